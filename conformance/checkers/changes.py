@@ -12,6 +12,7 @@ from typing import Final
 from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
+from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
@@ -21,9 +22,6 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.case import Case
 
-_REFUSED: Final = range(400, 500)
-# A proxy may have sent 408 after the device has acted; 406 is about the response.
-_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _MOST_OCTETS: Final = 65_536
 _MOST_THINGS: Final = 1_000
@@ -90,7 +88,7 @@ class Changes:
         if method in SAFE:
             if method == "GET" and operation is not None and occasion.context.plain:
                 yield from self._read(occasion, operation, path)
-        elif status in _REFUSED and status not in _UNCLEAR:
+        elif refuses(status, operation):
             said = f"{method} {path} with status {status}"
             if (above := path.rpartition("/")[0]) in self._known:
                 self._known[above].refused = said

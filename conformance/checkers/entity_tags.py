@@ -14,10 +14,18 @@ from conformance.verdict.case import Case
 _TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
 _LIST: Final = re.compile(rf"\s*{_TAG.pattern}(?:\s*,\s*{_TAG.pattern})*\s*")
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
-_CONDITIONS: Final = frozenset({"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "range"})
-_TAGS, _MATCH = "description/entity-tag", "description/if-match"
+_CONDITIONS: Final = frozenset(
+    {"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "if-range", "range"}
+)
+_TAGS, _MATCH, _REQUIRED = "description/entity-tag", "description/if-match", "description/required"
+# Conditions beside If-Match, by which a request may be refused with 412 as well (RFC 9110 13.2.2).
+_OTHERS: Final = frozenset({"if-none-match", "if-modified-since", "if-unmodified-since"})
 # So many tags are remembered, with contents of so many bytes.
 _MOST, _LARGEST = 4000, 65_536
+
+
+#: Header fields of a request, by which a representation is chosen.
+Fields = tuple[tuple[str, str], ...]
 
 
 class _Condition(NamedTuple):
@@ -47,6 +55,7 @@ class EntityTags:
     def __init__(self) -> None:
         self._named: dict[object, Response] = {}
         self._now: dict[str, Response] = {}
+        self._asked: dict[str, Fields] = {}
         self._wrote: dict[str, Occasion] = {}
         self._waiting: dict[str, _Condition] = {}
         # Whether the device has answered 304 and 412, and what is judged once it has.
@@ -55,6 +64,8 @@ class EntityTags:
         self._refused = 0
         self._ignored: list[Case] = []
         self._performed: list[Case] = []
+        # A 304 for a copy that is not the current one, with the tag that was current: the next read decides.
+        self._stale: dict[str, tuple[Occasion, str]] = {}
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange, and of earlier ones that it decides."""
@@ -67,7 +78,7 @@ class EntityTags:
                 # Several fields of one name are one list (RFC 9110 5.3).
                 asked[name.lower()] = f"{asked[name.lower()]}, {value}" if name.lower() in asked else value
         if request.method not in SAFE_METHODS:
-            yield from self._write(occasion, asked.get("if-match"))
+            yield from self._write(occasion, asked)
         elif request.method == "GET" and "range" not in asked:
             if "if-none-match" in asked:
                 yield from self._cached(occasion, asked)
@@ -77,6 +88,12 @@ class EntityTags:
         """Compare a content with the one that had the same tag, and with what was written just before."""
         url, answer = occasion.request.url, occasion.response
         waiting, wrote = self._waiting.pop(url, None), self._wrote.pop(url, None)
+        if answer.status == HTTPStatus.OK and url in self._stale:
+            stale, current = self._stale.pop(url)
+            expected = f"status 200 for a client without {current}, which was current before and after"
+            is_so = answer.header("etag") == current and fields_of(occasion) == fields_of(stale)
+            if is_so:
+                yield stale.case(_TAGS, False, expected, cause=f"{label_of(stale.operation)} stale")  # noqa: FBT003
         if waiting is not None:
             yield from _effect(waiting, answer)
             # Once, another client may have written the same.
@@ -84,30 +101,29 @@ class EntityTags:
             self._refused += is_lost
             if is_lost and self._refused > 1 and waiting.tag != answer.header("etag"):
                 expected = f"another status than 412, because the content is still what {waiting.tag} named"
-                label = _label(waiting.occasion.operation)
+                label = label_of(waiting.occasion.operation)
                 yield waiting.occasion.case(_MATCH, False, expected, cause=f"{label} current")  # noqa: FBT003
         tag = answer.header("etag") or ""
         if answer.status != HTTPStatus.OK or not _TAG.fullmatch(tag):
             return
-        self._now[url] = answer
+        self._now[url], self._asked[url] = answer, fields_of(occasion)
         if tag.startswith("W/"):
             return
-        fields = tuple(pair for pair in occasion.request.headers if pair[0].lower() not in _CONDITIONS)
-        key = (url, tag, answer.media_type, answer.header("content-encoding") or "", fields)
+        key = (url, tag, answer.media_type, answer.header("content-encoding") or "", fields_of(occasion))
         if key in self._named:
             other = _difference(self._named[key], answer)
             expected = f"another entity tag than {tag} for another content"
-            yield occasion.case(_TAGS, not other, expected, other, cause=f"{_label(occasion.operation)} one tag")
+            yield occasion.case(_TAGS, not other, expected, other, cause=f"{label_of(occasion.operation)} one tag")
         elif len(self._named) < _MOST and len(answer.body) < _LARGEST:
             self._named[key] = answer
         then = wrote.response.header("etag") if wrote is not None else None
         if wrote is not None and then and not then.startswith("W/") and wrote.response.body == answer.body:
             expected, found = f"ETag: {tag}, which a read right after gets with the same content", f"ETag: {then}"
-            yield wrote.case(_TAGS, then == tag, expected, found, cause=f"{_label(wrote.operation)} after")
+            yield wrote.case(_TAGS, then == tag, expected, found, cause=f"{label_of(wrote.operation)} after")
 
     def _cached(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
         """Judge a read by a client that has a copy: if it is current, it gets 304."""
-        answer, label = occasion.response, _label(occasion.operation)
+        answer, label = occasion.response, label_of(occasion.operation)
         tags = {one.removeprefix("W/") for one in _TAG.findall(asked["if-none-match"])}
         expected = "status 304, because If-None-Match has the current entity tag"
         if answer.status == HTTPStatus.NOT_MODIFIED:
@@ -115,6 +131,9 @@ class EntityTags:
             now = self._now.get(occasion.request.url)
             known = now.header("etag") if now is not None else None
             expected = f"status 304 with ETag: {known}, as status 200 has one (RFC 9110 15.4.5)" if known else expected
+            is_alike = self._asked.get(occasion.request.url) == fields_of(occasion)
+            if known and is_alike and known.removeprefix("W/") not in tags and asked["if-none-match"].strip() != "*":
+                self._stale[occasion.request.url] = occasion, known
             tag = answer.header("etag")
             holds = known is None or tag is not None
             yield occasion.case(_TAGS, holds, expected, "status 304 without ETag", cause=f"{label} 304 without")
@@ -136,9 +155,9 @@ class EntityTags:
             expected = "status 304 or 200 for a GET with If-None-Match"
             yield occasion.case(_TAGS, False, expected, cause=f"{label} 412")  # noqa: FBT003
 
-    def _write(self, occasion: Occasion, wanted: str | None) -> Iterator[Case]:
-        """Judge a request that acts, by its If-Match and what was current before it."""
-        url, answer = occasion.request.url, occasion.response
+    def _write(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+        """Judge a request that acts, by its conditions and what was current before it."""
+        url, answer, wanted = occasion.request.url, occasion.response, asked.get("if-match")
         now, is_refused = self._now.get(url), 400 <= answer.status < 500  # noqa: PLR2004 - RFC 9110 15.5
         self._wrote.pop(url, None)
         self._waiting.pop(url, None)
@@ -147,9 +166,14 @@ class EntityTags:
             self._now.clear()
             self._wrote.clear()
             self._waiting.clear()
+            self._stale.clear()
             if answer.ok and occasion.request.method in {"PUT", "PATCH"}:
                 self._wrote[url] = occasion
+        if now is not None:
+            yield from _performed(occasion, asked)
         if wanted is None or wanted.strip() == "*" or now is None or not _LIST.fullmatch(wanted):
+            return
+        if not _OTHERS.isdisjoint(asked):
             return
         tag = now.header("etag") or ""
         matches = tag.removeprefix("W/") in {one.removeprefix("W/") for one in _TAG.findall(wanted)}
@@ -161,7 +185,7 @@ class EntityTags:
                 self._performed.clear()
             self._waiting[url] = _Condition(occasion, tag, matches, now)
         elif answer.ok and answer.status != HTTPStatus.ACCEPTED and not matches:
-            label = _label(occasion.operation)
+            label = label_of(occasion.operation)
             case = occasion.case(_MATCH, False, _refusal(tag), cause=f"{label} performed")  # noqa: FBT003
             # Without the field, 412 may mean the state of the device.
             if self._has_412 or _declares(occasion.operation, with_status=not tag.startswith("W/")):
@@ -170,9 +194,33 @@ class EntityTags:
                 self._performed.append(case)
 
 
+def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+    """Judge a request to what exists that has no If-Match, or one that creates alone (RFC 9110 13.1.2, RFC 6585 3)."""
+    operation, answer = occasion.operation, occasion.response
+    is_done = answer.ok and answer.status != HTTPStatus.ACCEPTED
+    if operation is None or occasion.request.method not in {"PUT", "PATCH", "DELETE"}:
+        return
+    names = {item.name.lower() for item in operation.parameter("header")}
+    if asked.get("if-none-match", "").strip() == "*" and "if-none-match" in names:
+        if is_done or answer.status == HTTPStatus.PRECONDITION_FAILED:
+            expected = "a refusal with 412, because If-None-Match: * asks that nothing is there"
+            yield occasion.case(_MATCH, not is_done, expected, cause=f"{operation.label} none")
+        return
+    is_decided = is_done or answer.status == HTTPStatus.PRECONDITION_REQUIRED
+    is_asked_for = "if-match" in names and "428" in operation.responses
+    if asked.keys().isdisjoint({"if-match", *_OTHERS}) and is_asked_for and is_decided:
+        expected = "a refusal with 428, which the operation declares as well as If-Match"
+        yield occasion.case(_REQUIRED, not is_done, expected, cause=f"{operation.label} header If-Match")
+
+
+def fields_of(occasion: Occasion) -> Fields:
+    """Return the header fields of a request without its conditions, which choose a representation."""
+    return tuple(pair for pair in occasion.request.headers if pair[0].lower() not in _CONDITIONS)
+
+
 def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
     """Judge a refused request by what a read shows after it."""
-    occasion, label = waiting.occasion, _label(waiting.occasion.operation)
+    occasion, label = waiting.occasion, label_of(waiting.occasion.operation)
     status = occasion.response.status
     if waiting.matches:
         # A weak tag never matches here (RFC 9110 13.1.1).
@@ -225,5 +273,6 @@ def _said(value: dict[str, Any], name: str) -> str:
     return shown(value[name]) if name in value else "missing"
 
 
-def _label(operation: Operation | None) -> str:
+def label_of(operation: Operation | None) -> str:
+    """Return the label of an operation; empty without one."""
     return operation.label if operation else ""

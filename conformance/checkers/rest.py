@@ -6,6 +6,7 @@ from typing import Final
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, declared, fields, problem
 from conformance.checkers.changes import Changes
+from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
@@ -42,7 +43,7 @@ class RestCheckers:
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes, declared.WriteOnly(),
+            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
 from conformance.api.rest.references import collections_of
+from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import differences, is_devices, is_shared, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
@@ -24,9 +25,6 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.case import Case
 
-_REFUSED: Final = range(400, 500)
-# A proxy may have sent 408 after the device has acted; 406 is about the response.
-_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000
 # A device that acts later has so long, s.
@@ -134,7 +132,7 @@ class Writes:
             if request.method == "GET" and status == HTTPStatus.OK and item is not None and "?" not in path:
                 yield from self._read(occasion, item, path)
             return
-        if status in _REFUSED and status not in _UNCLEAR:
+        if refuses(status, operation):
             if item is not None and path in self._states:
                 self._writes[path].append(occasion)
             return
@@ -177,7 +175,7 @@ class Writes:
         if operation is None or request.media_type not in operation.bodies or not is_readable or not reads.now:
             return
         change = _Change(write, operation, *reads)
-        if write.response.status in _REFUSED:
+        if refuses(write.response.status, operation):
             yield from self._refused(occasion, change)
             return
         if write.response.status == _NOT_NOW:

@@ -17,7 +17,7 @@ from conformance.scenarios.estimate import TIMED_AGAIN
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
-from conformance.transport.exchange import Outgoing
+from conformance.transport.exchange import Exchange, Outgoing
 
 #: No content has this entity tag.
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
@@ -27,6 +27,8 @@ _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
 _REFUSALS: Final = 8
 # Each operation has been read so often by then: with the timed reads at the end, one wrong response in twenty is met.
 _READS: Final = 20 - TIMED_AGAIN
+# A content of so many octets has parts.
+_LONG: Final = 8
 # Operations are read more often where the device usually responds in so many ms.
 _QUICK_MS: Final = 50.0
 _FEW_READS: Final = 2
@@ -51,7 +53,9 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
         if usual is None:
             continue
         _head(surveyor, read, usual)
-        _cached(surveyor, read, usual)
+        last = surveyor.probes[-2].exchange
+        _cached(surveyor, read, usual, last)
+        _parts(surveyor, read, usual, last)
         for _ in found[: 1 if is_quick else _REFUSALS]:
             _after(surveyor, read, [usual], refusals)
         for inputs in islice(_queries(read, usual, values), min(queries, _QUERIES)):
@@ -89,14 +93,26 @@ def _after(
     return None
 
 
-def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:
+def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange | None) -> None:
     """Where the last read had an entity tag, read by conditions of clients that have that copy, or another one."""
-    last = surveyor.probes[-2].exchange
     tag = (last.response.header("etag") or "") if last is not None else ""
     request = written(read, inputs)
     for tags in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG) if tag else ():
         conditional = replace(request, headers=(*request.headers, ("If-None-Match", tags)))
         surveyor.send(read, Variation(Kind.ODD, "", "", inputs), conditional, fresh=False)
+
+
+def _parts(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange | None) -> None:
+    """Where the device has parts, read some of the last read, and one of another copy; then the whole once more."""
+    if last is None or len(last.response.body) < _LONG:
+        return
+    if "206" not in read.responses and (last.response.header("accept-ranges") or "").strip().lower() != "bytes":
+        return
+    request = written(read, inputs)
+    for fields in ((("Range", "bytes=2-5"),), (("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG))):
+        part = replace(request, headers=(*request.headers, *fields))
+        surveyor.send(read, Variation(Kind.ODD, "", "", inputs), part, fresh=False)
+    surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), fresh=False)
 
 
 def _head(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -14,6 +14,7 @@ from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
+from conformance.api.rest.patches import same
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
@@ -24,8 +25,10 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.representation import flat
 from conformance.documents.resources import resources_of
+from conformance.documents.security import demands
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG
+from conformance.scenarios.refusing import NO_FORMAT
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.special_bodies import TEXTS, is_list_of_changes, special_bodies, with_owned
@@ -40,6 +43,9 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _MEMBERS: Final = 6
 # So many filters of a list are tried; a device may list for so long what was deleted, s, and is asked so often.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
+_OCTETS: Final = "application/octet-stream"
+# Files with what programs take for the end of a line, of a text or of a file.
+_FILES: Final = (b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n", bytes(range(256)) + b"\r\n\n \0end")
 # The turn of an identifier that no other check chooses.
 _TURN: Final = 98
 # So many are written one by one after all together, which shows whether the others stay.
@@ -70,6 +76,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                     thing = _Thing(surveyor, read, thing_path)
                     thing.asked()
                     thing.written(changes)
+                    thing.filled()
                     if values.unique.knows(create) and changes:
                         thing.made_alike(create, changes, delete)
                     thing.deleted(delete, operations.get(("GET", collection_of(path))))
@@ -177,16 +184,20 @@ class _Thing:
         first = self.get()
         if not first.ok or first.exchange is None:
             return
+        is_behind = False
         for change in changes:
             bodies = self._bodies(change, members(first.exchange, ()))
-            for body in bodies[:1] if self.tag else ():
-                self.sent(change, body, ("If-Match", NO_TAG))
-                self.get()
+            if bodies:
+                self._refused(change, bodies)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
             for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
+                old = self.tag
                 if self.sent(change, body, *self._current()).ok:
                     self.get()
+                    if old not in {"", self.tag} and change is changes[0] and not is_behind:
+                        is_behind = True
+                        self._behind(change, bodies[-1], old)
             waits = True
             for body in self._special(change):
                 before, until = self._members(), time.monotonic() + _SETTLES_S
@@ -197,6 +208,65 @@ class _Thing:
                     waits = time.monotonic() < until
                     time.sleep(_PAUSE_S if waits else 0)
                     self.get()
+
+    def _refused(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
+        """Send what the description lets the device refuse for its header fields alone, and read after each.
+
+        That is a wrong condition or none, no format that the device has, and no credentials.
+        """
+        names = {one.name.lower() for one in change.parameter("header")}
+        tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] if self.tag else []
+        if self.tag and "428" in change.responses:
+            tried.append(())
+        if self.tag and "if-none-match" in names:
+            tried.append((("If-None-Match", "*"),))
+        if "406" in change.responses:
+            tried.append((("Accept", NO_FORMAT),))
+        for fields in tried:
+            is_right = fields and fields[0][0] != "If-Match"
+            self.sent(change, self._other(bodies), *fields, *(self._current() if is_right else ()))
+            if not self.get().ok:
+                return
+        if demands(self.api.run.contract.openapi, change):
+            body, inputs = self._other(bodies), usual_inputs(change, self.surveyor.values)[0]
+            request = written(change, inputs if body is None else replace(inputs, body=body))
+            headers = (*request.headers, *self._current())
+            self.api.client.send(change.method, self.target, headers=headers, body=request.body, authorized=False)
+            self.get()
+
+    def _other(self, bodies: Sequence[Any]) -> Any:
+        """Return a body that would change it; None without any."""
+        now = self._members()
+        others = (one for one in bodies if any(not same(now.get(name), one[name]) for name in one))
+        return next(others, bodies[0] if bodies else None)
+
+    def _behind(self, change: Operation, body: Any, old: str) -> None:
+        """Write and read by the entity tag that it had before: a client that missed a change (RFC 9110 13.1)."""
+        self.sent(change, body, ("If-Match", old))
+        self.get()
+        self.get(("If-None-Match", old))
+        self.get()
+
+    def filled(self) -> None:
+        """Send a file to what is below it and keeps one, and read that: all octets are those of the file."""
+        above = f"{self.read.template.rstrip('/')}/"
+        operations = {(one.method, one.template): one for one in operations_of(self.api.run.contract)}
+        for (method, template), read in operations.items():
+            put = operations.get(("PUT", template))
+            if method != "GET" or put is None or not template.startswith(above) or "{" in template[len(above) :]:
+                continue
+            if next(iter(put.bodies), "") != _OCTETS or not (allowed(self.api, put) and allowed(self.api, read)):
+                continue
+            path = self.target.rstrip("/") + template[len(above) - 1 :]
+            for octets in _FILES:
+                inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=_OCTETS)
+                request = replace(written(put, inputs), target=path)
+                if not self.surveyor.send(put, Variation(Kind.AGAIN, "", "", inputs), request).ok:
+                    break
+                whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+                for fields in ((), (("Range", "bytes=2-5"),), ()):
+                    part = replace(whole, headers=(*whole.headers, *fields))
+                    self.surveyor.send(read, Variation(Kind.ODD if fields else Kind.AGAIN, "", "", Inputs()), part)
 
     def _members(self) -> dict[str, Any]:
         return members(self.last, ()) if self.last is not None else {}
@@ -250,10 +320,9 @@ class _Thing:
         if delete is None or not self.get().ok:
             return
         was, began = members(self.last, ()) if self.last is not None else {}, time.monotonic()
-        if self.tag:
-            self.sent(delete, None, ("If-Match", NO_TAG))
-            if not self.get().ok:
-                return
+        self._refused(delete)
+        if not self.get().ok:
+            return
         self.sent(delete, None, *self._current())
         self.get(place="path of what was deleted")
         head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")

@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.rest.inputs import usual_inputs
+from conformance.api.rest.statuses import refuses
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.scenarios.living import ABSENT, Kind, Living, Look, State, Thing
 from conformance.scenarios.special_bodies import half_valid
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
-# A proxy may have sent 408 after the device has acted; 406 is about the response.
-_UNCLEAR: Final = frozenset({HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT})
-_ERRORS: Final = range(400, 500)
 _TEXT: Final = "text/plain"
+#: A media type that no device has.
+NO_FORMAT: Final = "application/x.roaas-nothing"
 # The turns of the values in a series of requests are so far apart.
 _STEP: Final = 10
 # Texts that no client but the suite writes, as `another` makes them.
 _OURS: Final = re.compile(r"(?:roaas |r)\d+")
 
 
-def is_refused(exchange: Exchange) -> bool:
+def is_refused(exchange: Exchange, operation: Operation | None = None) -> bool:
     """Return whether a device says that it has not done what a request asks."""
-    status = exchange.response.status
-    return status in _ERRORS and status not in _UNCLEAR
+    return refuses(exchange.response.status, operation)
+
+
+def is_ours(value: Any) -> bool:
+    """Return whether a value is a text that no client but the suite writes."""
+    return isinstance(value, str) and _OURS.fullmatch(value) is not None
 
 
 def _half_valid(living: Living, operation: Operation, turn: int, now: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -64,21 +68,28 @@ def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange) ->
 
 
 def refuse_creation(living: Living, create: Operation, turn: int) -> None:
-    """Send a creation that should be refused, and look in the list for what it asks for."""
-    body = next(_half_valid(living, create, turn, {}), None)
-    if body is None or living.lister is None or living.listing is None or not living.things:
+    """Send creations that should be refused, and look in the list for what each asks for."""
+    if living.lister is None or living.listing is None or not living.things:
         return
-    sent = living.writer.send(create, "", body)
-    ours = {name: one for name, one in body.items() if isinstance(one, str) and _OURS.fullmatch(one)}
-    if not is_refused(sent) or not ours:
-        return
+    writer, tried = living.writer, list[Exchange]()
+    if (body := next(_half_valid(living, create, turn, {}), None)) is not None:
+        tried.append(writer.send(create, "", body))
+    other = [next(iter(writer.bodies(create, turn + number * _STEP, {})), None) for number in (1, 2)]
+    if other[0] is not None and other[1] is not None:
+        tried.append(writer.send(create, "", other[0], media_type=_TEXT))
+        if "406" in create.responses:
+            tried.append(writer.send(create, "", other[1], headers=(("Accept", NO_FORMAT),)))
+    refused = [one for one in tried if is_refused(one, create)]
     before = living.listing.ids
-    listing = living.list_of(living.things[-1])
-    made = [
-        one
-        for one, id_ in zip(listing.items, listing.ids, strict=True)
-        if id_ and id_ not in before and any(one.get(name) == text for name, text in ours.items())
-    ]
-    other = f"a list with {', '.join(f'{name} {text!r}' for name, text in ours.items())}" if made else ""
-    expected = f"a list without what {create.label} with status {sent.response.status} asked for"
-    living.looks.append(Look(Kind.REFUSED, create.label, listing.exchange, expected, other))
+    listing = living.list_of(living.things[-1]) if refused else living.listing
+    for sent in refused:
+        value = read_json(sent.request.body).value
+        ours = {name: one for name, one in value.items() if is_ours(one)} if isinstance(value, dict) else {}
+        made = ours and [
+            one
+            for one, id_ in zip(listing.items, listing.ids, strict=True)
+            if id_ and id_ not in before and any(one.get(name) == text for name, text in ours.items())
+        ]
+        found = f"a list with {', '.join(f'{name} {text!r}' for name, text in ours.items())}" if made else ""
+        expected = f"a list without what {create.label} with status {sent.response.status} asked for"
+        living.looks.append(Look(Kind.REFUSED, create.label, listing.exchange, expected, found))

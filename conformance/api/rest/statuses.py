@@ -64,6 +64,17 @@ def is_refusal(exchange: Exchange) -> bool:
     return HTTPStatus.BAD_REQUEST <= status < HTTPStatus.INTERNAL_SERVER_ERROR and status not in _NO_REFUSALS
 
 
+def refuses(status: int, operation: Operation | None) -> bool:
+    """Return whether a status says that a request was not performed.
+
+    A proxy may have sent 408 after the device has acted. Many servers find out that no format is acceptable when they
+    have acted; an operation that declares 406 refuses by it.
+    """
+    is_declared = operation is not None and str(status) in operation.responses
+    unclear = {HTTPStatus.REQUEST_TIMEOUT} if is_declared else {HTTPStatus.NOT_ACCEPTABLE, HTTPStatus.REQUEST_TIMEOUT}
+    return HTTPStatus.BAD_REQUEST <= status < HTTPStatus.INTERNAL_SERVER_ERROR and status not in unclear
+
+
 def is_taken(exchange: Exchange) -> bool:
     """Return whether a valid request was accepted, or only put off: a goal of the robot's own may be active."""
     return exchange.response.ok or exchange.response.status == HTTPStatus.CONFLICT

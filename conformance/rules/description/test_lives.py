@@ -13,6 +13,7 @@ from conformance.api.rest.things import is_marked_deleted
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.scenarios.ending import Deletion, Ended, begin_and_end, look_at_ended, used_things
+from conformance.scenarios.keys import Keyed, repeated_keys
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
@@ -77,6 +78,13 @@ def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outc
         shown = one.deleted if one.fault else one.user
         expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
         yield Case(not one.fault, shown, expected, f"{shown.came}: {one.fault}", cause=one.operation)
+
+
+@rule("description/idempotency-key", on=(repeated_keys,))
+def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
+    """Judge whether a key stands for one request: it is performed once, and no other one gets its response."""
+    for one in trace:
+        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=f"{one.operation} {one.way}")
 
 
 @pytest.fixture(scope="session")

@@ -15,13 +15,13 @@ from conformance.verdict.case import Case
 
 
 def _played(name: str, scenario: Scenario) -> Rule:
-    """Return the rule that plays requests; `checkers.resources` and `checkers.entity_tags` judge each of the run."""
+    """Return the rule that plays requests; checkers of resources, tags and contents judge each of the run."""
     return rule(f"description/{name}", on=(scenario,))(lambda _trace: ())
 
 
 head = _played("head", neighbours)
 method_refused, entity_tag = _played("method-refused", own_things), _played("entity-tag", own_things)
-if_match = _played("if-match", own_things)
+if_match, digest = _played("if-match", own_things), _played("digest", own_things)
 
 
 @pytest.mark.phase("late")

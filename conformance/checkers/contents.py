@@ -1,0 +1,178 @@
+"""Contents by their octets: a part is a part of the whole, a digest that of the content, a file what was sent.
+
+RFC 9110 14, RFC 9530. What differs counts only between two equal readings of the whole.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from base64 import b64decode
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Final, NamedTuple
+
+from conformance.api.rest.statuses import refuses
+from conformance.checkers.entity_tags import Fields, fields_of, label_of
+from conformance.checkers.occasion import Occasion
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import SAFE, is_json
+from conformance.documents.parameters import plain_name
+from conformance.verdict.case import Case
+
+_PART: Final = re.compile(r"bytes (\d+)-(\d+)/(\d+|\*)", re.IGNORECASE)
+# Digests in structured fields (RFC 9530 2, 3), and in the field before them (RFC 3230 4.3.2).
+_DIGEST: Final = re.compile(r"(sha-256|sha-512)\s*=\s*:?([A-Za-z0-9+/]+=*):?(?=\s*(?:,|;|$))", re.IGNORECASE)
+_HASHES: Final = {"sha-256": hashlib.sha256, "sha-512": hashlib.sha512}
+# Members that tell the digest of a file, by their plain names.
+_MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
+_OCTETS: Final = "application/octet-stream"
+# So many contents of so many octets are remembered.
+_MOST, _LARGEST = 200, 1 << 20
+_RANGE, _DIGESTS, _READ, _TAGS = (
+    "http/range",
+    "description/digest",
+    "description/written-is-read",
+    "description/entity-tag",
+)
+
+
+class _Key(NamedTuple):
+    """What chooses one representation: where it is, and the header fields that ask for it."""
+
+    url: str
+    fields: Fields
+
+
+class Contents:
+    """Judges parts, digests and files."""
+
+    def __init__(self) -> None:
+        self._whole: dict[_Key, bytes] = {}
+        # Parts that wait for the next reading of the whole.
+        self._parts: dict[_Key, list[Occasion]] = {}
+        # Files as they were sent, until something else is changed.
+        self._sent: dict[str, Occasion] = {}
+        # Hashes of what was sent to a file or read from it, and the files that read otherwise.
+        self._known: dict[str, set[int]] = {}
+        self._differs: dict[str, set[bytes]] = {}
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange, and of earlier ones that it decides."""
+        request, answer = occasion.request, occasion.response
+        if request.raw is not None or answer.cut or answer.header("content-encoding") is not None:
+            return
+        if request.method != "HEAD":
+            yield from _digests(occasion)
+        if request.method not in SAFE:
+            yield from self._written(occasion)
+        elif request.method == "GET":
+            yield from self._read(occasion)
+
+    def _written(self, occasion: Occasion) -> Iterator[Case]:
+        request, answer = occasion.request, occasion.response
+        if refuses(answer.status, occasion.operation):
+            return
+        self._whole.clear()
+        self._parts.clear()
+        self._sent.clear()
+        is_file = request.media_type == _OCTETS and 0 < len(request.body) <= _LARGEST
+        if is_file and answer.ok and answer.status != HTTPStatus.ACCEPTED:
+            if request.method == "PUT":
+                self._sent[request.url] = occasion
+            yield from _member(occasion)
+
+    def _read(self, occasion: Occasion) -> Iterator[Case]:
+        request, answer = occasion.request, occasion.response
+        key = _Key(request.url, fields_of(occasion))
+        names = {name.lower() for name, _ in request.headers}
+        if answer.status == HTTPStatus.PARTIAL_CONTENT and "range" in names:
+            if "if-range" in names:
+                value = next(value for name, value in request.headers if name.lower() == "if-range")
+                yield from self._ignored(occasion, value)
+            if len(self._parts) < _MOST:
+                self._parts.setdefault(key, []).append(occasion)
+        if answer.status != HTTPStatus.OK or "range" in names:
+            return
+        before, parts = self._whole.get(key), self._parts.pop(key, [])
+        if before == answer.body:
+            for part in parts:
+                yield from _part(part, before)
+        if len(self._whole) < _MOST and len(answer.body) <= _LARGEST:
+            self._whole[key] = answer.body
+        if answer.media_type == _OCTETS:
+            yield from self._file(occasion, self._sent.pop(request.url, None))
+
+    def _file(self, occasion: Occasion, sent: Occasion | None) -> Iterator[Case]:
+        """Judge a read by the file that was sent just before; one that was there before may be there for a while."""
+        body, known = occasion.response.body, self._known.setdefault(occasion.request.url, set())
+        if sent is not None and (sent.request.body == body or hash(body) not in known):
+            octets, label = sent.request.body, label_of(occasion.operation)
+            differs = self._differs.setdefault(occasion.request.url.partition("?")[0], set())
+            differs |= set() if octets == body else {octets}
+            # Once, another client may have sent another file.
+            if octets == body or len(differs) > 1:
+                expected = f"the {len(octets)} octets that {label_of(sent.operation)} has sent"
+                found, cause = f"{len(body)} octets, which differ", f"{label} octets"
+                yield occasion.case(_READ, octets == body, expected, found, cause=cause)
+        known |= {hash(body)} | ({hash(sent.request.body)} if sent is not None else set())
+        if len(self._known) > _MOST:
+            del self._known[next(iter(self._known))]
+
+    @staticmethod
+    def _ignored(occasion: Occasion, value: str) -> Iterator[Case]:
+        """Judge a part for a client whose If-Range names another content (RFC 9110 13.1.5)."""
+        tag = occasion.response.header("etag") or ""
+        if value.startswith('"') and tag.startswith('"') and value != tag:
+            expected = f"status 200 with the whole, because If-Range does not have {tag}"
+            yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
+
+
+def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:
+    """Judge one part by the whole that was read before and after it."""
+    answer = occasion.response
+    found = _PART.fullmatch((answer.header("content-range") or "").strip())
+    if found is None or answer.media_type == "multipart/byteranges":
+        return
+    first, last = int(found[1]), int(found[2])
+    wrong = ""
+    if found[3] not in {"*", str(len(whole))}:
+        wrong = f"Content-Range: {found[0]}, and the whole has {len(whole)} octets"
+    elif answer.body != whole[first : last + 1]:
+        wrong = f"{len(answer.body)} octets that are not those of Content-Range: {found[0]}"
+    expected = f"octets {first} to {last} of the {len(whole)}, as a GET of the whole before and after shows them"
+    yield occasion.case(_RANGE, not wrong, expected, wrong, cause=f"{label_of(occasion.operation)} octets")
+
+
+def _digests(occasion: Occasion) -> Iterator[Case]:
+    """Judge the digests of a content, and those of a representation that is all of it."""
+    answer = occasion.response
+    is_whole = occasion.request.method == "GET" and answer.status == HTTPStatus.OK
+    for name in ("Content-Digest", "Repr-Digest", "Digest") if is_whole else ("Content-Digest",):
+        for algorithm, text in _DIGEST.findall(answer.header(name) or ""):
+            said, own = _decoded(text), _HASHES[algorithm.lower()](answer.body).digest()
+            expected = f"the digest of the content in {name}"
+            found, cause = f"{algorithm} of something else", f"{label_of(occasion.operation)} {name}"
+            yield occasion.case(_DIGESTS, said == own, expected, found, cause=cause)
+
+
+def _member(occasion: Occasion) -> Iterator[Case]:
+    """Judge a member of a response to an upload that tells the file's digest."""
+    answer = occasion.response
+    value = read_json(answer.body).value if is_json(answer.media_type) else None
+    for name, text in value.items() if isinstance(value, dict) else ():
+        make = _MEMBERS.get(plain_name(name))
+        if make is not None and isinstance(text, str) and re.fullmatch(r"[0-9a-fA-F]+", text):
+            own = make(occasion.request.body).hexdigest()
+            if len(own) == len(text):
+                expected, cause = f"{own} as {name}, the digest of what was sent", label_of(occasion.operation)
+                yield occasion.case(
+                    _DIGESTS, own == text.lower(), expected, f"{text} as {name}", cause=f"{cause} {name}"
+                )
+
+
+def _decoded(text: str) -> bytes | None:
+    try:
+        return b64decode(text, validate=True)
+    except ValueError:
+        return None

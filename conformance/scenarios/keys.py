@@ -1,0 +1,208 @@
+"""Send requests with an Idempotency-Key once more: with the same body, with another one, and by a new key.
+
+The draft draft-ietf-httpapi-idempotency-key-header, 2.6, says what a device does.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from http import HTTPStatus
+from typing import Any, Final
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.inputs import Inputs, renewed, usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.patches import same
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import collection_of, identified
+from conformance.api.rest.values import Values
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.parameters import Parameter, plain_name
+from conformance.scenarios.own_things import located
+from conformance.scenarios.refusing import is_ours
+from conformance.scenarios.scenario import NoOccasionError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.whole_list import read_whole
+from conformance.scenarios.writing import Writer, members
+from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
+
+# So many operations are tried; and the turn of bodies that no other check sends.
+_OPERATIONS, _TURN = 6, 7100
+# Members by which a response names what was made, whatever the client has sent.
+_IDS: Final = ("id", "uuid", "guid")
+# By these an operation says that it may refuse a key that came with another body.
+_REFUSALS: Final = frozenset({"409", "422"})
+
+
+@dataclass(frozen=True)
+class Keyed:
+    """One request with a key that was sent before, or beside one.
+
+    Attributes:
+        operation: its label.
+        way: what is special about it: the same request, another body, or a new key.
+        shown: the response that decides.
+        expected: what should have come of it, as a noun phrase.
+        fault: what came of it instead; empty: that.
+    """
+
+    operation: str
+    way: str
+    shown: Exchange
+    expected: str
+    fault: str = ""
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
+def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
+    """Repeat requests with the key of an earlier one; what is found wrong counts if a second round finds it too."""
+    operations = [one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams]
+    by_key = {(one.method, one.template.rstrip("/")): one for one in operations}
+    found, tried = list[Keyed](), 0
+    for operation in operations:
+        key = key_of(operation)
+        if key is None or operation.method != "POST" or operation.motion or tried >= _OPERATIONS:
+            continue
+        tried += 1
+        api.run.limit.check()
+        with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+            rounds = _Rounds(Writer(api, values), operation, key, by_key)
+            first = list(rounds.play(0))
+            wrong = [one for one in first if one.fault]
+            again = {one.way for one in rounds.play(1) if one.fault} if wrong else set[str]()
+            found += [one for one in first if not one.fault or one.way in again]
+    if not found:
+        raise NoOccasionError("no operation with a parameter Idempotency-Key answered with what it has made")
+    return tuple(found)
+
+
+def key_of(operation: Operation) -> Parameter | None:
+    """Return the header parameter of an operation that is its idempotency key, or None."""
+    named = (one for one in operation.parameter("header") if plain_name(one.name).endswith("idempotencykey"))
+    return next(named, None)
+
+
+@dataclass
+class _Rounds:
+    """The requests to one operation."""
+
+    writer: Writer
+    operation: Operation
+    key: Parameter
+    operations: dict[tuple[str, str], Operation]
+
+    def __post_init__(self) -> None:
+        collection = self.operation.template.rstrip("/")
+        reads = [one for (method, path), one in self.operations.items() if method == "GET"]
+        self._item = next((one for one in reads if collection_of(one.template) == collection), None)
+        self._lister = self.operations.get(("GET", collection))
+        self._delete = (
+            self.operations.get(("DELETE", self._item.template.rstrip("/"))) if self._item is not None else None
+        )
+
+    def play(self, number: int) -> Iterator[Keyed]:
+        """Send a request, the same again, its key with another body, and a new key with a third one."""
+        bodies, keys = self._bodies(_TURN + 10 * number), self._keys()
+        if len(keys) < 2 or not bodies:  # noqa: PLR2004 - the first one, and a new one
+            return
+        before = self._listed()
+        request = self._request(keys[0], bodies[0])
+        first = self._send(request)
+        made = [first]
+        if not first.response.ok or not (name := self._name(first)):
+            return
+        try:
+            again = self._send(request)
+            made.append(again)
+            yield self._repeated(first, again, name, before)
+            if len(bodies) > 1 and self.operation.responses.keys() & _REFUSALS:
+                other = self._send(self._request(keys[0], bodies[1]))
+                made.append(other)
+                expected = "a refusal with 422 of a key that came before with another body"
+                fault = other.came if other.response.ok else ""
+                yield Keyed(self.operation.label, "other body", other, expected, fault)
+            if len(bodies) > 1 and self._item is not None and first.response.status == HTTPStatus.CREATED:
+                new = self._send(self._request(keys[1], bodies[-1]))
+                made.append(new)
+                is_old = new.response.status == HTTPStatus.CREATED and self._name(new) == name
+                expected = f"something else than {name}, which was made for another key and another body"
+                yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
+        finally:
+            self._tidied(made)
+
+    def _repeated(self, first: Exchange, again: Exchange, name: str, before: set[str] | None) -> Keyed:
+        """Judge the same request: one that was performed twice has made two things."""
+        expected, shown, fault = f"the response with {name}, or a refusal", again, ""
+        second = self._name(again) if again.response.ok else ""
+        if second and second != name:
+            fault = f"{second}, a second one"
+        elif (before is not None) and self._lister is not None and self._item is not None:
+            sent = read_json(first.request.body).value
+            listing = read_whole(self.writer, self._lister, self._item, self._lister.template)
+            new = [
+                id_
+                for one, id_ in zip(listing.items, listing.ids, strict=True)
+                if id_ and id_ not in before and _is_like(one, sent)
+            ]
+            if len(set(new)) > 1:
+                expected, shown, fault = f"a list with {name} alone of what was sent", listing.exchange, ", ".join(new)
+        return Keyed(self.operation.label, "same request", shown, expected, fault)
+
+    def _send(self, request: Outgoing) -> Exchange:
+        return self.writer.api.send(request)
+
+    def _request(self, key: str, inputs: Inputs) -> Outgoing:
+        return written(self.operation, inputs.having("header", self.key.name, key))
+
+    def _keys(self) -> list[str]:
+        """Return two keys that the device does not know, as far as the schema allows them."""
+        found = []
+        for _ in range(2):
+            text = str(uuid.uuid4())
+            candidates = (text, f'"{text}"', text.replace("-", ""), text[:8])
+            found += [next((one for one in candidates if fits(self.key.schema, one)), "")]
+        return [one for one in found if one]
+
+    def _bodies(self, turn: int) -> list[Inputs]:
+        """Return inputs with three different bodies; with one alone where a body cannot be another one."""
+        usual, values = usual_inputs(self.operation, self.writer.values)[0], self.writer.values
+        first, found = renewed(self.operation, usual, values), list[Inputs]()
+        for number in range(3):
+            body = next(iter(self.writer.bodies(self.operation, turn + number)), None)
+            inputs = first if body is None else renewed(self.operation, replace(usual, body=body), values)
+            if all(not same(inputs.body, one.body) for one in found) or not found:
+                found.append(inputs)
+        return found if len(found) == 3 else found[:1]  # noqa: PLR2004 - see above
+
+    def _name(self, exchange: Exchange) -> str:
+        """Return what a response says that it has made: where it is, or its identifier; empty if it says neither."""
+        if self._item is not None:
+            if path := located(self.writer.api, self._item, exchange):
+                return path
+            if (id_ := identified(read_json(exchange.response.body).value, self._item)[1]) is not None:
+                return str(id_)
+        told = members(exchange, _IDS)
+        id_ = next((one for name, one in told.items() if plain_name(name) in _IDS), None)
+        return str(id_) if isinstance(id_, str | int) else exchange.response.header("location") or ""
+
+    def _listed(self) -> set[str] | None:
+        if self._lister is None or self._item is None or self._lister.parameter("path"):
+            return None
+        return set(read_whole(self.writer, self._lister, self._item, self._lister.template).ids)
+
+    def _tidied(self, made: list[Exchange]) -> None:
+        """Delete what was made."""
+        names = {self._name(one): None for one in made if one.response.ok}
+        for path in names:
+            if self._delete is not None and self._item is not None and path.startswith("/"):
+                self.writer.conditional(self._delete, self._item, path)
+
+
+def _is_like(item: dict[str, Any], sent: Any) -> bool:
+    """Return whether an item of a list has the texts that this run alone has sent."""
+    own = {name: one for name, one in sent.items() if is_ours(one)} if isinstance(sent, dict) else {}
+    return bool(own) and all(item.get(name) == one for name, one in own.items())

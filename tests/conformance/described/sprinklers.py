@@ -1,0 +1,605 @@
+"""A device of irrigation zones, right in several styles, and with faults that show between two exchanges."""
+
+import copy
+import hashlib
+import itertools
+import json
+import re
+import time
+from base64 import b64encode
+from datetime import UTC, datetime
+
+from aiohttp import web
+from small_device import REFUSED, answers, described, error
+
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_KEY = {"name": "Idempotency-Key", "in": "header", "schema": {"type": "string", "minLength": 1, "maxLength": 80}}
+_MATCH = {"name": "If-Match", "in": "header", "schema": {"type": "string"}}
+_NONE_MATCH = {"name": "If-None-Match", "in": "header", "schema": {"type": "string"}}
+_BAD = {"4XX": REFUSED}
+_WRITABLE = {
+    "name": {"type": "string", "minLength": 1, "maxLength": 60},
+    "minutes": {"type": "number", "minimum": 0, "maximum": 600},
+    "litres": {"type": "integer", "format": "int64", "minimum": 0, "maximum": 2**60},
+    "starts": {"type": "string", "format": "date-time"},
+    "valves": {"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 99}, "maxItems": 8},
+}
+_FIRST = {"minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": []}
+_SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "additionalProperties": False}
+_PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
+_STATES = ["idle", "running", "paused", "done"]
+_LOG = "".join(f"{number:04} valve opened\n" for number in range(40)).encode()
+
+
+def _shape(style):
+    own = {"id": {"type": "string", "readOnly": True}, "state": {"enum": _STATES, "readOnly": True}}
+    if style.get("counts"):
+        own |= {"reads": {"type": "integer", "readOnly": True}, "seen": {"type": "string", "readOnly": True}}
+    properties = {**_WRITABLE, **own}
+    return {"type": "object", "required": ["id", "name", "state"], "properties": properties}
+
+
+def _tag(value, style):
+    """Return the entity tag of a value, weak in some styles."""
+    text = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
+    return f'W/"{text}"' if style.get("etag") == "weak" else f'"{text}"'
+
+
+class Sprinklers:
+    """The zones, their map files, the settings and the log.
+
+    Args:
+        style: what is free: see `RIGHT`.
+        faults: what is wrong: see `FAULTS`.
+    """
+
+    def __init__(self, style, faults):
+        self.style, self.faults = style, frozenset(faults)
+        self.zones, self.maps, self.keys, self.old = {}, {}, {}, {}
+        self.issued, self.numbers, self.ticks = set(), itertools.count(1), itertools.count(1)
+        self.settings = {"season": "summer", "rain_stop": True, "pressure": 2.5}
+        self.cached, self.background = None, None
+        self.errors = self.since_s = 0
+        for name in ("lawn", "roses"):
+            self.add({"name": name})
+
+    def has(self, fault):
+        return fault in self.faults
+
+    def add(self, body):
+        id_ = f"z{next(self.numbers)}"
+        self.zones[id_] = {**_FIRST, **body, "id": id_, "state": "idle", "at": 0.0}
+        self.settle(id_)
+        return id_
+
+    def settle(self, id_):
+        """Let readers see what was written, in some styles a while later."""
+        if not self.style.get("late"):
+            return
+        before = self.old.get(id_, (0.0, None))[1] if self.old.get(id_, (0.0, None))[0] > time.monotonic() else None
+        self.old[id_] = time.monotonic() + self.style["late"], before
+
+    def shown(self, id_, where="item"):
+        zone = self.zones.get(id_)
+        if zone is None:
+            return None
+        if zone["state"] == "running" and time.monotonic() - zone["at"] > self.style.get("takes", 20):
+            zone["state"] = "done"
+        value = {name: copy.copy(one) for name, one in zone.items() if name != "at"}
+        if self.style.get("counts"):
+            zone["reads"] = zone.get("reads", 0) + 1
+            value |= {"reads": zone["reads"], "seen": datetime.now(UTC).isoformat()}
+        if self.has("the list shows another state") and where == "list" and value["state"] == "paused":
+            value["state"] = "running"
+        if self.has("the list rounds") and where == "list":
+            value["minutes"] = round(value["minutes"])
+        return value
+
+    def known(self, value):
+        return {name: one for name, one in value.items() if name not in {"reads", "seen"}}
+
+    def headers(self, value):
+        if self.style.get("etag") == "none":
+            return {}
+        tag = _tag(self.known(value), self.style)
+        self.issued.add(tag)
+        return {"ETag": tag}
+
+    # --- conditions ---
+
+    def refused(self, request, id_):
+        """Return the refusal of a write for its conditions, or None."""
+        wanted, value = request.headers.get("If-Match"), self.known(self.shown(id_))
+        tag = _tag(value, self.style)
+        if self.style.get("etag") == "none":
+            return error(412, "no entity tags here") if wanted not in {None, "*"} else None
+        if wanted is None:
+            asks = self.style.get("asks", True) and not self.has("a missing If-Match is taken")
+            return error(428, "If-Match is missing") if asks else None
+        tags = re.findall(r'(?:W/)?"[^"]*"', wanted)
+        holds = wanted.strip() == "*" or (tag in tags and not tag.startswith("W/"))
+        if self.has("a stale If-Match is taken"):
+            holds |= not self.issued.isdisjoint(tags)
+        return None if holds else error(412, "another version")
+
+    def cached_answer(self, request, value):
+        """Return a 304 if the client has this value, or None."""
+        fields, asked = self.headers(value), request.headers.get("If-None-Match")
+        if asked is None or not fields:
+            return None
+        tags = {one.removeprefix("W/") for one in re.findall(r'(?:W/)?"[^"]*"', asked)}
+        current = fields["ETag"].removeprefix("W/") in tags or asked.strip() == "*"
+        if self.has("a stale If-None-Match is current"):
+            current |= not {one.removeprefix("W/") for one in self.issued}.isdisjoint(tags)
+        return web.Response(status=304, headers=fields) if current else None
+
+    # --- bodies ---
+
+    async def body(self, request, *, whole):
+        """Return the valid members of a request's body, or the refusal."""
+        if request.content_type != "application/json":
+            return error(415, "JSON only", Accept="application/json")
+        try:
+            value = json.loads(await request.read(), parse_constant=lambda text: int(text, 99))
+        except (ValueError, RecursionError):
+            return error(400, "no JSON")
+        if not isinstance(value, dict) or (whole and "name" not in value) or not value:
+            return error(422, "no zone")
+        problem = next((name for name, one in value.items() if not _fits(name, one)), "")
+        return error(422, f"{problem} is not valid") if problem else value
+
+    def taken(self, body):
+        """Return what is stored of a body."""
+        kept = dict(body)
+        if self.has("the offset is lost") and "starts" in kept:
+            kept["starts"] = re.sub(r"[+-]\d\d:\d\d$", "Z", kept["starts"])
+        if self.has("two decimals are kept") and "minutes" in kept:
+            kept["minutes"] = round(kept["minutes"], 2)
+        if self.has("numbers are single floats") and "minutes" in kept:
+            kept["minutes"] = float(f"{kept['minutes']:.7g}")
+        if self.has("the last item is lost") and len(kept.get("valves", ())) > 2:
+            kept["valves"] = kept["valves"][:-1]
+        if self.has("large numbers are doubles") and "litres" in kept:
+            kept["litres"] = int(float(kept["litres"]))
+        return kept
+
+    def write(self, id_, values):
+        self.zones[id_] |= values
+        self.settle(id_)
+
+    # --- the collection ---
+
+    def wants(self, request, *known):
+        """Return the media type for a request, or an empty text where none of these is accepted."""
+        accept = request.headers.get("Accept", "*/*")
+        ranges = {}
+        for part in accept.split(","):
+            name, _, rest = part.strip().lower().partition(";")
+            found = re.search(r"q\s*=\s*([\d.]+)", rest)
+            ranges[name.strip()] = float(found[1]) if found else 1.0
+        places = [[name, f"{name.partition('/')[0]}/*", "*/*"] for name in known]
+        rated = [(next((ranges[one] for one in some if one in ranges), 0), -n) for n, some in enumerate(places)]
+        quality, place = max(rated)
+        return known[-place] if quality > 0 else ""
+
+    async def every(self, request):
+        media_type = self.wants(request, "application/json", "text/csv")
+        if not media_type:
+            return error(406, "JSON or CSV")
+        if request.method == "HEAD" and self.has("HEAD renames"):
+            for zone in self.zones.values():
+                zone["name"] = "seen"
+        if self.has("a list resets") and request.query_string == "":
+            for zone in self.zones.values():
+                zone["minutes"] = 10
+        found = [self.shown(one, "list") for one in self.zones]
+        if self.has("a cached list is old"):
+            self.cached = self.cached or copy.deepcopy(found)
+            ids = {one["id"] for one in found}
+            known = {one["id"]: one for one in self.cached if one["id"] in ids}
+            found = [known.get(one["id"], one) for one in found]
+            self.cached = copy.deepcopy(found)
+        vary = {"Vary": "Accept"}
+        if media_type == "application/json":
+            return web.json_response(found, headers=vary)
+        rows = [[str(one[name]) for name in ("id", "name", "minutes", "state")] for one in found]
+        if self.has("CSV lacks the last row"):
+            rows = rows[:-1]
+        if self.has("CSV has other values"):
+            rows = [[id_, name, str(float(minutes) * 60), state] for id_, name, minutes, state in rows]
+        lines = [",".join(_quoted(one) for one in row) for row in [["id", "name", "minutes", "state"], *rows]]
+        body = "\r\n".join([*lines, ""]).encode()
+        return web.Response(body=body, content_type="text/csv", charset="utf-8", headers=vary)
+
+    async def create(self, request):
+        is_acceptable = bool(self.wants(request, "application/json"))
+        if not is_acceptable and not self.has("what is refused with 406 is created"):
+            return error(406, "JSON only")
+        key, body = request.headers.get("Idempotency-Key"), await self.body(request, whole=True)
+        if isinstance(body, web.Response):
+            if body.status == 415 and self.has("what is refused with 415 is created"):
+                self.add(self.taken(_forced(await request.read())))
+            return body
+        if (known := self.answer_of(key, body)) is not None:
+            return known
+        value = self.shown(self.add(self.taken(body)))
+        if key is not None and self.style.get("keys", True):
+            self.keys[key] = body, value
+            while len(self.keys) > self.style.get("remembers", 1000):
+                del self.keys[next(iter(self.keys))]
+        return self.again(201, value) if is_acceptable else error(406, "JSON only")
+
+    def answer_of(self, key, body):
+        """Return the answer to a request whose key is known or no key, else None."""
+        if key is not None and not 1 <= len(key) <= 80:
+            return error(422, "a key has 1 to 80 characters")
+        if key is not None and self.keys and self.has("a new key gets an old answer"):
+            return self.again(201, next(iter(self.keys.values()))[1])
+        if key not in self.keys or self.has("one key acts twice"):
+            return None
+        asked, value = self.keys[key]
+        is_other = asked != body and self.style.get("prints", True)
+        if is_other and not self.has("another body gets the first answer"):
+            return error(422, "the key was for another body")
+        if self.style.get("repeats") == "refused":
+            return error(409, "done before")
+        if self.has("a repeated key acts and says nothing"):
+            self.add(self.taken(body))
+        return self.again(201, value)
+
+    def again(self, status, value):
+        fields = {"Location": f"/zones/{value['id']}", **self.headers(value)}
+        return web.json_response(value, status=status, headers=fields)
+
+    # --- a zone ---
+
+    def zone(self, request):
+        id_ = request.match_info["id"]
+        return id_ if id_ in self.zones else ""
+
+    async def read(self, request):
+        id_ = self.zone(request)
+        if not id_:
+            return error(404, "no such zone")
+        if not self.wants(request, "application/json"):
+            return error(406, "JSON only")
+        until, before = self.old.get(id_, (0.0, None))
+        value = self.shown(id_)
+        if before is not None and until > time.monotonic():
+            value = before
+        return self.cached_answer(request, value) or web.json_response(value, headers=self.headers(value))
+
+    def acts_anyway(self, status):
+        return self.has(f"what is refused with {status} is written")
+
+    async def put(self, request):
+        id_ = self.zone(request)
+        none = request.headers.get("If-None-Match")
+        if not id_:
+            return error(404, "no such zone")
+        body = await self.body(request, whole=True)
+        if isinstance(body, web.Response):
+            if body.status == 415 and self.acts_anyway(415):
+                self.write(id_, self.taken(_forced(await request.read())))
+            return body
+        tags = {"*", *self.headers(self.shown(id_)).values()}
+        if none is not None and none.strip() in tags and not self.has("If-None-Match: * is not looked at"):
+            return error(412, "there is one")
+        return self.written(request, id_, {**_FIRST, **self.taken(body)})
+
+    async def patch(self, request):
+        id_ = self.zone(request)
+        if not id_:
+            return error(404, "no such zone")
+        body = await self.body(request, whole=False)
+        return body if isinstance(body, web.Response) else self.written(request, id_, self.taken(body))
+
+    def written(self, request, id_, values):
+        accepted, refusal = self.wants(request, "application/json"), None
+        if not accepted:
+            refusal = error(406, "JSON only")
+        refusal = refusal or self.refused(request, id_)
+        if refusal is None or self.acts_anyway(refusal.status):
+            self.write(id_, values)
+        value = self.shown(id_)
+        return refusal or web.json_response(value, headers=self.headers(value))
+
+    async def delete(self, request):
+        id_ = self.zone(request)
+        if not id_:
+            return error(404, "no such zone")
+        refusal = self.refused(request, id_)
+        if refusal is not None and not (refusal.status == 428 and self.has("what is refused with 428 is deleted")):
+            return refusal
+        del self.zones[id_]
+        self.maps.pop(id_, None)
+        return refusal or web.Response(status=204)
+
+    def transition(self, old, new, action):
+        async def act(request):
+            id_ = self.zone(request)
+            if not id_:
+                return error(404, "no such zone")
+            self.shown(id_)
+            zone = self.zones[id_]
+            if zone["state"] not in old:
+                return error(409, f"it is {zone['state']}")
+            zone["state"], zone["at"] = new, time.monotonic()
+            value = self.shown(id_)
+            if self.has("a pause goes on") and action == "pause":
+                zone["state"] = "running"
+            return web.json_response(value)
+
+        return act
+
+    # --- files ---
+
+    async def upload(self, request):
+        id_ = self.zone(request)
+        if not id_:
+            return error(404, "no such zone")
+        if request.content_type != "application/octet-stream":
+            return error(415, "octets only")
+        octets = await request.read()
+        if self.has("line ends of a file are changed"):
+            octets = octets.replace(b"\r\n", b"\n")
+        if self.has("a file ends at NUL"):
+            octets = octets.partition(b"\0")[0]
+        self.maps[id_] = octets
+        if self.has("the checksum is of other octets"):
+            octets = octets.strip() + b"\n"
+        return web.json_response({"size": len(octets), "sha256": hashlib.sha256(octets).hexdigest()})
+
+    async def download(self, request):
+        id_ = self.zone(request)
+        if not id_ or id_ not in self.maps:
+            return error(404, "no map")
+        return self.octets(request, self.maps[id_], "application/octet-stream")
+
+    async def log(self, request):
+        if not self.wants(request, "text/plain"):
+            return error(406, "text only")
+        return self.octets(request, _LOG, "text/plain")
+
+    def octets(self, request, whole, media_type):
+        """Answer a file, or the part that Range asks for (RFC 9110 14)."""
+        tag, asked = f'"{hashlib.sha256(whole).hexdigest()[:12]}"', request.headers.get("Range", "")
+        digest = b64encode(hashlib.sha256(whole[1:] if self.has("the digest is wrong") else whole).digest()).decode()
+        fields = {"ETag": tag, "Accept-Ranges": "bytes", "Repr-Digest": f"sha-256=:{digest}:"}
+        fields["Content-Type"] = media_type
+        found = re.fullmatch(r"bytes=(\d*)-(\d*)", asked)
+        condition = request.headers.get("If-Range")
+        ignores = condition is not None and condition != tag and not self.has("a stale If-Range gets a part")
+        asks_none = request.headers.get("If-None-Match")
+        if asks_none is not None and tag in asks_none.replace("W/", ""):
+            return web.Response(status=304, headers={"ETag": tag})
+        if found is None or found.groups() == ("", "") or ignores or self.style.get("ranges") == "none":
+            if self.style.get("ranges") == "none":
+                del fields["Accept-Ranges"]
+            return web.Response(body=whole, headers=fields)
+        first, last = found.groups()
+        begin = int(first) if first else max(0, len(whole) - int(last))
+        end = min(int(last), len(whole) - 1) if first and last else len(whole) - 1
+        if begin >= len(whole) or begin > end:
+            return error(416, "no such part", **{"Content-Range": f"bytes */{len(whole)}"})
+        moved = 1 if self.has("a part begins one later") and begin + 1 < end else 0
+        part = whole[begin + moved : end + 1 + moved]
+        end -= end + 1 - begin - len(part)
+        total = len(part) if self.has("a part tells its own length as the whole one") else len(whole)
+        fields["Content-Range"] = f"bytes {begin}-{end}/{total}"
+        return web.Response(status=206, body=part, headers=fields)
+
+    # --- settings ---
+
+    async def read_settings(self, request):
+        if not self.wants(request, "application/json"):
+            return error(406, "JSON only")
+        if self.style.get("background"):
+            self.settings["pressure"] = 2 + next(self.ticks) % 7 / 4
+        value = dict(self.settings)
+        return web.json_response(value)
+
+    async def write_settings(self, request):
+        if request.content_type != "application/json":
+            return error(415, "JSON only")
+        try:
+            value = json.loads(await request.read())
+        except (ValueError, RecursionError):
+            return error(400, "no JSON")
+        rules = {
+            "season": lambda one: one in ("summer", "winter"),
+            "rain_stop": lambda one: isinstance(one, bool),
+            "pressure": lambda one: type(one) in (int, float) and 0 <= one <= 9,
+        }
+        if not isinstance(value, dict) or rules.keys() != value.keys():
+            return error(422, "not these members")
+        if not all(rules[name](one) for name, one in value.items()):
+            return error(422, "not valid")
+        self.settings = value
+        return web.json_response(value)
+
+    async def weather(self, request):
+        if not self.wants(request, "application/json"):
+            return error(406, "JSON only")
+        if self.has("a forecast stops the rain"):
+            self.settings["rain_stop"] = not self.settings["rain_stop"]
+        return web.json_response({"rain": False, "at": datetime.now(UTC).isoformat()})
+
+
+def _forced(octets):
+    """Return the members of a body whose media type was refused."""
+    try:
+        value = json.loads(octets)
+    except ValueError:
+        return {}
+    return {name: one for name, one in value.items() if _fits(name, one)} if isinstance(value, dict) else {}
+
+
+def _quoted(text):
+    return '"{}"'.format(text.replace('"', '""')) if re.search(r'[",\r\n]', text) else text
+
+
+def _is_time(value):
+    try:
+        return "T" in value and datetime.fromisoformat(value).tzinfo is not None
+    except ValueError:
+        return False
+
+
+_RULES = {
+    "name": lambda one: isinstance(one, str) and 1 <= len(one) <= 60,
+    "minutes": lambda one: type(one) in (int, float) and 0 <= one <= 600,
+    "litres": lambda one: type(one) in (int, float) and one % 1 == 0 and 0 <= one <= 2**60,
+    "starts": lambda one: isinstance(one, str) and _is_time(one),
+    "valves": lambda one: (
+        isinstance(one, list) and len(one) <= 8 and all(type(part) is int and 0 <= part <= 99 for part in one)
+    ),
+}
+
+
+def _fits(name, value):
+    """Return whether a member of a zone is valid."""
+    return name in _RULES and _RULES[name](value)
+
+
+def sprinklers(style, faults=()):
+    """Return the description and the handlers of a device."""
+    device, shape = Sprinklers(style, faults), _shape(style)
+    sent = {"required": True, "content": {"application/json": {"schema": _SENT}}}
+    patch = {"required": True, "content": {"application/json": {"schema": _PATCH}}}
+    file = {"required": True, "content": {"application/octet-stream": {"schema": {}}}}
+    kept = {"type": "object", "properties": {"size": {"type": "integer"}, "sha256": {"type": "string"}}}
+    octets = {"description": "ok", "content": {"application/octet-stream": {"schema": {}}}}
+    conditions = {"412": REFUSED, **({"428": REFUSED} if style.get("asks", True) else {})}
+    refusals = {"404": REFUSED, "406": REFUSED, "415": REFUSED, **conditions, **_BAD}
+    listing = answers({"type": "array", "items": shape})
+    listing["content"]["text/csv"] = {"schema": {"type": "string"}}
+    settings = {
+        "type": "object",
+        "required": ["season", "rain_stop", "pressure"],
+        "additionalProperties": False,
+        "properties": {
+            "season": {"enum": ["summer", "winter"]},
+            "rain_stop": {"type": "boolean"},
+            "pressure": {"type": "number", "minimum": 0, "maximum": 9},
+        },
+    }
+    weather = {"type": "object", "properties": {"rain": {"type": "boolean"}, "at": {"type": "string"}}}
+    prints = {"409": REFUSED, "422": REFUSED} if style.get("prints", True) else {}
+    key = [_KEY] if style.get("keys", True) else []
+    act = {"parameters": [_ID], "post": {"responses": {"200": answers(shape), "404": REFUSED, "409": REFUSED, **_BAD}}}
+    cached = {"200": answers(shape), "304": {"description": "as it was"}, **_BAD}
+    document = described(
+        {
+            "/zones": {
+                "get": {"responses": {"200": listing, **_BAD}},
+                "post": {
+                    "parameters": key,
+                    "requestBody": sent,
+                    "responses": {"201": answers(shape), "406": REFUSED, **prints, **_BAD},
+                },
+            },
+            "/zones/{id}": {
+                "parameters": [_ID],
+                "get": {"parameters": [_NONE_MATCH], "responses": cached},
+                "put": {
+                    "parameters": [_MATCH, _NONE_MATCH],
+                    "requestBody": sent,
+                    "responses": {"200": answers(shape), **refusals},
+                },
+                "patch": {
+                    "parameters": [_MATCH],
+                    "requestBody": patch,
+                    "responses": {"200": answers(shape), **refusals},
+                },
+                "delete": {"parameters": [_MATCH], "responses": {"204": {"description": "gone"}, **refusals}},
+            },
+            "/zones/{id}/start": act,
+            "/zones/{id}/pause": act,
+            "/zones/{id}/resume": act,
+            "/zones/{id}/map": {
+                "parameters": [_ID],
+                "get": {"responses": {"200": octets, "206": octets, **_BAD}},
+                "put": {"requestBody": file, "responses": {"200": answers(kept), **_BAD}},
+            },
+            "/log": {"get": {"responses": {"200": answers({"type": "string"}, "text/plain"), **_BAD}}},
+            "/settings": {
+                "get": {"responses": {"200": answers(settings), **_BAD}},
+                "put": {
+                    "requestBody": {"required": True, "content": {"application/json": {"schema": settings}}},
+                    "responses": {"200": answers(settings), **_BAD},
+                },
+            },
+            "/weather": {"get": {"responses": {"200": answers(weather), **_BAD}}},
+        }
+    )
+    routes = {
+        "/zones": {"GET": device.every, "POST": device.create},
+        "/zones/{id}": {"GET": device.read, "PUT": device.put, "PATCH": device.patch, "DELETE": device.delete},
+        "/zones/{id}/start": {"POST": device.transition({"idle", "done"}, "running", "start")},
+        "/zones/{id}/pause": {"POST": device.transition({"running"}, "paused", "pause")},
+        "/zones/{id}/resume": {"POST": device.transition({"paused"}, "running", "resume")},
+        "/zones/{id}/map": {"GET": device.download, "PUT": device.upload},
+        "/log": {"GET": device.log},
+        "/settings": {"GET": device.read_settings, "PUT": device.write_settings},
+        "/weather": {"GET": device.weather},
+    }
+    return document, routes
+
+
+#: Right devices: what is free in each.
+RIGHT = {
+    "as described": {},
+    "without conditions": {"asks": False, "keys": False, "takes": 0.3},
+    "weak tags": {"etag": "weak", "asks": False},
+    "no tags": {"etag": "none", "asks": False, "ranges": "none"},
+    "late": {"late": 0.8, "asks": False},
+    "counts reads": {"counts": True, "etag": "weak", "asks": False},
+    "moves by itself": {"background": True, "takes": 0.05},
+    "keys that are refused again": {"repeats": "refused", "remembers": 3},
+    "keys without fingerprints": {"prints": False, "remembers": 2, "asks": False},
+}
+#: Faults that are found side by side in one run: the style, and for each fault the requirement that it breaks.
+FAULTS = [
+    (
+        "as described",
+        {
+            "a stale If-Match is taken": "description/if-match",
+            "another body gets the first answer": "description/idempotency-key",
+            "a part begins one later": "http/range",
+            "a file ends at NUL": "description/written-is-read",
+            "the digest is wrong": "description/digest",
+        },
+    ),
+    (
+        "as described",
+        {
+            "a missing If-Match is taken": "description/required",
+            "a stale If-None-Match is current": "description/entity-tag",
+            "one key acts twice": "description/idempotency-key",
+            "what is refused with 406 is written": "description/refused-keeps",
+            "a part tells its own length as the whole one": "http/range",
+            "the checksum is of other octets": "description/digest",
+        },
+    ),
+    (
+        "as described",
+        {
+            "If-None-Match: * is not looked at": "description/if-match",
+            "a stale If-Range gets a part": "description/entity-tag",
+            "a repeated key acts and says nothing": "description/idempotency-key",
+            "what is refused with 406 is created": "description/refused-keeps",
+            "what is refused with 428 is written": "description/refused-keeps",
+            "line ends of a file are changed": "description/written-is-read",
+        },
+    ),
+    (
+        "keys that are refused again",
+        {
+            "what is refused with 428 is deleted": "description/refused-keeps",
+            "what is refused with 415 is created": "description/refused-keeps",
+            "a new key gets an old answer": "description/idempotency-key",
+        },
+    ),
+    ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
+]

@@ -1,0 +1,28 @@
+"""A device of zones: no right style is blamed, and faults that show between two exchanges are found at quick."""
+
+import pytest
+from small_device import certified, small_device
+from sprinklers import FAULTS, RIGHT, sprinklers
+
+# What some of the faults bring about beside what they break: what is refused and done is no longer as it was written.
+_FOLLOWS = {f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "digest")}
+
+
+def _blamed(style, faults, tmp_path):
+    with small_device(*sprinklers(RIGHT[style], faults)) as url:
+        done = certified(f"{url}/openapi.json", tmp_path / "out", "--call=*")
+    return done.blamed, done.text
+
+
+@pytest.mark.parametrize("style", RIGHT)
+def test_a_right_style_is_not_blamed(style, tmp_path):
+    blamed, text = _blamed(style, (), tmp_path)
+    assert not blamed, text
+
+
+@pytest.mark.parametrize("number", range(len(FAULTS)))
+def test_faults_are_found(number, tmp_path):
+    style, faults = FAULTS[number]
+    blamed, text = _blamed(style, faults, tmp_path)
+    assert blamed.keys() >= set(faults.values()), text
+    assert blamed.keys() <= {*faults.values(), *_FOLLOWS}, text
