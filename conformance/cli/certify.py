@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import gc
 import sys
 from pathlib import Path
@@ -159,7 +160,8 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
         raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
     source, statement = None, None
     if not options.fleet:
-        source, statement = told_apart(named_or_usual(targets, given), options.openapi or options.wsdl)
+        named = named_or_usual(targets, given)
+        source, statement = told_apart(named, options.openapi or options.wsdl, new=options.init)
     options = checked(options, named=bool(source or statement))
     if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
@@ -302,8 +304,16 @@ def _notes(run: Run) -> tuple[str, ...]:
         f"Class {name} is not claimed: the robot's {' and '.join(missing)} interface has no address."
         for name, missing in run.statement.lacking(run.contract).items()
     ]
-    unused = CallRules.of(run).unused(operations_of(run.contract)) if run.contract.openapi_path else ()
-    notes += [f"The pattern {one!r} matches no operation of the description." for one in unused]
+    operations = operations_of(run.contract) if run.contract.openapi_path else ()
+    labels = [one.label for one in operations]
+    for pattern in CallRules.of(run).unused(operations):
+        near = difflib.get_close_matches(pattern, labels, 1)
+        meant = f"; did you mean {near[0]!r}?" if near else "."
+        notes.append(f"The pattern {pattern!r} matches no operation of the description{meant}")
+    if run.allow_motion and not (run.contract.is_claimed or run.statement.motion_map):
+        notes.append(
+            "--allow-motion allows nothing here, as the statement has no motion map: --call allows operations."
+        )
     if run.contract.is_claimed and not run.allow_motion:
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import time
@@ -37,6 +38,8 @@ _BY_NAME: Final = frozenset(
         "pathItems", "paths", "webhooks", "content", "encoding", "mediaTypes",
     }
 )  # fmt: skip
+_TITLE: Final = re.compile(r"<title[^>]{0,200}>([^<]{1,500})", re.IGNORECASE)
+_TITLE_WITHIN: Final = 20_000
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
 _SERVER: Final = re.compile(r"(?:[A-Za-z][A-Za-z0-9+.-]*:)?//[^/?#]*")
 _BLANK: Final = b"\xef\xbb\xbf \t\r\n"
@@ -63,6 +66,7 @@ class Description:
         not_called: what the suite cannot call, with the reason.
         unread: operations and schemas that cannot be read and are left out of the document, and references that are not
             followed, because they lead to another server or out of the folder; each with the reason.
+        elsewhere: that it was found at another place than the user named.
     """
 
     source: str
@@ -73,6 +77,7 @@ class Description:
     remarks: tuple[str, ...] = ()
     not_called: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
 
 def read_description(source: str, load: Load, overlays: Iterable[str] = (), trust: Trust | None = None) -> Description:
@@ -167,11 +172,20 @@ def _parsed(source: str, load: Load) -> Schema:
         document = None
     if not isinstance(document, dict):
         markup = octets.lstrip(_BLANK).startswith(b"<")
-        what = ", but HTML or XML, such as a page for people, a login or a WSDL" if markup else ""
+        what = f", but {_markup(octets)}" if markup else ""
         raise DescriptionError(f"{source} is no description: it holds no object{what}")
     if excess := crowd_in(document) or long_text_in(document):
         raise DescriptionError(f"{source} cannot be read: {excess}")
     return document
+
+
+def _markup(octets: bytes) -> str:
+    """Return what a document that begins with `<` is: a page with its title, or XML."""
+    beginning = octets[:_TITLE_WITHIN].decode("utf-8", "replace")
+    title = _TITLE.search(beginning)
+    if title:
+        return f"an HTML page with the title {' '.join(html.unescape(title[1]).split())[:80]!r}"
+    return "HTML, such as a page for people" if "<html" in beginning.lower() else "HTML or XML, such as a WSDL"
 
 
 def _within_budget(load: Load) -> Load:

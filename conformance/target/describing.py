@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -122,12 +123,18 @@ def fetch_description(
     except DescriptionError as error:
         if not is_url(source):
             raise
-        for path in _USUAL if len(urlsplit(source).path.strip("/").split("/")) <= 1 else ():
+        usual = _USUAL if len(urlsplit(source).path.strip("/").split("/")) <= 1 else ()
+        for path in usual:
             try:
-                return read_description(urljoin(source, path), load, overlays, trust)
+                found = read_description(urljoin(source, path), load, overlays, trust)
             except DescriptionError:
                 continue
-        raise DescriptionError(f"{error}; name the URL or file of its OpenAPI description") from error
+            remark = f"Judged by {found.source}, because {source} is no description."
+            return replace(found, elsewhere=(remark,))
+        if "; are credentials missing" in str(error):
+            raise
+        tried = f"; neither are {', '.join(usual[:2])} and {len(usual) - 2} other usual places" if usual else ""
+        raise DescriptionError(f"{error}{tried}. Name the URL or file of its OpenAPI description") from error
 
 
 def _check_server(source: str, base: str, endpoints: Endpoints, connection: Connection) -> None:
@@ -186,7 +193,8 @@ def described_contract(
     document = without_credentials(found.document, connection.credentials.places)
     folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
     Contract.load.cache_clear()
-    remarks = (*(() if base_url or endpoints.rest else found.remarks), *found.not_called, *found.unread)
+    of_server = () if base_url or endpoints.rest else found.remarks
+    remarks = (*found.elsewhere, *of_server, *found.not_called, *found.unread)
     remarks += _without_cases(document)
     return Contract.load(folder), msgspec.structs.replace(endpoints, rest=base), remarks
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import itertools
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -89,6 +91,12 @@ class Judged(NamedTuple):
     remarks: tuple[str, ...] = ()
 
 
+# A host with a port or with a dot in its name, and perhaps a path.
+_ADDRESS: Final = re.compile(r"(\[[0-9a-fA-F:]+\]|[\w-]+(\.[\w-]+)*)(:\d{1,5}(/.*)?|/.*(openapi|swagger|wsdl|api).*)")
+# So many names of a folder are looked through for one that was meant.
+_MOST_NAMES: Final = 1000
+# The options that only a robot without a description of its own has.
+_PAPERS: Final = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 # The options that name a device, by their names in Python.
 _NAMES: Final = (
     "openapi", "wsdl", "rest", "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint",
@@ -104,12 +112,20 @@ def named_or_usual(targets: tuple[str, ...], options: Mapping[str, Any]) -> tupl
     return (str(USUAL_STATEMENT),)
 
 
-def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | None, Path | None]:
+def told_apart(targets: tuple[str, ...], openapi: str | None, *, new: bool = False) -> tuple[str | None, Path | None]:
     """Return the description and the statement that the command names; either may be None.
 
+    Args:
+        targets: the arguments.
+        openapi: the description that an option names.
+        new: whether the statement is yet to be written.
+
     Raises:
-        click.UsageError: two descriptions or two statements are named.
+        click.UsageError: two descriptions or two statements are named, or there is no such file.
     """
+    for one in targets:
+        if not is_url(one) and not Path(one).exists() and not (new and one.endswith(".toml")):
+            raise click.UsageError(_no_file(one))
     described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml", ".wsdl"))]
     statements = [one for one in targets if one not in described]
     described += [openapi] if openapi else []
@@ -117,6 +133,19 @@ def told_apart(targets: tuple[str, ...], openapi: str | None) -> tuple[str | Non
         if len(named) > 1:
             raise click.UsageError(f"{' and '.join(named)} are several {what}: name one")
     return next(iter(described), None), Path(statements[0]) if statements else None
+
+
+def _no_file(target: str) -> str:
+    """Return what to tell of an argument that is neither a URL nor a file."""
+    scheme, found, _ = target.partition("://")
+    if found:
+        return f"{target}: {scheme}:// is not read; give the address as http:// or https://"
+    if _ADDRESS.fullmatch(target):
+        return f"{target} is no file, and no address without http:// or https:// before it: http://{target}"
+    folder = Path(target).parent
+    names = (str(path) for path in itertools.islice(folder.glob("*"), _MOST_NAMES) if path.is_file())
+    near = difflib.get_close_matches(str(folder / Path(target).name), names, 1)
+    return f"there is no file {target}" + (f"; did you mean {near[0]}?" if near else "")
 
 
 def what_is_judged(source: str | None, statement: Path | None, options: DeviceOptions) -> Judged:
@@ -142,6 +171,12 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
         DescriptionError, StatementError, ContractError: one of them cannot be used.
         UnreachableError: the server of the description does not respond.
     """
+    for name in _PAPERS:
+        if name in options.endpoints:
+            raise StatementError(
+                f"--{name.replace('_', '-')} is for a robot with the paper's contract, and this device is judged by "
+                f"its description {source}: leave one of them out"
+            )
     where = options.applied(endpoints_of(statement) if statement else Endpoints())
     api = api or Api()
     base_url = options.base_url or api.base_url
@@ -260,7 +295,9 @@ def _claims(options: DeviceOptions, contract: Contract) -> tuple[str, ...]:
     ):
         for name in names:
             if name not in known:
-                raise StatementError(f"{option} {name!r}: {contract.name} has {', '.join(known)}")
+                near = difflib.get_close_matches(name, known, 1)
+                meant = f"did you mean {near[0]}? " if near else ""
+                raise StatementError(f"{option} {name!r}: {meant}{contract.name} has {', '.join(known)}")
     return (*contract.profiles.get(options.profile or "", ()), *options.classes)
 
 

@@ -35,7 +35,7 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import Pace, time_to_arrive
 from conformance.transport.passage import Heard, Passage, Recorder
 from conformance.transport.reach import Trust
-from conformance.transport.tls import ClientCertificate, tls_context
+from conformance.transport.tls import ClientCertificate, explained, tls_context
 
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.
@@ -424,7 +424,7 @@ def _no_answer(error: Exception, seconds: float) -> _SilenceError:
         return _SilenceError(f"a response that is not HTTP: {text}", NoAnswer.MALFORMED)
     if isinstance(error, NoConnectionError):
         kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
-        return _SilenceError(f"no connection: {text}", kind)
+        return _SilenceError(f"no connection: {explained(text)}", kind)
     if isinstance(error, OSError):
         return _SilenceError(f"the connection broke without a response: {text}", NoAnswer.CLOSED)
     raise error

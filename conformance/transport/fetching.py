@@ -5,6 +5,7 @@ that the user did not name. Credentials are added in the transport, so that none
 in the environment are not used: the suite reaches the device as its requests do.
 """
 
+import os
 import ssl
 import threading
 import time
@@ -24,6 +25,7 @@ from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Request, Response
 from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
+from conformance.transport.tls import explained
 
 _REDIRECTS: Final = 4
 # Of one document, and of all that one description refers to.
@@ -139,7 +141,9 @@ class Fetcher:
             self._connection.recorder.record(Passage(request, *link, None, problem, heard=Heard.NEVER))
 
     def _hint(self, url: str, status: int) -> str:
-        """Return which option sends the credentials that a server asks for."""
+        """Return what a status says of the way to the device, or which option sends the credentials asked for."""
+        if status in {httpx.codes.BAD_GATEWAY, httpx.codes.SERVICE_UNAVAILABLE, httpx.codes.GATEWAY_TIMEOUT}:
+            return ": a proxy answers, and the device behind it does not"
         if status not in {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}:
             return ""
         reason = self._trust.refusal(url)
@@ -235,7 +239,20 @@ def _worded(error: httpx.TransportError, seconds: float) -> str:
     if isinstance(error, httpx.TimeoutException):
         return f"no response within {seconds:.3g} s"
     if isinstance(error, httpx.ConnectError):
-        return f"no connection: {text}"
+        return f"no connection: {explained(text)}{_unused_proxy()}"
     if isinstance(error, httpx.RemoteProtocolError) and "disconnected" not in text:
         return f"a response that is not HTTP: {text}"
-    return f"the server closed the connection without a response: {text}"
+    return f"the server closed the connection without a response: {text}{_maybe_tls(error)}"
+
+
+def _maybe_tls(error: httpx.TransportError) -> str:
+    """Return that a port which closes a connection may speak TLS, if TLS was not tried."""
+    try:
+        return "; is the address https://?" if error.request.url.scheme == "http" else ""
+    except RuntimeError:  # it has no request
+        return ""
+
+
+def _unused_proxy() -> str:
+    named = [name for name in ("http_proxy", "https_proxy", "all_proxy") if {name, name.upper()} & os.environ.keys()]
+    return f" ({named[0]} is set: no proxy is used, as the device's own responses are judged)" if named else ""

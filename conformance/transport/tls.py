@@ -61,6 +61,16 @@ class ClientCertificate(NamedTuple):
             raise CertificateError(f"client certificate {self.file}, key {key}: {reason}") from None
 
 
+def explained(text: str) -> str:
+    """Return the text of an error of TLS, with what the user can do about it where that is known."""
+    if any(said in text for said in ("WRONG_VERSION_NUMBER", "RECORD_LAYER_FAILURE", "PACKET_LENGTH_TOO_LONG")):
+        return "this port does not speak TLS; is the address http://?"
+    if "self-signed certificate" in text or "unable to get local issuer" in text:
+        kind = "self-signed" if "self-signed certificate (" in text else "signed by an authority that nobody here knows"
+        return f"its certificate is {kind}{advice(': name it, or its authority, by --ca-file')}"
+    return text
+
+
 def tls_context(ca_file: Path | None, certificate: ClientCertificate | None = None) -> ssl.SSLContext:
     """Return a TLS context that trusts the authorities in ``ca_file``, or the system's if it is None.
 
