@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import difflib
 import gc
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +34,7 @@ from conformance.statement.statement import Statement, StatementError
 from conformance.target.naming import Judged, hold_folder, named_or_usual, told_apart, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
+from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -90,6 +93,15 @@ Write down what is known of the device in a file, which later runs are given:
 @click.option("--effort", type=click.Choice(EFFORTS), default="standard", help="How many cases to test.")
 @click.option("--minutes", type=_POSITIVE, metavar="M", help="Send requests for about M minutes, the usual ones first.")
 @click.option("--class", "classes", multiple=True, metavar="NAME", help="Claim a conformance class; repeatable.")
+@click.option(
+    "--select",
+    multiple=True,
+    metavar="ID|CLASS",
+    help="Judge only these requirements: http, http/date or 'http/*'; repeatable.",
+)
+@click.option("--exclude", multiple=True, metavar="ID|CLASS", help="Judge all but these requirements; repeatable.")
+@click.option("--last-failed", is_flag=True, help="Judge only what failed in the result that is in the --out folder.")
+@click.option("-x", "--exit-first", is_flag=True, help="End the run at the first failure of a MUST.")
 @click.option("--plan", is_flag=True, help="Print the scenarios and checks in their order; send nothing.")
 @options_of(Group.EFFORT, rare=True)
 @click.option("--profile", metavar="NAME", help="Claim the classes of a profile of the contract, such as full.")
@@ -129,6 +141,12 @@ Write down what is known of the device in a file, which later runs are given:
 )
 @click.option(
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
+)
+@click.option(
+    "--write-baseline",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write what fails to a baseline, with today's date, for you to give reasons.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print result.json to stdout in place of the summary.")
 @click.option("--quiet", "-q", "progress", flag_value="none", help="Write no progress; the same as --progress none.")
@@ -210,6 +228,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     if options.init:
         return init(statement, chosen, contract, force=options.force)
     options.check_nonce()
+    options.check_new_baseline()
     # Before the run: what cannot be signed by this key is told at once.
     notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
     if options.plan:
@@ -228,7 +247,25 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     else:
         print_summary(outcome)
         click.echo(f"result: {outcome.path}")
+    if options.write_baseline:
+        _write_baseline(options.write_baseline, outcome, contract, options.baseline)
     return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options.as_json)
+
+
+def _write_baseline(path: Path, outcome: Certification, contract: Contract, old: Path | None) -> None:
+    """Write what fails to a baseline file, and say what is to be done with it."""
+    from conformance.verdict.baseline import baseline_text, load_baseline  # noqa: PLC0415 - only for this option
+
+    found = [
+        contract.ledger[one["id"]]
+        for one in outcome.document["requirements"]
+        if one["verdict"] == "fail" or "expected_failure" in one
+    ]
+    known = load_baseline(old, contract.ledger, contract.renamed) if old else ()
+    today = dt.datetime.now(dt.UTC).date()
+    path.write_text(baseline_text(found, known, today), encoding="utf-8")
+    told = "Write a reason and a last day to each, then give it by --baseline." if found else "Nothing fails."
+    click.echo(f"baseline: {path}, {counted(len(found), 'failure')}. {told}", err=True)
 
 
 def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> CommandResult:
@@ -267,6 +304,7 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
         raise StatementError(str(error)) from error
     run = _run(chosen, options, contract)
     run.requirement_set, run.given = requirements, given
+    run.selection = replace(run.selection, accepted=frozenset(entry.requirement for entry in baseline))
     run.restart_command, run.wait_s = options.restart_command, options.wait_s
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*remarks, *_notes(run))
@@ -282,13 +320,21 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
+    from conformance.verdict.selection import Selection, SelectionError, failed_before, selected  # noqa: PLC0415 - same
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}
+    claims = tuple(name for name in chosen.claimed(contract) if name in known)
+    try:
+        among = failed_before(options.out / "result.json") if options.last_failed else None
+        ids = selected(contract.ledger, claims, options.select, options.exclude, among)
+    except SelectionError as error:
+        raise click.UsageError(str(error)) from error
     return Run(
         statement=chosen,
         contract=contract,
-        claims=tuple(name for name in chosen.claimed(contract) if name in known),
+        claims=claims,
+        selection=Selection(ids, options.exit_first),
         allow_motion=options.allow_motion,
         seed=options.seed if options.nonce is None else seed_of_nonce(options.nonce),
         effort=Effort(options.effort, minutes=options.minutes or DEEP_MINUTES),

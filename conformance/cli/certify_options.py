@@ -27,6 +27,11 @@ class CertifyOptions(DeviceOptions):
     restart_command: str = ""
     wait_s: float | None = None
     baseline: Path | None = None
+    write_baseline: Path | None = None
+    select: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    exit_first: bool = False
+    last_failed: bool = False
     fleet: str | None = None
     parallel: int | None = None
     key: str | None = None
@@ -46,6 +51,16 @@ class CertifyOptions(DeviceOptions):
     def calls(self) -> CallRules:
         """What the options alone say of what may be called."""
         return CallRules(self.allow, self.never)
+
+    def check_new_baseline(self) -> None:
+        """Check that --write-baseline overwrites no file that was not read.
+
+        Raises:
+            click.UsageError: it would.
+        """
+        path = self.write_baseline
+        if path is not None and path.exists() and path != self.baseline:
+            raise click.UsageError(f"--write-baseline: {path} exists; give it as --baseline as well, to renew it")
 
     def check_nonce(self) -> None:
         """Check that the seed follows from the nonce, where there is one.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.terminal import inert
+from conformance.commandline.terminal import columns, inert, wrapped
 from conformance.contract.classes import QUESTIONS
 from conformance.verdict.finding import counted
 
@@ -28,6 +28,8 @@ _SHOWN_BLOCKED = 5
 # Findings of one requirement that are printed in full; each further one has a line.
 _IN_FULL = 5
 _LINE = 160
+# The column of a class's reason; that on narrow terminals; and from how many columns on a terminal is wide.
+_REASON, _NARROW, _WIDE = 46, 4, 100
 
 
 def print_summary(outcome: Certification) -> None:
@@ -44,7 +46,12 @@ def print_summary(outcome: Certification) -> None:
         reason = document["class_reasons"].get(name, "")
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""
         mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
-        click.echo(f"  {name + view:<30} {mark}{blanks}{inert(reason[:300])}".rstrip())
+        # A narrow terminal has the reason on lines of its own.
+        below = (columns() or _WIDE) < _WIDE and reason
+        told = wrapped(inert(reason[:300]), " " * (_NARROW if below else _REASON))
+        click.echo(
+            f"  {name + view:<30} {mark}{blanks}{chr(10) if below else ''}{told if below else told.lstrip()}".rstrip()
+        )
     by_id = {requirement["id"]: requirement for requirement in document["requirements"]}
     for topic, question in QUESTIONS.items():
         found = [(cause, by_id[cause["requirement"]]) for cause in document["causes"]]
@@ -61,14 +68,16 @@ def print_summary(outcome: Certification) -> None:
                 _print_line(cause, requirement)
     _print_unjudged(document)
     if "web_server" in document:
-        click.echo(f"\nThe web server\n  {inert(document['web_server']['text'])}")
+        click.echo(f"\nThe web server\n{wrapped(inert(document['web_server']['text']), '  ')}")
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
     not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     counts[not_claimed] = counts.pop("not-claimed", 0)
-    told = ", ".join(f"{count} {value}" for value, count in sorted(counts.items()) if count)
+    # In the order, and by the words, of the bar and the pages.
+    order = ("fail", "error", "warn", "skip", "pass", not_claimed)
+    told = ", ".join(f"{counts[value]} {value}" for value in order if counts[value])
     if "api" in document:
         _print_unshown(document["api"]["operations"])
         _print_left(document["api"].get("left_behind", {}).get("lines", ()))
@@ -99,7 +108,9 @@ def warning(document: Mapping[str, Any], which: str = "") -> str:
 
 
 def _print_unjudged(document: Mapping[str, Any]) -> None:
-    """Print what could not be judged because of an error in the suite, and what ``--minutes`` left out."""
+    """Print stale entries of the baseline, and what an error in the suite or ``--minutes`` left unjudged."""
+    for id_ in document.get("stale", ()):
+        click.echo(f"\nThe baseline expects {id_} to fail, and it passes: delete the entry.")
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
     if faults:
         count = len({id_ for fault in faults for id_ in fault["requirements"]})
@@ -107,7 +118,7 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
     for fault in faults:
         click.echo(f"  {inert(fault['text'])}")
     if "left_out" in document:
-        click.echo(f"\nNot everything was tried\n  {inert(document['left_out']['text'])}")
+        click.echo(f"\nNot everything was tried\n{wrapped(inert(document['left_out']['text']), '  ')}")
 
 
 def _print_unshown(rows: list[dict[str, Any]]) -> None:
@@ -151,9 +162,11 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
 def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Path) -> None:
     """Print a finding and the requirements that are not tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
-    click.echo(f"\n{cause['number']}. {head}\n  {requirement['text']}\n  {inert(cause['text'])}")
+    click.echo(f"\n{cause['number']}. {head}")
+    click.echo(wrapped(requirement["text"], "  "))
+    click.echo(wrapped(inert(cause["text"]), "  "))
     if "breaks" in requirement:
-        click.echo(f"  what breaks in practice: {requirement['breaks']}")
+        click.echo(wrapped(f"what breaks in practice: {requirement['breaks']}", "  "))
     blocks = cause["blocks"]
     if blocks:
         shown = ", ".join(blocks[:_SHOWN_BLOCKED])

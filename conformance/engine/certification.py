@@ -30,13 +30,15 @@ from conformance.history.writing import HistoryWriter
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stored import write_traces
 from conformance.transport.client import Connection
-from conformance.verdict.baseline import Expectation, accepted_until, apply_baseline
+from conformance.verdict.baseline import Accepted, Expectation, accepted_until, apply_baseline, stale_entries
 from conformance.verdict.causes import Cause, by_cause
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.run import Run
+from conformance.verdict.selection import UNSELECTED, WITHHELD, Selection
 from conformance.verdict.verdicts import (
     ClassValue,
     Overall,
+    Value,
     Verdict,
     class_verdicts,
     overall,
@@ -172,11 +174,18 @@ def _concluded(
     if run.requirement_set is not None and run.scored is not None:
         seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
+    stale = stale_entries(seen, baseline)
+    remarks += [f"The baseline expects {id_} to fail, and it passes: delete the entry." for id_ in stale]
+    narrowed = WITHHELD if run.selection.ids is not None else ""
+    if narrowed:
+        remarks.append(f"{narrowed[:1].upper()}{narrowed[1:]}: the verdict is at most inconclusive.")
     # A baseline makes a run green, not a robot conformant: the classes fail all the same.
     classes, accepted = (
-        withheld(_deciding(one, run.claims, run.beside), run.refused or run.unshown) for one in (seen, verdicts)
+        withheld(_deciding(one, run.claims, run.beside), run.refused or run.unshown or narrowed)
+        for one in (seen, verdicts)
     )
     failed = overall(classes) is Overall.NOT_CONFORMANT
+    until = accepted_until(verdicts) if failed and overall(accepted) is not Overall.NOT_CONFORMANT else ""
     if not run.enough and run.less:
         remarks.append(f"Nothing can be said of a robot {run.less}: the verdict is inconclusive unless it failed.")
     document = result_document(
@@ -184,7 +193,7 @@ def _concluded(
         verdicts,
         causes,
         classes if failed else accepted,
-        accepted_until=accepted_until(verdicts) if failed and overall(accepted) is not Overall.NOT_CONFORMANT else "",
+        accepted=Accepted(until, stale),
         started=started.at,
         finished=started.ended,
         command=command,
@@ -199,7 +208,17 @@ def _concluded(
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
         return Certification(code, document, path, unwritten)
     code = OF_VERDICT[overall(accepted, enough=run.decided)] if reached else ExitCode.UNREACHABLE
+    if stale and code in {ExitCode.PASSED, ExitCode.INCONCLUSIVE}:
+        code = ExitCode.FAILED
+    if narrowed and code == ExitCode.INCONCLUSIVE and run.decided and _all_hold(verdicts, run.selection):
+        code = ExitCode.PASSED
     return Certification(code, document, path)
+
+
+def _all_hold(verdicts: Iterable[Verdict], selection: Selection) -> bool:
+    """Return whether a selected requirement passed, and each has a verdict that is no failure."""
+    values = [one.value for one in verdicts if selection.has(one.requirement.id)]
+    return Value.PASS in values and Value.FAIL not in values and Value.ERROR not in values
 
 
 def _deciding(
@@ -232,7 +251,10 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
     judge = run.judge
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
-        if run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
+        if not run.selection.has(requirement.id):
+            # A check judges several requirements at once: what it saw of others is not asked for.
+            judge.evidence[requirement.id] = Evidence(skips=[UNSELECTED])
+        elif run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
     if not run.contract.is_claimed:

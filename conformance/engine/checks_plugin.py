@@ -116,12 +116,14 @@ class ChecksPlugin:
             parent.config.pluginmanager.register(import_module(name), name)
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
-        """Deselect checks of classes that are not claimed, and sort the others by the plan."""
+        """Deselect checks of classes that are not claimed or selected, and sort the others by the plan."""
         if not any(map(is_check, items)):
             return
         run = self._robot().run
         ledger = run.contract.ledger
-        claimed = {id_ for id_, requirement in ledger.items() if requirement.binds(run.claims)}
+        claimed = {
+            id_ for id_, requirement in ledger.items() if requirement.binds(run.claims) and run.selection.has(id_)
+        }
         kept = [item for item in items if not is_check(item) or not claimed.isdisjoint(self.ids_of(item))]
         dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
@@ -209,6 +211,9 @@ class ChecksPlugin:
             if not finding.causes or not finding.causes <= self._told:
                 new.append(finding)
             self._told |= finding.causes
+        first = next((finding for finding in new if run.selection.ends_at(finding.requirement)), None)
+        if first and not run.aborted:
+            run.aborted = f"the run ended at its first finding (-x), of {first.requirement}"
         if new:
             pytest.fail(SECRETS.masked("\n".join(map(in_full, new))), pytrace=False)
         if musts:

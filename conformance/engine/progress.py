@@ -3,6 +3,7 @@
 import os
 import shutil
 import time
+from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -12,6 +13,7 @@ import pytest
 from conformance.contract.classes import Level
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.stage import STAGES
+from conformance.verdict.causes import by_cause
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 _OFTEN_S = 2.0
 # Columns of the bar alone, and of the bar with brackets, counts and blanks.
 _BAR, _BEFORE_TEXT = 24, 42
+# What a requirement that is not met is called, by its level; what a robot may do and does not is no failing of its.
+_WORDS = {Level.MUST: "fail", Level.SHOULD: "warn"}
 
 
 def _has_bar(out: TextIO | None) -> bool:
@@ -40,7 +44,8 @@ class Progress:
     def __init__(self, robot: RobotUnderTest, out: TextIO | None, *, bar: bool = False) -> None:
         self._robot, self._out, self._drawn = robot, out, bar and _has_bar(out)
         self._started = self._told = time.monotonic()
-        self._phase = ""
+        self._phase = self._found = ""
+        self._failures = 0
         self._done = self._total = 0
         self._bar: ProgressBar[Any] | None = None
 
@@ -79,11 +84,21 @@ class Progress:
             self._bar.render_finish()
 
     def _so_far(self) -> str:
+        """Return the requests and the requirements that fail or warn, in the words and numbers of the summary."""
         run = self._robot.run
-        # What a robot may do and does not is no failing of its.
-        findings = sum(run.contract.ledger[id_].level is not Level.MAY for id_ in run.judge.refuted())
-        found = f", {counted(findings, 'requirement')} not met" if findings else ""
-        return f"{counted(self._robot.connection.sent, 'request')}{found}"
+        failures = sum(run.judge.refuted().values())
+        if failures != self._failures:
+            # One cause is one finding, told by one requirement.
+            self._failures = failures
+            _, causes = by_cause(run.judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
+            broken = {cause.finding.requirement for cause in causes if run.selection.has(cause.finding.requirement)}
+            levels = Counter(
+                Level.SHOULD if run.scored is not None and id_ not in run.scored else run.contract.ledger[id_].level
+                for id_ in broken
+                if run.contract.ledger[id_].class_ not in run.beside
+            )
+            self._found = "".join(f", {levels[level]} {word}" for level, word in _WORDS.items() if levels[level])
+        return f"{counted(self._robot.connection.sent, 'request')}{self._found}"
 
     def _write(self, text: str) -> None:
         if self._out is None:

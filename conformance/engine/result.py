@@ -18,6 +18,7 @@ from conformance.engine.suite import contract_digests, installed, suite_digest, 
 from conformance.engine.web_server import web_server
 from conformance.explaining.advice import topic_of
 from conformance.transport.exchange import Attempt, Unanswered
+from conformance.verdict.baseline import NOTHING, Accepted
 from conformance.verdict.causes import Cause
 from conformance.verdict.finding import Finding
 from conformance.verdict.run import Run
@@ -45,7 +46,7 @@ def result_document(
     command: str,
     notes: list[str],
     interrupted: bool,
-    accepted_until: str = "",
+    accepted: Accepted = NOTHING,
 ) -> dict[str, Any]:
     """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
@@ -62,7 +63,7 @@ def result_document(
         "verdict": value,
         "verdict_line": verdict_line(run, value, verdicts),
         **({"stop_undelivered": run.stop_undelivered} if run.stop_undelivered else {}),
-        **({"accepted_until": accepted_until} if accepted_until else {}),
+        **({"accepted_until": accepted.until} if accepted.until else {}),
         **({"refused": run.refused} if run.refused else {}),
         "interrupted": interrupted,
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": run.digests["suite"]},
@@ -70,6 +71,8 @@ def result_document(
         "requirement_set": run.requirement_set.told if run.requirement_set else None,
         "digests": {"statement": run.given.statement, "contract": run.digests["contract"]},
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
+        **({"stale": list(accepted.stale)} if accepted.stale else {}),
+        **({"selected": sorted(run.selection.ids)} if run.selection.ids is not None else {}),
         "nonce": run.given.nonce,
         "places": run.given.places,
         "target": _target(robot),

@@ -1,13 +1,16 @@
 """A baseline: a file of expected failures, each with a reason and an expiry date."""
 
 import datetime as dt
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final, NamedTuple
 
 import msgspec
 
+from conformance.contract.ledger import Requirement
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
 from conformance.verdict.verdicts import Value, Verdict
 
@@ -27,9 +30,25 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """
 
     requirement: Text
-    reason: Text
+    reason: str
     expires: dt.date
     intermittent: bool = False
+
+
+class Accepted(NamedTuple):
+    """What a baseline does to a run.
+
+    Attributes:
+        until: last day on which it accepts all failures; empty if it does not accept all.
+        stale: ids of entries whose requirements pass.
+    """
+
+    until: str = ""
+    stale: tuple[str, ...] = ()
+
+
+#: What no baseline does.
+NOTHING: Final = Accepted()
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,6 +72,8 @@ def load_baseline(
     ids = set(known)
     baseline = tuple(_renewed(entry, renamed) for entry in baseline)
     for entry in baseline:
+        if not entry.reason.strip():
+            raise BaselineError(f"{path}: {entry.requirement} has no reason: write why its failure is accepted")
         if entry.requirement not in ids:
             raise BaselineError(f"{path}: {entry.requirement!r} is no requirement; `roaas contract list` shows them")
     return baseline
@@ -77,6 +98,33 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
         _applied(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
         for verdict in verdicts
     ]
+
+
+def stale_entries(verdicts: Iterable[Verdict], baseline: Iterable[Expectation]) -> tuple[str, ...]:
+    """Return the ids of entries that say of a requirement which passes that it always fails."""
+    passed = {verdict.requirement.id for verdict in verdicts if verdict.value is Value.PASS}
+    return tuple(entry.requirement for entry in baseline if entry.requirement in passed and not entry.intermittent)
+
+
+def baseline_text(failed: Iterable[Requirement], old: Iterable[Expectation], today: dt.date) -> str:
+    """Return a baseline file of what fails now; what an older baseline says of it is kept.
+
+    Args:
+        failed: the requirements that fail.
+        old: entries of the older baseline.
+        today: the last day of new entries, so that somebody has to choose a later one.
+    """
+    known = {entry.requirement: entry for entry in old}
+    tables = ["# Failures that are accepted for a while: write a reason to each, and the last day on which it holds.\n"]
+    for requirement in failed:
+        entry = known.get(requirement.id)
+        reason, expires = (entry.reason, entry.expires) if entry else ("", today)
+        often = "intermittent = true\n" if entry and entry.intermittent else ""
+        tables.append(
+            f"# {' '.join(requirement.text.split())}\n[[expected]]\nrequirement = {json.dumps(requirement.id)}\n"
+            f"reason = {json.dumps(reason, ensure_ascii=False)}\nexpires = {expires.isoformat()}\n{often}"
+        )
+    return "\n".join(tables)
 
 
 def accepted_until(verdicts: Iterable[Verdict]) -> str:

@@ -11,6 +11,7 @@ from conformance.contract.requirement_sets import RequirementSet
 from conformance.statement.statement import Statement, empty_statement
 from conformance.verdict.effort import Effort, Tally
 from conformance.verdict.evidence import Judge
+from conformance.verdict.selection import Selection
 from conformance.verdict.time_limit import TimeLimit
 
 # Less than this much was left out for want of time: a verdict says so in the notes, and not in its first line.
@@ -68,6 +69,7 @@ class Run:
         unreachable: why an interface was not reachable at the start.
         tally: the generated cases of all explorations, and those that time did not allow.
         limit: the time that the run may take, and what it left out.
+        selection: the requirements that are judged of the claimed ones.
         prepare: loads what is needed after the run; called while a check waits for the robot.
     """
 
@@ -94,6 +96,7 @@ class Run:
     unreachable: dict[Interface, str] = field(default_factory=dict)
     tally: Tally = field(default_factory=Tally)
     limit: TimeLimit = field(default_factory=TimeLimit)
+    selection: Selection = field(default_factory=Selection)
     prepare: Callable[[], object] | None = None
 
     def __post_init__(self) -> None:

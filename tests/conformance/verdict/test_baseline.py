@@ -6,7 +6,15 @@ import pytest
 
 from conformance.contract.classes import Level, Origin
 from conformance.contract.ledger import Requirement
-from conformance.verdict.baseline import BaselineError, Expectation, accepted_until, apply_baseline, load_baseline
+from conformance.verdict.baseline import (
+    BaselineError,
+    Expectation,
+    accepted_until,
+    apply_baseline,
+    baseline_text,
+    load_baseline,
+    stale_entries,
+)
 from conformance.verdict.evidence import Evidence
 from conformance.verdict.verdicts import Value, Verdict
 
@@ -59,7 +67,7 @@ def test_an_expired_entry_is_named():
         ("[[expected]]\nrequirement = 'http/date'\nexpires = 2027-01-01", "[[expected]] number 1: 'reason' is missing"),
         (
             "[[expected]]\nrequirement = 'http/date'\nreason = ' '\nexpires = 2027-01-01",
-            "reason = ' ' must be a string",
+            "http/date has no reason: write why its failure is accepted",
         ),
         ("[[expected]]\nrequirement = 'http/date'\nreason = 'x'\nexpires = '2027-01-01'", "without quotes"),
         ("[[expect]]\nrequirement = 'http/date'", "'expect'"),
@@ -81,3 +89,22 @@ def test_an_entry_with_an_id_that_went_is_one_of_the_requirement_that_asks_it_no
     assert (entry.requirement, entry.reason) == ("http/date", "ticket 7; http/old is http/date now")
     with pytest.raises(BaselineError, match="no requirement"):
         load_baseline(path, ["http/date"])
+
+
+def test_a_written_baseline_asks_for_reasons_and_keeps_those_that_are_there(tmp_path):
+    path = tmp_path / "baseline.toml"
+    failed = [Requirement(f"http/{name}", "http", Level.MUST, "A text.", "RFC", Origin.NORM) for name in ("date", "x")]
+    old = [Expectation("http/x", 'ticket "7"', dt.date(2027, 1, 1), intermittent=True)]
+    path.write_text(baseline_text(failed, old, _TODAY), encoding="utf-8")
+    with pytest.raises(BaselineError, match="http/date has no reason"):
+        load_baseline(path, {"http/date", "http/x"})
+    path.write_text(path.read_text().replace('reason = ""', 'reason = "a"'), encoding="utf-8")
+    assert load_baseline(path, {"http/date", "http/x"}) == (Expectation("http/date", "a", _TODAY), *old)
+
+
+@pytest.mark.parametrize(("intermittent", "stale"), [(False, ("http/date",)), (True, ())])
+def test_an_entry_whose_requirement_passes_is_stale(intermittent, stale):
+    requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC", Origin.NORM)
+    entry = Expectation("http/date", "ticket 7", dt.date(2026, 12, 31), intermittent)
+    assert stale_entries([Verdict(requirement, Value.PASS, "", Evidence())], [entry]) == stale
+    assert stale_entries([Verdict(requirement, Value.SKIP, "", Evidence())], [entry]) == ()
