@@ -32,7 +32,7 @@ from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.result.files import with_unstopped
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
-from loadtests.settings.cli_options import COUNTS, KNEE_SEARCHES, RATES, SHARE, CliOptions
+from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, CliOptions
 from loadtests.settings.settings import STEP_S, Settings, SettingsError
 from loadtests.settings.settle import (
     AGAINST_LOOKS,
@@ -196,14 +196,9 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--web-host", default="127.0.0.1", help="Where the web UI and the metrics listen.")
 @click.option("--metrics-port", type=click.IntRange(1, 65535), help="Serve the histograms to Prometheus on this port.")
 @options_of(Group.EFFORT)
-@click.option("--steps", is_flag=True, help="Then raise the rate in steps until the robot breaks down.")
-@options_of(Group.EFFORT, rare=True)
-@click.option("--step-rates", callback=RATES, metavar="R,R,…", help="The rates of these steps.")
-@options_of(Group.EFFORT)
 @click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
 @options_of(Group.EFFORT, rare=True)
 @click.option("--knee-searches", type=click.IntRange(1, 50), default=KNEE_SEARCHES, help="How often to search for it.")
-@click.option("--connections", callback=COUNTS, metavar="N,N,…", help="Then keep this many connections busy.")
 @click.option("--step-duration", "step_s", type=float, default=STEP_S, help="Seconds of each step, for each interface.")
 @options_of(Group.MEASURED)
 @click.option(

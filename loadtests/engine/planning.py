@@ -81,8 +81,7 @@ def _scenario_block_s(duration_s: float) -> float:
 def users(settings: Settings, workers: int) -> int:
     """Return how many users to start in total."""
     load, steps = settings.load, settings.steps
-    if load.users is not None and not steps.rates:
-        return max(load.users, *steps.connections, 0)
-    rate = max(load.rate or 0.0, *steps.rates, 0.0)
-    each = min(_MOST_USERS, max(_LEAST_USERS, int(rate / workers * _STALL_S)))
-    return max(each * workers, *steps.connections, 0)
+    if load.users is not None:
+        return load.users
+    each = int((load.rate or 0.0) / workers * _STALL_S)
+    return workers * (_MOST_USERS if steps.asked else min(_MOST_USERS, max(_LEAST_USERS, each)))

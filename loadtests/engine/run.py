@@ -175,12 +175,10 @@ class Run:
         )
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
-        """Carry out the load steps, the searches for the knee, and the steps with more connections."""
+        """Search the knee."""
         outcome = self.outcome
         load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
-        outcome.steps += load.steps()
         outcome.knee_searches += load.knees()
-        outcome.over_connections += load.over_connections()
 
     @property
     def _over(self) -> bool:

@@ -21,10 +21,10 @@ from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import same_machine
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
-from loadtests.schedule.plan import Plan, step_operation
+from loadtests.schedule.plan import Plan
 from loadtests.schedule.segment import GAP_S
 from loadtests.settings.settings import Settings
-from loadtests.statistics import counts, end_to_end, figures, modes, over_time, service_levels, steps, streams, verdict
+from loadtests.statistics import counts, end_to_end, figures, modes, over_time, service_levels, streams, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.end_to_end import SHARED
@@ -126,10 +126,8 @@ def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[
         "processes": plan.workers,
         "connections": plan.connections,
         "pacing": pacing,
-        "connection_steps": list(after.connections),
         "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
-        "step_rates": list(after.rates),
-        "step_s": after.step_s if after.rates else None,
+        "step_s": after.step_s if after.asked else None,
     }
 
 
@@ -215,10 +213,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         **({"against": compared} if compared else {}),
         "time_series": over_time.time_series(measured),
         "blocks": over_time.blocks(measured),
-        "steps": outcome.steps,
-        "knee": _knee(outcome, plan),
         "knee_search": outcome.knee_searches,
-        "over_connections": outcome.over_connections,
         "errors": over_time.errors(recorder, plan.operations) + _early_errors(outcome.findings),
         "thresholds": judged,
         "slo": levels,
@@ -338,15 +333,6 @@ def _early_errors(findings: Findings) -> list[dict[str, Any]]:
         | {"count": 1, "first_s": None, "last_s": None}
         for name, failure in findings.failures.items()
     ]
-
-
-def _knee(outcome: Outcome, plan: Plan) -> list[dict[str, Any]]:
-    if not outcome.steps:
-        return []
-    operation = plan.operations[step_operation(plan.operations)]
-    settings = outcome.settings
-    criterion = steps.Criterion.of(settings.thresholds, operation, settings.slo.get(operation))
-    return steps.knee(outcome.steps, plan.interfaces, criterion)
 
 
 def _stamp(moment: datetime) -> str:

@@ -14,7 +14,6 @@ from loadtests.measuring.robot_process import RobotProcess
 from loadtests.measuring.streams import Heard
 from loadtests.schedule.plan import Plan, SeriesName
 from loadtests.settings.settings import Settings
-from loadtests.statistics.steps import Step
 
 
 class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
@@ -47,8 +46,7 @@ class Outcome:
         before: the machine when the run began.
         robot_process: the process at the robot's address before the comparison, where that is known.
         cpu_share: the busiest worker's share of a core in the comparison.
-        steps: results of the stepped load.
-        knee_searches: results of the searches for the knee; over_connections: of more and more connections.
+        knee_searches: results of the searches for the knee.
         journeys: deliveries from the request to the application, by way.
         heard: what came over each stream.
     """
@@ -67,8 +65,6 @@ class Outcome:
     before: Moment = field(default_factory=Moment.now)
     robot_process: RobotProcess | None = None
     cpu_share: float | None = None
-    steps: list[Step] = field(default_factory=list)
     knee_searches: list[dict[str, Any]] = field(default_factory=list)
-    over_connections: list[dict[str, Any]] = field(default_factory=list)
     journeys: dict[str, Journeys] = field(default_factory=dict)
     heard: list[Heard] = field(default_factory=list)

@@ -98,12 +98,6 @@ def _medians(document: dict[str, Any]) -> list[str]:
 def _knees(document: dict[str, Any]) -> list[str]:
     """Return the rates at which the robot breaks down, by steps and by bisection."""
     lines = []
-    for entry in document["knee"]:
-        highest = entry["highest_rate"]
-        reached = (
-            "no offered rate meets" if highest is None else f"{highest:g}/s is the highest offered rate that meets"
-        )
-        lines.append(f"{entry['interface']}: {reached}: {entry['criterion']}")
     for entry in document["knee_search"]:
         if entry["rate"] is not None:
             low, high = entry["interval"]

@@ -36,12 +36,9 @@ class CliOptions:
     warmup_s: float | None = None
     arrivals: str = "constant"
     seed: int = 1
-    steps: bool = False
-    step_rates: tuple[float, ...] = ()
     step_s: float = STEP_S
     knee: bool = False
     knee_searches: int = KNEE_SEARCHES
-    connections: tuple[int, ...] = ()
     repeats: Repeats = field(default_factory=Repeats)
     allow_motion: bool = False
     thresholds: tuple[Threshold, ...] = ()
@@ -80,11 +77,4 @@ def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Contex
     return callback
 
 
-RATES = _parsed(
-    lambda text: tuple(float(part) for part in text.split(",")) if text else (), "a list of rates such as 100,200,400"
-)
-COUNTS = _parsed(
-    lambda text: tuple(sorted({int(part) for part in text.split(",")})) if text else (),
-    "a list of numbers such as 1,8,32,128,512",
-)
 SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")

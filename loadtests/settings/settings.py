@@ -28,26 +28,22 @@ class Selection:
 
 @dataclass(frozen=True)
 class Steps:
-    """The loads after the comparison.
+    """The searches for the knee after the comparison.
 
     Attributes:
-        rates: of the steps, in arrivals per second; empty for no steps.
         step_s: seconds of each step.
         most_rate: the highest rate allowed for the operation that is stepped.
-        knee_searches: how often to search the knee by bisection; 0 for not at all.
-        connections: numbers of connections to keep busy.
+        knee_searches: how often to search; 0 for not at all.
     """
 
-    rates: tuple[float, ...] = ()
     step_s: float = STEP_S
     most_rate: float | None = None
     knee_searches: int = 0
-    connections: tuple[int, ...] = ()
 
     @property
     def asked(self) -> bool:
         """Return whether there is anything to do after the comparison."""
-        return bool(self.rates or self.knee_searches or self.connections)
+        return bool(self.knee_searches)
 
 
 @dataclass(frozen=True)

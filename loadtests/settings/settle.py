@@ -13,7 +13,6 @@ from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Setti
 
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
-_MOST_CONNECTIONS = 4096
 _MOST_DURATION_S = 24 * 3600.0
 
 
@@ -21,8 +20,8 @@ def contradiction(options: CliOptions) -> str | None:
     """Return what is wrong with the options and what to change; None if they are valid."""
     if options.rate is not None and options.users is not None:
         return "--rate (open model) and --users (closed model) exclude each other"
-    if options.users is not None and (options.steps or options.step_rates or options.knee):
-        return "--steps and --knee set rates, which is an open model: use --rate instead of --users"
+    if options.users is not None and options.knee:
+        return "--knee sets rates, which is an open model: use --rate instead of --users"
     if options.generator.processes + options.generator.expect < 1:
         return "--processes 0 leaves the work to other machines: say how many workers with --expect-workers"
     ranges: list[tuple[str, Any, float, float]] = [
@@ -31,8 +30,6 @@ def contradiction(options: CliOptions) -> str | None:
         ("--duration", options.duration_s, 0.0, _MOST_DURATION_S),
         ("--timeout", options.endpoints.get("timeout_s"), 0.0, 3600.0),
         ("--step-duration", options.step_s, 0.0, 600.0),
-        *(("--connections", users, 0, _MOST_CONNECTIONS) for users in options.connections),
-        *(("--step-rates", rate, 0.0, _MOST_RATE) for rate in options.step_rates),
     ]
     for name, value, low, high in ranges:
         if value is not None and not low < value <= high:
@@ -64,7 +61,6 @@ DEFAULT_DURATION_S = 20.0
 DEFAULT_AGAINST_S = 40.0
 AGAINST_LOOKS = (1, 2, 4)
 DEFAULT_WARMUP_S = 2.0
-DEFAULT_STEP_RATES = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0, 12800.0)
 #: Limits on operations that move the robot, unless its statement's [load] says otherwise.
 MOTION_RATE = 500.0
 MOTION_DURATION_S = 120.0
@@ -181,9 +177,7 @@ def _compared(settings: Settings, options: CliOptions, other: RobotStatement, ta
     """Return the settings of a run against another robot, whose own limits apply as well."""
     tolerance = options.tolerance
     if settings.steps.asked:
-        raise SettingsError(
-            "--against compares two robots; --steps, --knee and --connections load one: run them one after the other"
-        )
+        raise SettingsError("--against compares two robots, and --knee loads one: run them one after the other")
     if not 0 < tolerance <= _MOST_TOLERANCE:
         raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")
     load = settings.load
@@ -206,21 +200,6 @@ def _looks(options: CliOptions, load: Load, settings: Settings, other: _Allowed)
 
 
 def _steps(options: CliOptions, statement: RobotStatement, *, moves: bool) -> Steps:
-    """Return the load steps after the comparison; they use a read operation if there is one."""
-    ceiling = _Allowed.of(statement, moves=moves).rate
+    """Return the searches for the knee; they use a read operation if there is one."""
     searches = options.knee_searches if options.knee else 0
-    return Steps(_step_rates(options, ceiling), options.step_s, ceiling, searches, options.connections)
-
-
-def _step_rates(options: CliOptions, ceiling: float | None) -> tuple[float, ...]:
-    """Return the rates of the stepped load up to a limit; empty when no steps are wanted."""
-    if options.step_rates:
-        above = [rate for rate in options.step_rates if ceiling is not None and rate > ceiling]
-        if above:
-            raise SettingsError(f"--step-rates {above[0]:g} exceeds {ceiling:g} requests/s, the highest rate allowed")
-        return tuple(sorted(set(options.step_rates)))
-    if not options.steps:
-        return ()
-    if ceiling is None:
-        return DEFAULT_STEP_RATES
-    return tuple(rate for rate in DEFAULT_STEP_RATES if rate <= ceiling) or (ceiling,)
+    return Steps(options.step_s, _Allowed.of(statement, moves=moves).rate, searches)

@@ -1,8 +1,9 @@
-"""Where a robot breaks down: a load that is stepped up until the robot no longer meets the criterion."""
+"""One rate for a few seconds, and whether the robot met the criterion: what searches for the knee are made of."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import msgspec
 
@@ -11,7 +12,6 @@ from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded
-from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import Measured, counted
 from loadtests.statistics.recorder import Recorder
 
@@ -61,11 +61,13 @@ class Criterion:
 
 
 class Step(msgspec.Struct, kw_only=True):
-    """One rate over one interface: an entry of `steps` in latency.json.
+    """One rate over one interface: a point of the `curve` of a search for the knee in latency.json.
 
     Attributes:
         reason: why the step does not meet the criterion.
+        achieved_rate: good responses in a second of the step, from its first responses on.
         cpu_share: the busiest generator process's share of a core.
+        lag_p99_ms: how late the generator itself was.
     """
 
     interface: str
@@ -76,30 +78,33 @@ class Step(msgspec.Struct, kw_only=True):
     errors: int
     dropped: int
     p50_ms: float | None
+    p95_ms: float | None
     p99_ms: float | None
     max_ms: float | None
     meets: bool
     reason: str | None
     cpu_share: float | None = None
+    lag_p99_ms: float | None = None
 
     @property
     def limited_by_generator(self) -> bool:
-        """Return whether the generator was too busy for the step to say anything about the robot."""
-        return (self.cpu_share or 0.0) > BUSY
+        """Return whether the generator was too busy, or itself too late, for the step to say anything of the robot."""
+        return (self.cpu_share or 0.0) > BUSY or 2 * (self.lag_p99_ms or 0.0) > (self.p99_ms or math.inf)
 
 
 def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, criterion: Criterion) -> Step:
-    """Return one interface's step of a plan that was carried out."""
+    """Return the result of a plan of one interface that was carried out."""
     measured, name = Measured([plan], recorder), (operation, interface, "wire")
-    asked = arrivals_due(plan, plan.length_s, phase="step", interface=interface)
-    seconds = sum(segment.active_s for segment in plan.segments if segment.interface == interface)
-    whole, last = measured.total(name, "step"), Histogram()
-    for block in measured.blocks(name, "step"):
-        last = block.cell.response
-    achieved = _answered_in_time(whole.service.total, last, seconds)
+    asked = arrivals_due(plan, plan.length_s, phase="step")
+    blocks = list(measured.blocks(name, "step"))
+    whole = measured.total(name, "step")
+    # Until its first responses come, even a robot that keeps up has answered nothing.
+    first_s = (blocks[0].cell.response.quantile_ms(0.5) or 0.0) / 1e3 if blocks else 0.0
+    seconds = max(plan.length_s - first_s, plan.length_s / 10)
+    achieved, offered = recorder.in_time[plan.first_segment] / seconds, asked / plan.length_s
     reasons = []
-    if achieved < _LEAST_ACHIEVED * asked / seconds:
-        reasons.append(f"{achieved:.0f}/s answered of {asked / seconds:.0f}/s")
+    if achieved < _LEAST_ACHIEVED * offered:
+        reasons.append(f"{achieved:.0f}/s answered of {offered:.0f}/s")
     started = whole.service.total + whole.errors
     if started and whole.errors / started > _MOST_ERRORS:
         reasons.append(f"{whole.errors} of {started} requests failed")
@@ -107,7 +112,7 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
         value = counted(whole, time).figure_ms(quantile)
         if value is not None and value >= below:
             reasons.append(f"{quantile} {time} time {value:.3f} ms is not below {below:g} ms")
-    response = counted(whole, "response")
+    response, lag = counted(whole, "response"), measured.spans("step", name).lag
     return Step(
         interface=interface,
         offered_rate=round(plan.step_rate or 0.0, 6),
@@ -115,41 +120,11 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
         count=whole.service.total,
         errors=whole.errors,
         dropped=whole.dropped,
-        p50_ms=rounded(response.figure_ms("p50")),
-        p99_ms=rounded(response.figure_ms("p99")),
-        max_ms=rounded(response.figure_ms("max")),
         meets=not reasons,
         reason="; ".join(reasons) or None,
+        lag_p99_ms=rounded(lag.figure_ms("p99")),
+        p50_ms=rounded(response.figure_ms("p50")),
+        p95_ms=rounded(response.figure_ms("p95")),
+        p99_ms=rounded(response.figure_ms("p99")),
+        max_ms=rounded(response.figure_ms("max")),
     )
-
-
-def _answered_in_time(answered: int, last: Histogram, seconds: float) -> float:
-    """Return the requests answered per second, from the step's beginning to its last responses.
-
-    An overloaded robot answers the last arrivals late, by the length of its queue: all responses together took the
-    step's length plus that delay. The median of the last half second is taken as the delay, so that one outlier does
-    not count.
-    """
-    delay = (last.quantile_ms(0.5) or 0.0) / 1e3
-    length = seconds if delay < seconds * (1 - _LEAST_ACHIEVED) else seconds + delay
-    return answered / length if length > 0 else 0.0
-
-
-def knee(results: Iterable[Step], interfaces: tuple[str, ...], criterion: Criterion) -> list[dict[str, Any]]:
-    """Return the highest rate up to which every step met the criterion, for each interface."""
-    found = []
-    for interface in interfaces:
-        steps = sorted((step for step in results if step.interface == interface), key=lambda step: step.offered_rate)
-        missed = next((step for step in steps if not step.meets), None)
-        met = steps if missed is None else steps[: steps.index(missed)]
-        found.append(
-            {
-                "interface": interface,
-                "highest_rate": met[-1].offered_rate if met else None,
-                "first_rate_missed": missed.offered_rate if missed else None,
-                "criterion": criterion.words(interface),
-                "reason": missed.reason if missed else None,
-                "limited_by": None if missed is None else ("generator" if missed.limited_by_generator else "robot"),
-            }
-        )
-    return found

@@ -86,14 +86,35 @@ class Comparison:
         return bool(self.old["valid"] and self.new["valid"] and any(c.interval for c in self.changes))
 
     def with_verdict(self, verdict: str) -> list[Change]:
-        """Return the changes with that verdict, the greatest change first."""
-        found = [change for change in self.changes if change.verdict == verdict]
-        return sorted(found, key=lambda change: -abs(math.log(change.ratio or 1.0)))
+        """Return the changes with that verdict, the one first that is known best.
+
+        That is the one with the least uncertainty: its interval, and what the A/A controls show to be noise.
+        """
+        return sorted((change for change in self.changes if change.verdict == verdict), key=_uncertainty)
+
+    @property
+    def busy(self) -> str:
+        """Return what to do where a machine was busy; empty where none was."""
+        for word, result in (("old", self.old), ("new", self.new)):
+            environment = result["environment"]
+            load = (environment.get("machine") or {}).get("load_average_before")
+            if load is not None and load > environment["cpus"]:
+                return (
+                    f"The machine was busy before the {word} run (load average {load:.1f} on {environment['cpus']} "
+                    "CPUs), and two runs meet different disturbances: to be sure, measure both versions in one run "
+                    "with roaas load --against."
+                )
+        return ""
 
     @property
     def slower(self) -> bool:
         """Return whether any quantile got slower beyond its threshold."""
         return bool(self.with_verdict("slower"))
+
+
+def _uncertainty(change: Change) -> tuple[float, float]:
+    low, high = change.interval or (1.0, math.inf)
+    return max(math.log(high / low), math.log1p(change.threshold)), math.log(high / low)
 
 
 def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, str], threshold: float) -> Comparison:
@@ -276,9 +297,7 @@ def _remarks(
     if after > before:
         yield f"More requests failed: {after:.2%} now, {before:.2%} before."
     yield from _uncounted(old_series, new_series)
-    for interface, (was, now) in _knees(old, new).items():
-        if was != now:
-            yield f"{interface.upper()} met the criterion up to {rate(was)} requests/s, and now up to {rate(now)}."
+    yield from _knees(old, new)
 
 
 def _uncounted(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
@@ -292,8 +311,16 @@ def _failed(series: AllSeries) -> float:
     return failed / max(1, failed + sum(int(one.data["count"]) for one in series.values()))
 
 
-def _knees(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
+def _knees(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a remark for each interface whose knee moved: the regions in which it lies do not overlap."""
     before, after = (
-        {knee["interface"]: knee["highest_rate"] for knee in result.get("knee", [])} for result in (old, new)
+        {search["interface"]: search for search in result.get("knee_search", []) if search["interval"]}
+        for result in (old, new)
     )
-    return {interface: (before[interface], after[interface]) for interface in after if interface in before}
+    for interface in (name for name in after if name in before):
+        was, now = before[interface], after[interface]
+        if max(was["interval"][0], now["interval"][0]) > min(was["interval"][1], now["interval"][1]):
+            yield (
+                f"{interface.upper()}: the knee was at {rate(was['rate'])} requests/s, and is now at "
+                f"{rate(now['rate'])}."
+            )

@@ -20,22 +20,22 @@ _HEAD = ("series", "time", "at", "old ms", "new ms", "new/old", "95 % interval",
 
 
 def verdict(comparison: Comparison) -> Verdict:
-    """Return the verdict on a comparison of two latency results, with the greatest change and its interval."""
+    """Return the verdict on a comparison of two latency results, with the change that is known best."""
     if not comparison.valid:
         because = " ".join(comparison.remarks) or "No quantile has an interval in both results."
         return Verdict("warning", "?", "Not comparable", because)
     slower, faster = comparison.with_verdict("slower"), comparison.with_verdict("faster")
     counted = f"(Of {len(comparison.changes)} quantiles {len(slower)} got slower and {len(faster)} faster.)"
+    again = f" {hint}" if (hint := comparison.busy) else ""
     if slower:
-        return Verdict("bad", "✗", "It got slower", f"{sentence(slower[0])} {counted}")
+        return Verdict("bad", "✗", "It got slower", f"{sentence(slower[0])} {counted}{again}")
     if faster:
-        return Verdict("good", "✓", "It got faster", f"{sentence(faster[0])} {counted}")
+        return Verdict("good", "✓", "It got faster", f"{sentence(faster[0])} {counted}{again}")
     unclear = comparison.with_verdict("unclear")
     if unclear:
-        widest = sentence(max(unclear, key=_width))
-        return Verdict(
-            "quiet", "=", "No change can be shown", f"The least certain: {widest} Longer runs give narrower intervals."
-        )
+        best = sentence(unclear[0])
+        longer = again or " Longer runs give narrower intervals."
+        return Verdict("quiet", "=", "No change can be shown", f"Of these the best known: {best}{longer}")
     return Verdict("quiet", "=", "No change", "Every quantile with an interval stayed within the threshold.")
 
 
@@ -113,7 +113,3 @@ def _ratios(changes: Sequence[Change]) -> Any:
         "New service time divided by the old one, with 95 % intervals. Right of 1 requests got slower. A change within "
         "the noise, which is in the table, does not count.",
     )
-
-
-def _width(one: Change) -> float:
-    return one.interval[1] / one.interval[0] if one.interval else 0.0

@@ -66,7 +66,6 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
         *_followed(result),
         *_stalled(result),
         *_two_modes(series),
-        *_knees(result),
         *_searched(result),
         *_failed(result, series),
         *_noted(result),
@@ -152,26 +151,6 @@ def _two_modes(series: AllSeries) -> Iterator[str]:
             far.append(f"{share(found['beyond_five_medians'])} of {name}")
     if far:
         yield f"Requests over five times the median: {', '.join(far)}."
-
-
-def _knees(result: Mapping[str, Any]) -> Iterator[str]:
-    explained: set[str] = set()
-    for knee in result.get("knee", []):
-        name = knee["interface"].upper()
-        # Both interfaces usually have the same criterion: it is shown once.
-        criterion = "" if knee["criterion"] in explained else f" ({knee['criterion']})"
-        explained.add(knee["criterion"])
-        if knee["highest_rate"] is None:
-            yield f"{name} did not meet the criterion at any offered rate{criterion}."
-            continue
-        sentence = f"{name} meets the criterion up to {rate(knee['highest_rate'])} requests/s{criterion}"
-        missed = knee.get("first_rate_missed")
-        if missed is None:
-            yield f"{sentence}, the highest rate offered: the knee is above it."
-            continue
-        because = f": {knee['reason']}" if knee.get("reason") else ""
-        limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
-        yield f"{sentence}, and no longer at {rate(missed)} requests/s{because}.{limit}"
 
 
 def _searched(result: Mapping[str, Any]) -> Iterator[str]:

@@ -43,7 +43,7 @@ class Device(asyncio.Protocol):
 
 
 async def serve(rate):
-    Device.interval, Device.burst = 1 / rate, 0.1
+    Device.interval, Device.burst = 1 / rate, 0.03
     server = await asyncio.get_running_loop().create_server(Device, "127.0.0.1", 0, backlog=1024)
     sys.stdout.write(f"ready {server.sockets[0].getsockname()[1]}\n")
     sys.stdout.flush()

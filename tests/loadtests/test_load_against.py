@@ -78,7 +78,7 @@ def test_the_other_robot_has_to_be_there_as_well(toy, load, free_port):
         ("--against b:2", "b:2"),
         ("--against http://b:2 --tolerance much", "'much' is not a percentage"),
         ("--against http://b:2 --tolerance 0", "--tolerance 0.000% is out of range"),
-        ("--against http://b:2 --steps", "one after the other"),
+        ("--against http://b:2 --knee", "one after the other"),
         ("--against slow.toml --rate 90", "--rate 90 exceeds 80 requests/s (the statement's [endpoints] request_rate"),
         ("--against slow.toml --rate 9 --duration 6 --repeat 2", "--duration 6 2 times exceeds 10 s"),
     ],

@@ -92,3 +92,21 @@ def test_one_side_alone_counts_all_its_requests(bucket, load):
     assert counts["achieved_rate"] == pytest.approx(80, rel=0.05)
     assert re.search(r"^asked +400  80.0/s for 5.0 s$", run.out, re.MULTILINE), run.out
     assert "p99 needs 1,000 requests, and GET /state gets 400: --duration 13 is long enough" in run.err
+
+
+@pytest.mark.parametrize("capacity", [300, 1000])
+def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load, capacity):
+    run = load(
+        bucket(capacity),
+        "--operation 'GET /state' --rate 50 --duration 1 --warmup 0.1 --knee --knee-searches 3 --step-duration 1.5",
+    )
+    (search,) = run.result["knee_search"]
+    estimates = [(kept * missed) ** 0.5 for kept, missed in search["brackets"]]
+    assert len(estimates) == 3, run.err
+    assert max(estimates) <= 1.2 * min(estimates)
+    assert search["rate"] == pytest.approx(capacity, rel=0.2)
+    missed = [point["offered_rate"] for point in search["curve"] if not point["meets"]]
+    assert all(missed.count(rate) >= 2 for _, rate in search["brackets"]), "what ends a branch was tried twice"
+    over = [point["achieved_rate"] for point in search["curve"] if point["offered_rate"] > 1.3 * capacity]
+    assert over == pytest.approx([capacity] * len(over), rel=0.2), "an overloaded robot goes on at its capacity"
+    assert "Where it breaks" in latency_html(run.result)

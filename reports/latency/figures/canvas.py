@@ -23,8 +23,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 P = ParamSpec("P")
 INK, SOFT, LINE = "#16202a", "#55616d", "#d9dfe5"
-COLOUR = {"rest": "#0072B2", "soap": "#D55E00", "rosbridge": "#009E73"}
-MARK = {"rest": "o", "soap": "^", "rosbridge": "s"}
+COLOUR = {"rest": "#0072B2", "soap": "#D55E00", "rosbridge": "#009E73", "both": "#7a4d8f"}
+MARK = {"rest": "o", "soap": "^", "rosbridge": "s", "both": "D"}
 """A marker for each interface beside its colour, because a black and white printer shows one grey."""
 SPAN_COLOUR = {"build": "#E69F00", "wire": "#56B4E9", "server": "#009E73", "parse": "#CC79A7"}
 SPAN_HATCH = {"build": "", "wire": "//", "server": "", "parse": "\\\\"}

@@ -41,10 +41,6 @@ def test_options_win_over_the_statement_and_defaults_fill_the_rest():
         (CliOptions.of(**REST, warmup_s=-1.0), "--warmup -1 is out of range"),
         (CliOptions.of(**REST, rate=501.0, allow_motion=True), "exceeds 500 requests/s (the default limit"),
         (CliOptions.of(**REST, duration_s=121.0, allow_motion=True), "exceeds 120 s (the default limit"),
-        (
-            CliOptions.of(**REST, step_rates=(100.0, 600.0), allow_motion=True, operations=("delivery",)),
-            "--step-rates 600 exceeds 500",
-        ),
         (CliOptions.of(**REST, token_file="/nonexistent"), "token file '/nonexistent': No such file"),  # noqa: S106 - a path
         (CliOptions.of(**REST, ca_file="/nonexistent"), "ca_file '/nonexistent'"),
         (CliOptions.of(**REST, interfaces=("soap",)), "--interface soap needs"),
@@ -85,9 +81,7 @@ def test_the_statements_limits_hold_and_lift():
     assert settle(CliOptions.of(**REST, rate=9000.0, duration_s=600.0), Statement()).load.rate == 9000.0, (
         "reads are not bounded"
     )
-    assert settle(CliOptions.of(**REST, step_rates=(6000.0,), allow_motion=True), Statement()).steps.rates == (
-        6000.0,
-    ), "of reads"
+    assert settle(CliOptions.of(**REST, knee=True, allow_motion=True), Statement()).steps.most_rate is None, "of reads"
     assert settle(CliOptions.of(**REST, users=4, allow_motion=True), Statement()).limits.max_rate == MOTION_RATE
 
 

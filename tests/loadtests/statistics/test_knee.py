@@ -1,5 +1,6 @@
 """The search for the knee, on a robot whose knee is known."""
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,8 +32,34 @@ def test_every_search_encloses_the_knee_in_few_steps(knee):
         assert kept < knee <= missed
         assert missed / kept <= RESOLUTION + 1e-6
     assert found["confidence"] == pytest.approx(0.9375)
-    assert len(tried) <= 16 + 4 * 8
+    assert len(tried) <= 28 + 4 * 16, "what missed is tried twice"
     assert found["limited_by"] == "robot"
+
+
+def test_a_rate_that_missed_by_chance_ends_no_branch():
+    tried = []
+    good = robot(900, tried)
+
+    def attempt(rate):
+        trial = good(rate)
+        unlucky = rate == 200 or (rate > 600 and tried.count(rate) == 1)
+        return msgspec.structs.replace(trial, meets=trial.meets and not unlucky)
+
+    found = knee_search("rest", "…", search_again(3, (50, 50_000), attempt))
+    assert all(kept < 900 <= missed for kept, missed in found["brackets"])
+    assert {point.offered_rate for point in found["curve"]} == set(tried)
+
+
+def test_a_miss_while_the_generator_was_late_is_tried_again():
+    left = iter(range(4))
+
+    def attempt(rate):
+        late = 300 < rate < 500 and next(left, None) is not None
+        trial = robot(900)(rate)
+        return msgspec.structs.replace(trial, meets=trial.meets and not late, cpu_share=0.99 if late else 0.2)
+
+    (search,) = search_again(1, (50, 50_000), attempt)
+    assert search.kept < 900 <= search.missed
 
 
 def test_what_lies_beyond_the_limits_is_not_guessed():

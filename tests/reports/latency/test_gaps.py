@@ -17,7 +17,7 @@ def as_in_the_first_version(_latency):
 
 
 def with_one_interface(latency):
-    latency.update(series=latency["series"][:1], comparisons=[], steps=[], knee=[])
+    latency.update(series=latency["series"][:1], comparisons=[], knee_search=[])
 
 
 def invalid(latency):
@@ -62,8 +62,8 @@ def with_knees(latency):
         search | none | {"interface": "both", "held_up_to": 400.0},
         search | none | {"interface": "soap", "rate": 90.0, "interval": [80.0, 100.0], "brackets": [[80.0, 100.0]]},
     ]
-    figures = {"connections": 8, "rate": 900.0, "count": 5, "errors": 0, "p50_ms": None, "p99_ms": None, "max_ms": None}
-    latency["over_connections"] = [figures | {"interface": "rest", "client": "wire", "cpu_share": None}]
+    step = {"interface": "soap", "offered_rate": 90.0, "achieved_rate": 0.0, "count": 0, "errors": 0, "meets": False}
+    latency["knee_search"][2]["curve"] = [step | {"p50_ms": None, "p99_ms": None}]
 
 
 def followed(latency):

@@ -36,6 +36,29 @@ def test_slower_is_found_where_it_is(latency):
     assert verdict(found).words == "It got slower"
 
 
+def test_the_headline_is_what_is_known_best_and_not_what_changed_most(latency):
+    new = scaled(latency, 1.2, "soap")
+    for series in new["series"]:  # a tail that doubled, known to a quarter
+        for time, bounds in (("service_ms", "ci95_ms"), ("response_ms", "response_ci95_ms")):
+            series[time]["p99"] *= 2
+            series[bounds]["p99"] = [series[time]["p99"] / 1.25, series[time]["p99"] * 1.25]
+    found = compared(latency, new)
+    assert max(change.ratio for change in found.with_verdict("slower")) > 1.9
+    assert "at 50 % went from" in verdict(found).sentence
+    unsure = compared(latency, scaled(latency, 1.01), 0.001)
+    assert verdict(unsure).words == "No change can be shown"
+    widths = {change: math.log(change.interval[1] / change.interval[0]) for change in unsure.with_verdict("unclear")}
+    assert next(iter(widths)).quantile == "p50"
+
+
+def test_where_a_machine_was_busy_one_run_with_both_is_the_way(latency):
+    assert "--against" not in verdict(compared(latency, latency)).sentence
+    latency["environment"]["machine"] = {"load_average_before": latency["environment"]["cpus"] * 5.0}
+    for new in (scaled(latency, 1.2, "soap"), scaled(latency, 1.01)):
+        told = verdict(compared(latency, new, 0.001)).sentence
+        assert "in one run with roaas load --against" in told
+
+
 def test_faster_is_no_failure(latency):
     found = compared(latency, scaled(latency, 0.7, "soap"))
     assert not found.slower
@@ -151,9 +174,9 @@ def test_what_else_changed_is_told(latency):
     other["environment"]["cpu"] = "Another CPU"
     other["series"][0]["errors"] = 500
     other["series"].pop()
-    other["knee"][0]["highest_rate"] = 2000
+    other["knee_search"][0].update(rate=2000, interval=[1900, 2100])
     told = " ".join(compared(latency, other).remarks)
-    for wanted in ("cpu was Example CPU", "More requests failed", "Only in the old result", "and now up to 2,000"):
+    for wanted in ("cpu was Example CPU", "More requests failed", "Only in the old result", "and is now at 2,000"):
         assert wanted in told
 
 

@@ -17,7 +17,7 @@ from reports.latency.findings import remarks, verdict
 from reports.latency.page import latency_html, latency_markdown
 
 DATA = Path(__file__).parents[1] / "data"
-FIGURES = ["ratios", "spectrum", "heat", "blocks", "spans", "timeline", "load"]
+FIGURES = ["load", "ratios", "spectrum", "heat", "blocks", "spans", "timeline"]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_everything_is_in_it(latency, example):
         latency["headline"]["sentence"],
         "SOAP takes 0.047 ms longer than REST for delivery on average; 0.030 ms of that is the server's own work.",
         "1 stall in seconds 15 to 17 of the run: a request took 400.2 ms",
-        "REST meets the criterion up to 4,000 requests/s",
+        "REST: the knee is at 5,657 requests/s (4,000 to 8,000, 1 searches)",
         "2 requests of 4,642 failed",
         "the paper, delivery1.5002.5001.67",
         "no complete response within 10 s",
@@ -66,7 +66,7 @@ def test_everything_is_in_it(latency, example):
 def test_every_figure_tells_what_it_shows(example):
     document = html.document_fromstring(example)
     drawings = document.xpath("//figure//*[local-name()='svg']")
-    assert len(drawings) == 18
+    assert len(drawings) == 20
     assert all(len(drawing.get("aria-label")) > 20 for drawing in drawings)
     assert all(text(caption) for caption in document.iter("figcaption"))
 
@@ -113,7 +113,7 @@ def emptied(latency):
         series["spans_ms"] = dict.fromkeys(("build", "wire", "server", "parse"))
     for comparison in latency["comparisons"]:
         comparison.update(soap_minus_rest_ms=None, ratio=None, ci95=None, ci95_difference_ms=None, reason="0 samples")
-    latency.update(time_series={"width_s": 1.0, "series": []}, steps=[], knee=[], thresholds=[], noise_floor=[])
+    latency.update(time_series={"width_s": 1.0, "series": []}, knee_search=[], thresholds=[], noise_floor=[])
     latency.update(interrupted=True, errors=[])
     return latency
 
@@ -143,7 +143,7 @@ def test_invalid_run_says_so_first(latency):
 
 def test_one_interface_alone(latency):
     latency["series"] = [s for s in latency["series"] if s["interface"] == "rest"][:1]
-    latency.update(comparisons=[], steps=[])
+    latency.update(comparisons=[], knee_search=[])
     assert "difference" not in figures(page(latency))
 
 
@@ -192,7 +192,7 @@ def test_robot_without_server_timing(latency):
 def test_negative_and_zero_figures(latency):
     for comparison in latency["comparisons"]:
         comparison.update(soap_minus_rest_ms=-0.01, ratio=0.9, ci95=[0.88, 0.92], ci95_difference_ms=[0.0, 0.02])
-    for step in latency["steps"]:
+    for step in latency["knee_search"][0]["curve"]:
         step.update(p50_ms=None, p99_ms=None, achieved_rate=0.0, count=0)
     assert "0.90" in text(page(latency))
     assert load(latency)
@@ -202,10 +202,10 @@ def test_negative_and_zero_figures(latency):
 def test_one_request_in_each_series(latency):
     histogram = HdrHistogram(1, 3_600_000_000, 3)
     histogram.record_value(70)
-    latency.update(series=latency["series"][:2], steps=[])
+    latency.update(series=latency["series"][:2], knee_search=[])
     for series in latency["series"]:
         series.update(count=1, histogram=histogram.encode().decode(), response_histogram=histogram.encode().decode())
-    assert figures(page(latency)) == FIGURES[:-1]
+    assert figures(page(latency)) == FIGURES[1:]
 
 
 def test_stalls_are_found_and_those_of_one_moment_are_one(latency):
@@ -236,7 +236,7 @@ def test_long_run_keeps_its_stall_and_its_size(latency):
 
 
 def test_hostile_text_stays_text(latency):
-    latency.update(series=latency["series"][:2], steps=[], time_series={"width_s": 1.0, "series": []})
+    latency.update(series=latency["series"][:2], knee_search=[], time_series={"width_s": 1.0, "series": []})
     attack = "</svg></script><script>alert(1)</script>\x1b[2J\u202e"
     latency["environment"].update(cpu=attack, command=attack, robot_command=attack)
     latency["environment"]["robot"].update(name=attack, vendor=attack, version=attack, servers={attack: attack})
@@ -256,7 +256,7 @@ def test_bad_histogram_is_told(latency):
 
 
 def test_noise_floor_of_a_short_run(latency):
-    latency.update(series=latency["series"][:1], steps=[], time_series={"width_s": 1.0, "series": []})
+    latency.update(series=latency["series"][:1], knee_search=[], time_series={"width_s": 1.0, "series": []})
     for noise in latency["noise_floor"]:
         noise.update(ci95=None, reason="fewer than 6 pairs of blocks")
     assert "for an A/A control, which compares an interface with itself (fewer than 6" in text(page(latency))
