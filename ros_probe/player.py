@@ -2,9 +2,10 @@
 
 Each command is an object with "do"; each gets one answer. Times are of CLOCK_MONOTONIC, ns. Values are as in values.py.
 
-- `describe` (type): the fields of a type.
-- `publish` (topic, type, values, gap_s, reliability, durability): publish; the first time, become a publisher. Without
-  values, only that. Answers `sent`: when each was handed to ROS; `subscribers`.
+- `describe` (type): the fields of a type. `complete` (type, value): the value with its defaults.
+- `publish` (topic, type, values, gap_s, repeat_s, reliability, durability): publish; the first time, become a
+  publisher. Without values, only that. The last value is repeated every repeat_s until the next command. Answers
+  `sent`: when each was handed to ROS; `subscribers`; `best_effort`: whether one of them may lose messages.
 - `listen` (topic, type): subscribe, as reliably as the publishers that are there.
 - `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
   value]`; waits until so much has come.
@@ -69,10 +70,12 @@ class Player:
         self._executors: list[Executor] = []
         self._spin(SingleThreadedExecutor(context=self._context), self._node)
         self._entities: dict[str, Any] = {}
+        self._timers: dict[str, Any] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
         self._news, self._ends = threading.Condition(), threading.Event()
         self._commands: dict[str, Callable[..., dict[str, Any]]] = {
             "describe": lambda type: {"types": described(type)},  # noqa: A006 - the command's own word
+            "complete": lambda type, value: {"value": plain(message_of(type, value))},  # noqa: A006 - as above
             "publish": self._publish,
             "listen": self._listen,
             "heard": self._heard,
@@ -133,6 +136,7 @@ class Player:
         type: str,  # noqa: A002 - the command's own word
         values: list[dict[str, Any]] = [],  # noqa: B006 - is only read
         gap_s: float = 0.0,
+        repeat_s: float = 0.0,
         reliability: str = "reliable",
         durability: str = "volatile",
         depth: int = 100,
@@ -147,12 +151,17 @@ class Player:
             )
             self._entities[key] = self._node.create_publisher(type_of(type), topic, qos)
         publisher, sent = self._entities[key], []
+        self._stop_repeating(topic)
         for number, message in enumerate(messages):
             if number and gap_s:
                 time.sleep(gap_s)
             sent.append(time.monotonic_ns())
             publisher.publish(message)
-        return {"sent": sent, "subscribers": publisher.get_subscription_count()}
+        if messages and repeat_s:
+            self._timers[topic] = self._node.create_timer(repeat_s, partial(publisher.publish, messages[-1]))
+        there = self._node.get_subscriptions_info_by_topic(topic)
+        best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in there)
+        return {"sent": sent, "subscribers": publisher.get_subscription_count(), "best_effort": best_effort}
 
     def _listen(self, topic: str, type: str) -> dict[str, Any]:  # noqa: A002 - as above
         publishers = self._node.get_publishers_info_by_topic(topic)
@@ -206,7 +215,14 @@ class Player:
         )
         return {}
 
+    def _stop_repeating(self, topic: str) -> None:
+        if topic in self._timers:
+            timer = self._timers.pop(topic)
+            timer.cancel()
+            self._node.destroy_timer(timer)
+
     def _forget(self, name: str) -> dict[str, Any]:
+        self._stop_repeating(name)
         found = [self._entities.pop(key) for key in (name, f"publish {name}") if key in self._entities]
         for one in found:
             # In rclpy, each entity has its own way out; an action server is one of several entities.

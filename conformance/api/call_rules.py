@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from conformance.documents.openapi import Operation
-from conformance.statement.motion_map import shape_of
+from conformance.statement.motion_map import is_for
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Reason(StrEnum):
     READS = "by its name it only reads"
     ALLOWED = "--call allows it"
     CHANGES = "it may change something: --call allows it"
-    MAPPED = "the motion map names it"
+    MAPPED = "the map in the statement names it"
     MOVES = "it moves the device: --allow-motion allows it"
     NEVER = "--never excludes it"
     EXCLUDED = "the description excludes it (x-roaas-never)"
@@ -135,13 +135,13 @@ def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[s
     Args:
         rules: what the user says.
         operations: of the description.
-        mapped: the calls that a motion map sends in this run.
+        mapped: the calls that maps in the statement send in this run.
     """
     by_reason: dict[Reason, list[str]] = {}
-    shapes = set(map(shape_of, mapped))
     for operation in operations:
         reason = rules.decide(operation)
-        sent = shape_of(operation.label) in shapes and not reason.may and reason not in {Reason.NEVER, Reason.EXCLUDED}
+        is_mapped = any(is_for(call, operation.label) for call in mapped)
+        sent = is_mapped and not reason.may and reason not in {Reason.NEVER, Reason.EXCLUDED}
         by_reason.setdefault(Reason.MAPPED if sent else reason, []).append(operation.label)
     called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
     changing = by_reason.get(Reason.ALLOWED, []) + by_reason.get(Reason.MAPPED, [])

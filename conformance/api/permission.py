@@ -11,7 +11,7 @@ from conformance.api.call_rules import CallRules, Reason
 from conformance.contract.classes import Prerequisite
 from conformance.documents.openapi import Operation
 from conformance.documents.resources import is_normal, matching
-from conformance.statement.motion_map import shape_of
+from conformance.statement.motion_map import is_for
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.transport.reach import moved
@@ -90,11 +90,9 @@ class Permission:
         if declared is None and method in SAFE_METHODS:
             return ""  # whatever is there, it changes nothing
         reason = rules.decide(declared or Operation(path, method, path))
-        moves = self._run.statement.motion_map
-        if moves is not None and self._run.allow_motion and declared is not None:
-            mapped = shape_of(declared.label) in map(shape_of, moves.calls)
-            if mapped and reason not in {Reason.NEVER, Reason.EXCLUDED}:
-                return ""
+        mapped = declared is not None and any(is_for(call, declared.label) for call in self._run.mapped)
+        if mapped and reason not in {Reason.NEVER, Reason.EXCLUDED}:
+            return ""
         if declared is not None and (reason.may or (declared.stop and not declared.never)):
             return ""
         if reason is Reason.ALLOWED:

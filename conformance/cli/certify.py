@@ -139,6 +139,8 @@ Write down what is known of the device in a file, which later runs are given:
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )
+@click.option("--ros", is_flag=True, help="Judge a ROS 2 web gateway by the ROS map in its statement, from both ends.")
+@click.option("--ros-play", is_flag=True, help="The same, with the suite in the robot's place: no robot is needed.")
 @click.option(
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )
@@ -309,9 +311,8 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
     run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
     notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
-    moves = run.statement.motion_map.calls if run.allow_motion and run.statement.motion_map else ()
     robot = RobotUnderTest(run, connection)
-    calls = () if contract.is_claimed else tuple(told(CallRules.of(run), operations_of(contract), moves))
+    calls = () if contract.is_claimed else tuple(told(CallRules.of(run), operations_of(contract), run.mapped))
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return judge(robot, options.out, command=command, baseline=baseline, **said)
@@ -336,6 +337,7 @@ def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
         claims=claims,
         selection=Selection(ids, options.exit_first),
         allow_motion=options.allow_motion,
+        ros="play" if options.ros_play else "watch" if options.ros else "",
         seed=options.seed if options.nonce is None else seed_of_nonce(options.nonce),
         effort=Effort(options.effort, minutes=options.minutes or DEEP_MINUTES),
         limit=TimeLimit(options.minutes),

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from importlib.util import find_spec
 from typing import Final
 
+_ROS: Final = "rclpy"
 _SOAP: Final = ("zeep", "xmlschema")
 #: The modules that an extra of pyproject.toml brings, by their import names. `roaas robot` names its own.
 EXTRAS: Final = {
@@ -29,6 +30,13 @@ def lacking(extra: str, user: str) -> str | None:
 def lacking_soap(interfaces: Iterable[str], user: str = "judging a SOAP service") -> str | None:
     """Return the same for a device with these interfaces: all but `rest` are SOAP services."""
     return lacking("soap", user) if {*interfaces} - {"rest"} else None
+
+
+def lacking_ros(user: str) -> str | None:
+    """Return the same where ROS is needed, which PyPI has for Linux on x86-64, and every system's packages."""
+    if find_spec(_ROS) is not None:
+        return None
+    return f"{_told(user, _ROS, 'ros')} (Linux x86-64), or source the setup.bash of a ROS 2 that is there"
 
 
 def told(module: str | None, user: str) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +25,8 @@ _MOST_MANIFEST: Final = 64 * 1024
 TITLE: Final = "its own description"
 #: The class that a motion map claims.
 MOTION: Final = "motion"
+#: The class that a ROS map claims.
+ROS: Final = "ros-gateway"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
 #: What a web server does by itself, for a device of either kind.
@@ -41,7 +43,7 @@ def write_described_pack(
     original: Mapping[str, Any],
     unresolved: tuple[str, ...] = (),
     *,
-    moves: bool = False,
+    mapped: Collection[str] = (),
 ) -> Path:
     """Write a contract pack for a description; return its folder.
 
@@ -50,7 +52,7 @@ def write_described_pack(
         document: the description as one OpenAPI 3 document.
         original: the description as it was read.
         unresolved: references to other files that lead nowhere.
-        moves: whether the statement has a motion map, so that motion is judged as well.
+        mapped: the classes that maps in the statement claim.
 
     Raises:
         OSError: it cannot be written.
@@ -60,7 +62,11 @@ def write_described_pack(
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
     taken, sent = _formats(document)
-    more = {MOTION: moves, "rest-formats": sent > 1, "xml-security": any("xml" in name for name in taken)}
+    more = {
+        **dict.fromkeys(mapped, True),
+        "rest-formats": sent > 1,
+        "xml-security": any("xml" in name for name in taken),
+    }
     classes = [*_CLASSES, *(name for name, there in more.items() if there)]
     lines = [
         f"name = {basic_string(name)}",

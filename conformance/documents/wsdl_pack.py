@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 
 from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.out_folder import own_folder
-from conformance.contract.described import MOTION, SOAP, TITLE, WEB_SERVER
+from conformance.contract.described import SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
@@ -42,7 +42,7 @@ def write_soap_pack(
     *,
     named: Mapping[str, str] | None = None,
     foreign: bool = False,
-    moves: bool = False,
+    mapped: Collection[str] = (),
 ) -> Path:
     """Write a contract pack for a WSDL; return its folder.
 
@@ -54,7 +54,7 @@ def write_soap_pack(
         address: where the service is, whatever the WSDL says; empty: as it says.
         named: locations of schemas that were found by their namespace.
         foreign: whether the WSDL is not the device's own.
-        moves: whether the statement has a motion map, so that motion is judged as well.
+        mapped: the classes that maps in the statement claim.
 
     Raises:
         OSError: it cannot be written.
@@ -66,7 +66,7 @@ def write_soap_pack(
         f"title = {basic_string(TITLE)}",
         "closed_answers = true",
         "described = true",
-        *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, WEB_SERVER, *((MOTION,) if moves else ()))),
+        *(f'\n[[class]]\nname = "{class_}"' for class_ in (SOAP, WEB_SERVER, *mapped)),
     ]
     write_atomically(folder / MANIFEST, "\n".join(lines) + "\n")
     write_json(folder / "openapi.json", _operations(found))

@@ -16,7 +16,7 @@ from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.commandline.secrecy import SECRETS
 from conformance.commandline.started import Started
 from conformance.contract.classes import Prerequisite
-from conformance.contract.described import MOTION, SOAP
+from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
 from conformance.engine.interruption import remembered
 from conformance.engine.motion_answers import answers
@@ -258,11 +258,11 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
     if not run.contract.is_claimed:
-        # What the motion map declares is claimed, and so is that the operations of a WSDL answer.
+        # What a map declares is claimed, and so is that the operations of a WSDL answer.
         _leave_out(
             seen[id_]
             for id_, item in run.contract.ledger.items()
-            if item.class_ != MOTION and (not id_.startswith(f"{SOAP}/") or Prerequisite.SEEN in item.needs)
+            if item.class_ not in {MOTION, ROS} and (not id_.startswith(f"{SOAP}/") or Prerequisite.SEEN in item.needs)
         )
     verdicts = [
         verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)

@@ -152,9 +152,10 @@ def _rules(robot: RobotUnderTest) -> list[tuple[Rule, Scenario]]:
 def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], traces: Recordings) -> None:
     """Judge the traces of scenarios by the contract's rules."""
     run = robot.run
-    moves = run.statement.motion_map
-    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort, "motion": moves}
+    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort}
+    maps = {"motion": run.statement.motion_map, "ros": run.statement.ros_map}
     for rule, scenario in rules:
         recording = traces.played.get(scenario.name)
-        if recording is not None and (moves or "motion" not in rule.fixtures):
-            record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))
+        lacking = any(name in rule.fixtures for name, found in maps.items() if found is None)
+        if recording is not None and not lacking:
+            record(run.judge, rule.requirement, rule.outcomes(recording.trace, (known | maps).__getitem__))

@@ -24,8 +24,10 @@ from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
+from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
+from conformance.statement.ros_map import RosMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
 from conformance.verdict.case import Checker
@@ -115,6 +117,24 @@ def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
     if interfaces.rest is None:
         raise NotPossibleError("the device has no REST interface")
     return MappedDevice(interfaces.rest, motion, binding=binding_of(interfaces.rest))
+
+
+@pytest.fixture(scope="session")
+def ros(run: Run) -> RosMap:
+    """Return the ROS map; the class that needs it is judged only where there is one."""
+    if run.statement.ros_map is None or not run.ros:
+        raise NotPossibleError("a gateway is judged with --ros or --ros-play, by the table [ros] of its statement")
+    return run.statement.ros_map
+
+
+@pytest.fixture(scope="session")
+def gateway(run: Run, interfaces: Interfaces, ros: RosMap) -> Iterator[Gateway]:
+    """Yield the gateway with both of its ends."""
+    if interfaces.rest is None:
+        raise NotPossibleError("the device has no REST interface")
+    found = Gateway(run, interfaces.rest, binding_of(interfaces.rest), ros)
+    yield found
+    found.close()
 
 
 @pytest.fixture

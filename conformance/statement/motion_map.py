@@ -374,3 +374,10 @@ def names_in(template: Any) -> set[str]:
 def shape_of(call: str) -> str:
     """Return an operation without the names in its path, which map and description may choose differently."""
     return NAME.sub("{}", call)
+
+
+def is_for(call: str, label: str) -> bool:
+    """Return whether a map's call is for the operation of a description: by its template, or by a path that fits it."""
+    if shape_of(call) == shape_of(label):
+        return True
+    return re.fullmatch("[^/]+".join(map(re.escape, shape_of(label).split("{}"))), call.partition("?")[0]) is not None

@@ -34,13 +34,15 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         at: where the message is in the body; empty: the body is the message.
         fields: position in the web's message = position in the ROS message, where their names differ. What is under the
             position goes with it. Without it, all names are those of the message.
-        values: values of the parameters in the path, and of others that the operation requires.
+        values: values of the parameters in the path, by name.
+        body: other members of the body that the operation gets.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s.
     """
 
     at: Pointer = ""
     fields: dict[Pointer, Pointer] = {}
     values: dict[str, Any] = {}
+    body: dict[str, Any] = {}
     timeout_s: Positive = 5.0
 
 

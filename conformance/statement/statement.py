@@ -87,7 +87,7 @@ class Statement(msgspec.Struct, frozen=True):
     @property
     def domain_id(self) -> int | None:
         """The ROS domain that a probe may join, or None."""
-        return None
+        return self.ros_map.domain if self.ros_map else None
 
     def on_domain(self, domain_id: int) -> Self:
         """Return the statement with another ROS domain.
@@ -250,15 +250,17 @@ class _Addresses(msgspec.Struct, frozen=True):
     endpoints: Endpoints = Endpoints()
     auth: Auth | None = None
     motion: Any = None
+    ros: Any = None
 
 
-def has_motion_map(path: Path) -> bool:
-    """Return whether a statement on a device with a description has a motion map.
+def maps_in(path: Path) -> tuple[str, ...]:
+    """Return which maps a statement on a device with a description has: motion, ros.
 
     Raises:
         StatementError: the statement cannot be read.
     """
-    return read_toml(path, _Addresses, StatementError).motion is not None
+    found = read_toml(path, _Addresses, StatementError)
+    return tuple(name for name in ("motion", "ros") if getattr(found, name) is not None)
 
 
 def api_of(path: Path) -> Api:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -161,7 +161,7 @@ def described_contract(
     connection: Connection,
     out: Path,
     *,
-    moves: bool = False,
+    mapped: Collection[str] = (),
     allow_files: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of an API's own description, the endpoints with its base URL, and remarks.
@@ -173,7 +173,7 @@ def described_contract(
         endpoints: what the statement or the options say.
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
-        moves: whether the statement has a motion map.
+        mapped: the classes that maps in the statement claim.
         allow_files: whether a description in a file may refer to files outside its folder.
 
     Raises:
@@ -191,7 +191,7 @@ def described_contract(
     if not (base_url or endpoints.rest):
         _check_server(source, base, endpoints, connection)
     document = without_credentials(found.document, connection.credentials.places)
-    folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, moves=moves)
+    folder = write_described_pack(out / FOLDER, document, found.original, found.unresolved, mapped=mapped)
     Contract.load.cache_clear()
     of_server = () if base_url or endpoints.rest else found.remarks
     remarks = (*found.elsewhere, *of_server, *found.not_called, *found.unread)
@@ -230,7 +230,7 @@ def soap_contract(
     out: Path,
     *,
     schemas: Path | None = None,
-    moves: bool = False,
+    mapped: Collection[str] = (),
     allow_files: bool = False,
 ) -> tuple[Contract, Endpoints, tuple[str, ...]]:
     """Return the contract of a device's WSDL, the endpoints with its address, and remarks.
@@ -243,7 +243,7 @@ def soap_contract(
         connection: deadline, credentials and TLS.
         out: folder of the results, in which the pack is written.
         schemas: folder with schemas that the WSDL's references do not lead to, or None.
-        moves: whether the statement has a motion map.
+        mapped: the classes that maps in the statement claim.
         allow_files: whether a WSDL in a file may refer to files outside its folder.
 
     Raises:
@@ -310,7 +310,7 @@ def soap_contract(
     uncalled = (
         f"{label_of(port, one)} is not called: {why}." for port, one in each(found.ports) if (why := found.remark(one))
     )
-    pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, moves=moves)
+    pack = write_soap_pack(out / FOLDER, found, source, documents, address, named=named, foreign=foreign, mapped=mapped)
     Contract.load.cache_clear()
     remarks = (*filter(None, [remark]), *elsewhere, *uncalled, *found.notes)
     return Contract.load(pack), msgspec.structs.replace(endpoints, rest=base), remarks

@@ -14,14 +14,15 @@ import click
 import msgspec
 
 from conformance.commandline.device_options import advice
-from conformance.commandline.extras import lacking_soap
+from conformance.commandline.extras import lacking_ros, lacking_soap
 from conformance.commandline.help_pages import USUAL_STATEMENT
 from conformance.commandline.out_folder import FolderError, held
+from conformance.contract.described import MOTION, ROS
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.motion_map import MotionMap, shape_of
+from conformance.statement.motion_map import MotionMap, is_for
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -30,11 +31,13 @@ from conformance.statement.statement import (
     api_of,
     empty_statement,
     endpoints_of,
-    has_motion_map,
     load_statement,
+    maps_in,
 )
 from conformance.target.connecting import connection_of, keyed
 from conformance.target.describing import described_contract, is_wsdl, soap_contract
+
+_BY_MAP: Final = "--ros and --ros-play judge a gateway by its ROS map: give"
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class DeviceOptions:
         profile, classes: what is claimed.
         allow, never: patterns of operations that may or must not be called.
         ros_domain_id: the device's ROS domain, or None.
+        ros, ros_play: whether a gateway is judged by its ROS map; with the suite in the robot's place.
     """
 
     endpoints: Mapping[str, Any] = field(default_factory=dict)
@@ -64,6 +68,8 @@ class DeviceOptions:
     allow: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     ros_domain_id: int | None = None
+    ros: bool = False
+    ros_play: bool = False
 
     @property
     def moves(self) -> bool:
@@ -160,6 +166,8 @@ def what_is_judged(source: str | None, statement: Path | None, options: DeviceOp
     source = source or (api.openapi or api.wsdl if api else None)
     if source is not None:
         return _described(source, api, statement, options)
+    if options.ros or options.ros_play:
+        raise StatementError(f"{_BY_MAP} a statement with [api], as it goes by the gateway's own description")
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     return Judged(_apply(declared, options, contract), contract)
 
@@ -185,8 +193,8 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
     try:
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
-        more = {
-            "moves": options.moves or (statement is not None and has_motion_map(statement)),
+        more: dict[str, Any] = {
+            "mapped": _mapped(statement, options),
             "allow_files": options.allow_files or api.allow_files,
         }
         if soap:
@@ -208,18 +216,38 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
     return Judged(_apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract, remarks)
 
 
+def _mapped(statement: Path | None, options: DeviceOptions) -> tuple[str, ...]:
+    """Return the classes that the maps of a statement claim.
+
+    Raises:
+        StatementError: a gateway is to be judged, and has no map.
+        click.UsageError: ROS is not installed.
+    """
+    maps = maps_in(statement) if statement else ()
+    moves = (MOTION,) if options.moves or "motion" in maps else ()
+    if not (options.ros or options.ros_play):
+        return moves
+    if "ros" not in maps:
+        raise StatementError(f"{_BY_MAP} a statement with a table [ros]: docs/ros-gateway.md shows one")
+    if problem := lacking_ros("judging a ROS gateway"):
+        raise click.UsageError(problem)
+    return (*moves, ROS)
+
+
 def _check_map(declared: Statement, contract: Contract) -> None:
-    """Check that the description has the operations that the motion map names.
+    """Check that the description has the operations that the maps name.
 
     Raises:
         StatementError: it lacks one.
     """
     labels = [operation.label for operation in operations_of(contract)]
-    for call in declared.motion_map.calls if declared.motion_map else ():
-        if shape_of(call) not in map(shape_of, labels):
+    calls = [("motion", call) for call in (declared.motion_map.calls if declared.motion_map else ())]
+    calls += [("ros.operations", call) for call in (declared.ros_map.calls if declared.ros_map else ())]
+    for table, call in calls:
+        if not any(is_for(call, label) for label in labels):
             near = difflib.get_close_matches(call, labels, 1, 0)
             raise StatementError(
-                f"[motion] names {call!r}, which the description does not have"
+                f"[{table}] names {call!r}, which the description does not have"
                 + (f"; did you mean {near[0]!r}?" if near else "")
             )
 

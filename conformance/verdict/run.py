@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
@@ -50,6 +50,7 @@ class Run:
         contract: the contract that the robot is judged by.
         claims: the classes that are judged.
         allow_motion: whether the robot may be moved.
+        ros: where the statement has a ROS map: "watch" the robot's graph, or "play" the robot; empty: neither.
         seed: seed of everything random.
         requirement_set: the frozen set that scores the robot, or None for the whole contract.
         given: inputs that the result repeats, beside the statement.
@@ -77,6 +78,7 @@ class Run:
     contract: Contract = field(default_factory=Contract.load)
     claims: tuple[str, ...] = ()
     allow_motion: bool = False
+    ros: Literal["", "watch", "play"] = ""
     seed: int = 0
     effort: Effort = field(default_factory=Effort)
     requirement_set: RequirementSet | None = None
@@ -101,6 +103,14 @@ class Run:
 
     def __post_init__(self) -> None:
         self.judge = Judge(self.contract.ledger)
+
+    @property
+    def mapped(self) -> tuple[str, ...]:
+        """The operations that maps in the statement name, of those that may be called in this run."""
+        said = self.statement
+        moves = said.motion_map.calls if said.motion_map and self.allow_motion else ()
+        acts = self.ros == "play" or (self.ros and self.allow_motion)
+        return (*moves, *(said.ros_map.calls if said.ros_map and acts else ()))
 
     def out_of_time(self, requirement: str) -> None:
         """Record that the time was over before a case of a requirement was tried."""

@@ -1,0 +1,1 @@
+"""Class ros-gateway: what the web says and what ROS says are the same."""

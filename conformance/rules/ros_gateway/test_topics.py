@@ -1,0 +1,210 @@
+"""Whether what a gateway says of topics is what ROS says of them (statement, table ``[ros]``)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Final
+
+from conformance.scenarios.ros.definition import put_at, value_at
+from conformance.scenarios.ros.samples import Kind
+from conformance.scenarios.ros.topics import (
+    Burst,
+    Sent,
+    Shown,
+    Topics,
+    topic_bursts,
+    topic_reads,
+    topic_refusals,
+    topic_writes,
+)
+from conformance.scenarios.ros.web import Difference, changed, differences, document_of, equal
+from conformance.scenarios.rule import Note, NotTested, Outcome, rule
+from conformance.statement.ros_map import Publishes, Reads, RosMap
+from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
+
+# So many differing fields say enough.
+_ROWS: Final = 4
+# Of the time that the link and a busy machine take on top of what the map says, s.
+_SLACK_S: Final = 1.0
+
+
+def _reads(ros: RosMap, call: str) -> Reads:
+    found = ros.operations[call]
+    assert isinstance(found, Reads)
+    return found
+
+
+def _rows(found: list[Difference]) -> tuple[str, str]:
+    """Return what ROS says and what the web says, field by field."""
+    more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
+    own = "; ".join(f"{one.at} = {one.ros} ({one.declared})" for one in found[:_ROWS])
+    web = "; ".join(f"{one.at} = {one.web}" for one in found[:_ROWS])
+    return own + more, web + more
+
+
+@rule("ros-gateway/read-exact", on=(topic_reads,))
+def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each field of a message is returned as it was published; old messages are another matter."""
+    for one, older in _with_older(trace):
+        if one.kind is Kind.NON_FINITE and ros.non_finite == "refused":
+            expected = f"an error status for {one.what} on {one.topic}, as the map says (non_finite)"
+            yield Case(one.was_shown, one.exchange, expected, cause=f"{one.operation} non-finite")
+        elif one.kind is not Kind.NON_FINITE or ros.non_finite is not None:
+            for exchange in (one.exchange, *one.later):
+                if exchange.response.ok and not any(_is_in(each, exchange, trace, ros) for each in older):
+                    yield _of_content(one, exchange, trace, ros)
+
+
+def _with_older(trace: Topics) -> Iterator[tuple[Shown, list[Shown]]]:
+    """Yield each message with those that the same operation showed before it, and that are not equal to it."""
+    before: dict[str, list[Shown]] = {}
+    for one in trace.probes:
+        older = before.setdefault(one.operation, [])
+        yield one, [each for each in reversed(older) if each.value != one.value]
+        older.append(one)
+
+
+def _differences(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> list[Difference]:
+    document, body = document_of(exchange.response.body), _reads(ros, one.operation)
+    return differences(document, json.loads(one.value), trace.definitions[one.operation], body, ros)
+
+
+def _is_in(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> bool:
+    return exchange.response.ok and not _differences(one, exchange, trace, ros)
+
+
+def _of_content(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> Case:
+    found = _differences(one, exchange, trace, ros)
+    kinds = sorted({each.declared for each in found})
+    own, web = _rows(found)
+    expected = f"{one.what} as ROS has it on {one.topic}: {own}" if found else f"{one.what} on {one.topic}"
+    return Case(not found, exchange, expected, observed=web, cause=f"{one.operation} {' '.join(kinds[:2])}")
+
+
+@rule("ros-gateway/read-fresh", on=(topic_reads,))
+def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether a new message is returned in time."""
+    for one, older in _with_older(trace):
+        reads = _reads(ros, one.operation)
+        within_s, took_s = reads.max_age_s or reads.timeout_s, one.sent - one.published
+        expected = f"{one.what} on {one.topic} within {within_s:g} s of its publication"
+        if one.was_shown:
+            holds = one.earlier == 0 or took_s <= within_s + _SLACK_S
+            yield Case(holds, one.exchange, expected, f"an older one until {took_s:.1f} s after it", one.operation)
+        elif not one.reliably:
+            yield Note(f"The gateway subscribes to {one.topic} with best effort, and did not get {one.what}.")
+        elif not one.exchange.response.ok:
+            if one.kind is not Kind.NON_FINITE:
+                yield Case(False, one.exchange, expected, cause=f"{one.operation} {one.exchange.response.status}")
+        elif back := next((each for each in older if _is_in(each, one.exchange, trace, ros)), None):
+            yield Case(False, one.exchange, expected, f"{back.what} from before it", one.operation)
+
+
+@rule("ros-gateway/read-newest", on=(topic_reads,))
+def read_newest(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether a message that was shown is followed by no older one."""
+    for one, older in _with_older(trace):
+        for later in one.later if one.was_shown and one.kind is not Kind.NON_FINITE else ():
+            is_right = _is_in(one, later, trace, ros)
+            back = None if is_right else next((each for each in older if _is_in(each, later, trace, ros)), None)
+            expected = f"{one.what} on {one.topic}, which was returned just before, or a newer one"
+            yield Case(back is None, later, expected, f"{back.what} from before it" if back else "", one.operation)
+
+
+@rule("ros-gateway/write-exact", on=(topic_writes,))
+def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each field of what is published is that of the request."""
+    for burst in trace:
+        for one in burst.sent:
+            if not one.accepted:
+                continue
+            wanted = json.loads(one.value)
+            heard = [each.content for each in burst.heard]
+            if not heard:
+                continue  # whether one comes, another requirement says
+            fits = any(equal(each, wanted) for each in heard)
+            found = [] if fits else list(changed(_mapped(heard[-1], one, ros), _mapped(wanted, one, ros)))
+            more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
+            web = "; ".join(f"{at} = {sent}" for at, _, sent in found[:_ROWS]) + more
+            own = "; ".join(f"{at} = {came}" for at, came, _ in found[:_ROWS]) + more
+            yield Case(
+                not found,
+                one.exchange,
+                f"{one.what} on {one.topic} as the web sent it" + (f": {web}" if found else ""),
+                observed=f"on {one.topic}: {own}",
+                cause=f"{one.operation} {found[0][0] if found else ''}",
+            )
+
+
+def _mapped(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, object]:
+    """Return the fields of a message that the operation's body has."""
+    body = ros.operations[one.operation]
+    assert isinstance(body, Publishes)
+    found: dict[str, object] = {}
+    for own in body.fields.values():
+        found = put_at(found, own, value_at(message, own))
+    return found if body.fields else message
+
+
+@rule("ros-gateway/once", on=(topic_writes, topic_bursts))
+def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each accepted request is exactly one message."""
+    later = list(trace)
+    trace_of: dict[str, list[Sent]] = {}
+    for burst in trace:
+        trace_of.setdefault(burst.operation, []).extend(burst.sent)
+    for burst in trace:
+        later.pop(0)
+        after = [each for one in later if one.operation == burst.operation for each in one.heard]
+        every = [_mapped(json.loads(one.value), one, ros) for one in trace_of[burst.operation] if one.value]
+        strange = [each for each in burst.heard if not any(equal(each.content, wanted) for wanted in every)]
+        for one in burst.sent:
+            if not one.accepted:
+                continue
+            wanted = _mapped(json.loads(one.value), one, ros)
+            same = [each for each in (*burst.heard, *after) if equal(each.content, wanted)]
+            expected = f"one message on {one.topic} for an accepted request ({burst.how})"
+            if not same and strange:
+                continue  # it came, and was changed
+            if not same and not burst.reliable:
+                yield NotTested(f"the gateway publishes {one.topic} with best effort, which may lose messages")
+            elif len(same) != 1:
+                found = f"{len(same)} equal messages" if same else "none"
+                yield Case(False, one.exchange, expected, f"{found} on {one.topic}", cause=f"{one.operation} {found}")
+            else:
+                yield Case(True, one.exchange, expected)
+
+
+@rule("ros-gateway/order", on=(topic_bursts,))
+def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether the messages of one client are published in the order of its requests."""
+    for burst in trace:
+        if any(one.client for one in burst.sent):
+            continue
+        places = []
+        for one in burst.sent:
+            wanted = _mapped(json.loads(one.value), one, ros)
+            place = next((i for i, each in enumerate(burst.heard) if equal(each.content, wanted)), None)
+            if place is not None:
+                places.append((place, one))
+        for (before, _), (after, one) in pairwise(places):
+            expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
+            yield Case(before < after, one.exchange, expected, "one before that of an earlier request", one.operation)
+
+
+@rule("ros-gateway/refused-nothing", on=(topic_refusals, topic_writes))
+def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether a refused request publishes nothing."""
+    for burst in trace:
+        for one in burst.sent:
+            if one.accepted:
+                continue
+            heard = [each.content for each in burst.heard]
+            if one.value:
+                heard = [each for each in heard if equal(each, _mapped(json.loads(one.value), one, ros))]
+            expected = f"no message on {one.topic}, as the request was refused ({one.what})"
+            shown = json.dumps(heard[0])[:200] if heard else ""
+            yield Case(not heard, one.exchange, expected, f"the message {shown}", cause=one.operation)

@@ -1,0 +1,142 @@
+"""A gateway with both of its ends: its web API, and the ROS graph that the suite watches or plays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
+
+from conformance.api.rest.interface import RestInterface
+from conformance.scenarios.motion.binding import Binding
+from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.robot import ProbeError, Robot
+from conformance.scenarios.ros.samples import Maker
+from conformance.scenarios.ros.web import written
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
+from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.verdict.run import Run
+
+_Operation = TypeVar("_Operation")
+# From one look at the gateway to the next, s.
+PACE_S: Final = 0.03
+_KEYS: Final[dict[type, str]] = {
+    Reads: "topic", Publishes: "publishes", Calls: "service", Acts: "action", Lists: "lists"
+}  # fmt: skip
+
+
+@dataclass
+class Gateway:
+    """One gateway.
+
+    Args:
+        run: the run's data.
+        api: its web API.
+        binding: how its operations become requests.
+        ros: its map.
+
+    Attributes:
+        plays: whether the suite is the robot; otherwise it watches one.
+    """
+
+    run: Run
+    api: RestInterface
+    binding: Binding
+    ros: RosMap
+    _robot: Robot | None = field(default=None, init=False)
+    _problem: str = field(default="", init=False)
+
+    @property
+    def plays(self) -> bool:
+        """Whether the suite is the robot; otherwise it watches one."""
+        return self.run.ros == "play"
+
+    @property
+    def robot(self) -> Robot:
+        """The robot's end.
+
+        Raises:
+            NotPossibleError: it cannot be had, or there is no gateway on the graph.
+        """
+        if self._problem:
+            raise NotPossibleError(self._problem)
+        if self._robot is None:
+            try:
+                self._robot = Robot(self.ros.domain)
+                self._robot.await_ready()
+            except ProbeError as error:
+                self._problem = f"the suite's ROS node in domain {self.ros.domain} did not start: {error}"
+                raise NotPossibleError(self._problem) from error
+        return self._robot
+
+    def close(self) -> None:
+        """End the robot's end."""
+        if self._robot is not None:
+            self._robot.close()
+
+    def of(self, kind: type[_Operation]) -> Iterator[tuple[str, _Operation]]:
+        """Yield the map's operations of a kind.
+
+        Raises:
+            NotDeclaredError: there is none.
+        """
+        found = [(call, one) for call, one in self.ros.operations.items() if isinstance(one, kind)]
+        if not found:
+            raise NotDeclaredError(f"[ros.operations] has no operation with {_KEYS[kind]!r}")
+        yield from found
+
+    def need_permission(self) -> None:
+        """Check that something may be sent to the robot.
+
+        Raises:
+            NotPossibleError: it is a real one, and may not be moved.
+        """
+        if not (self.plays or self.run.allow_motion):
+            raise NotPossibleError(
+                "it sends something to the robot: give --ros-play (the suite is the robot) or --allow-motion"
+            )
+
+    def definition(self, name: str) -> Definition:
+        """Return the definition of a type.
+
+        Raises:
+            NotPossibleError: it is not installed.
+        """
+        try:
+            return self.robot.definition(name)
+        except ProbeError as error:
+            raise NotPossibleError(f"{name}: {error}") from error
+
+    def maker(self, definition: Definition) -> Maker:
+        """Return what makes messages of a type, for this run."""
+        return Maker(definition, self.run.seed, self.binding.syntax == "XML")
+
+    def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:
+        """Return the request of an operation; ``value``: of the ROS message that it gets."""
+        document = None
+        if value is not None:
+            document = written(value, self.definition(_type_of(body)), body, self.ros)
+        return self.binding.made(filled(call, body.values), document)
+
+    def send(self, made: Outgoing, timeout_s: float) -> Exchange:
+        """Send a request.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        return self.api.client.send(
+            made.method, made.target, headers=made.headers, body=made.body, timeout_s=max(timeout_s, 1.0)
+        )
+
+
+def _type_of(body: Body) -> str:
+    """Return the name of the type that an operation is sent."""
+    match body:
+        case Calls():
+            return f"{body.type}#Request"
+        case Acts():
+            return f"{body.type}#Goal"
+        case Publishes() | Reads():
+            return body.type
+    raise TypeError(type(body).__name__)

@@ -1,0 +1,117 @@
+"""The robot's end of a gateway: a ROS node in a process of its own, which does as told (ros_probe/player.py)."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.scenarios.ros.definition import Definition
+from ros_probe.process import ProbeError, RosProcess
+
+_NS: Final = 1_000_000_000
+# A command on top of what it waits for itself, s.
+_ANSWER_S: Final = 20.0
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What came to the robot.
+
+    Attributes:
+        at: when, s of the monotonic clock.
+        what: message, request, goal, cancel or the like.
+        value: JSON of it, with NaN and infinities bare.
+    """
+
+    at: float
+    what: str
+    value: str
+
+    @property
+    def content(self) -> Any:
+        """The value itself."""
+        return json.loads(self.value)
+
+
+@dataclass(frozen=True)
+class Published:
+    """What came of publishing.
+
+    Attributes:
+        at: when the first message was handed to ROS, s of the monotonic clock.
+        subscribers: how many there were.
+        reliably: whether all of them have each message sent again that is lost on the way.
+    """
+
+    at: float
+    subscribers: int
+    reliably: bool
+
+
+class Robot(RosProcess):
+    """A started node.
+
+    Args:
+        domain_id: of the graph.
+        name: of the node; each process has another one.
+
+    Raises:
+        ProbeError: the process cannot be started.
+    """
+
+    def __init__(self, domain_id: int, name: str = "roaas_robot") -> None:
+        super().__init__("play", "--name", f"{name}_{os.getpid()}", domain_id=domain_id)
+        self._definitions: dict[str, Definition] = {}
+
+    def tell(self, what: str, **how: Any) -> dict[str, Any]:
+        """Have a command carried out, and return its answer.
+
+        Raises:
+            ProbeError: it cannot be, or the process has ended.
+        """
+        return self.ask(json.dumps({"do": what, **how}), how.get("within_s", 0.0) + _ANSWER_S)
+
+    def definition(self, name: str) -> Definition:
+        """Return the definition of a type, or, with "#Request" or the like after its name, of a part of it.
+
+        Raises:
+            ProbeError: the type is not installed.
+        """
+        if name not in self._definitions:
+            self._definitions[name] = Definition(name, self.tell("describe", type=name)["types"])
+        return self._definitions[name]
+
+    def publish(self, topic: str, type_: str, *values: Any, **how: Any) -> Published:
+        """Publish messages.
+
+        Raises:
+            ProbeError: see tell().
+        """
+        said = self.tell("publish", topic=topic, type=type_, values=values, **how)
+        sent = said["sent"]
+        return Published(sent[0] / _NS if sent else time.monotonic(), said["subscribers"], not said["best_effort"])
+
+    def heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
+        """Return what came to a topic, service or action since the last call; wait until so much has come.
+
+        Raises:
+            ProbeError: see tell().
+        """
+        events = self.tell("heard", name=name, count=count, within_s=within_s)["events"]
+        return [Heard(at / _NS, what, json.dumps(value)) for at, what, value in events]
+
+    @contextmanager
+    def publishing(self, topic: str) -> Iterator[None]:
+        """Leave a topic in the end."""
+        try:
+            yield
+        finally:
+            self.tell("forget", name=topic)
+
+
+__all__ = ["Heard", "ProbeError", "Robot"]

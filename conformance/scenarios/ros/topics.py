@@ -1,0 +1,398 @@
+"""Scenarios on topics: what a gateway returns of the messages on them, and publishes on them.
+
+Times are s of the monotonic clock, which all processes of a machine share.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.ros.definition import Definition, value_at
+from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.robot import Heard
+from conformance.scenarios.ros.samples import Kind, Sample
+from conformance.scenarios.ros.web import differences, document_of, equal
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.ros_map import Publishes, Reads
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.parallel import MOST_CLIENTS, send_together
+from conformance.verdict.effort import Effort
+
+_NEEDS: Final = (Need.REST,)
+# A message is published again so often, for gateways that subscribe when they are asked, or wait for the next one, s.
+_REPEAT_S: Final = 0.1
+_REPEAT_LARGE_S: Final = 0.5
+# A large one that may be lost on the way is waited for so long, s.
+_LARGE_S: Final = 2.5
+# Reads in a row that show the same wrong message: it is not on its way any more.
+_SURE: Final = 4
+_SURE_S: Final = 0.4
+# After so many messages that never came, an operation is given up.
+_GIVES_UP: Final = 2
+# What comes on top of what was sent comes so soon, s.
+_MORE_S: Final = 0.5
+# A publisher may keep no more messages than that, and need not wait for who is slow.
+_BURST: Final = 8
+_SAMPLES: Final = {"quick": 8, "standard": 16, "deep": 40}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A message on a topic, and what an operation returned of it.
+
+    Attributes:
+        operation: the operation.
+        topic: its topic.
+        what: the message as a noun phrase.
+        kind: what it is for.
+        value: JSON of the message, with all its fields.
+        published: when it was published first.
+        exchange: the read that shows it, else the last one.
+        sent, received: when that was requested, and when the response had arrived.
+        was_shown: whether it shows the message.
+        reliably: whether the gateway subscribes so that no message is lost on the way.
+        earlier: reads of other content before that.
+        later: reads after that, before the next message.
+    """
+
+    operation: str
+    topic: str
+    what: str
+    kind: Kind
+    value: str
+    published: float
+    exchange: Exchange
+    sent: float
+    received: float
+    was_shown: bool
+    reliably: bool = True
+    earlier: int = 0
+    later: tuple[Exchange, ...] = ()
+
+
+@dataclass(frozen=True)
+class Topics:
+    """What was read of topics, and the definitions of their types."""
+
+    probes: tuple[Shown, ...]
+    definitions: dict[str, Definition]
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def topic_reads(gateway: Gateway, effort: Effort) -> Topics:
+    """Publish messages of extreme values on topics, and read them through the gateway."""
+    if not gateway.plays:
+        raise NotPossibleError("the suite is not the robot, whose messages it would know: --ros-play")
+    shown: list[Shown] = []
+    definitions: dict[str, Definition] = {}
+    with partial_trace(lambda: Topics(tuple(shown), definitions)):
+        for call, reads in gateway.of(Reads):
+            definitions[call] = gateway.definition(reads.type)
+            with gateway.robot.publishing(reads.topic):
+                shown.extend(_Reader(gateway, call, reads, definitions[call]).shown(effort))
+    return Topics(tuple(shown), definitions)
+
+
+@dataclass
+class _Reader:
+    gateway: Gateway
+    call: str
+    reads: Reads
+    definition: Definition
+    contents: set[str] = field(default_factory=set)
+
+    def shown(self, effort: Effort) -> Iterator[Shown]:
+        """Yield what is shown of each message."""
+        lost = 0
+        samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=effort.name != "quick")
+        for sample in samples:
+            shown = self.of(sample)
+            yield shown
+            lost += sample.kind is not Kind.LARGE and not shown.was_shown and self.is_stale(shown.exchange)
+            if lost >= _GIVES_UP:
+                return
+            self.contents.add(self.content(shown.exchange))
+
+    def of(self, sample: Sample) -> Shown:
+        """Publish a message, and read until it is shown, or surely another one, or its time is over."""
+        clock, reads = WALL_CLOCK, self.reads
+        repeat_s = _REPEAT_LARGE_S if sample.kind is Kind.LARGE else _REPEAT_S
+        value = self.complete(sample.value)
+        published = self.gateway.robot.publish(reads.topic, reads.type, sample.value, repeat_s=repeat_s)
+        reliably = published.reliably or sample.kind is not Kind.LARGE
+        until = published.at + (max(reads.max_age_s or 0.0, reads.timeout_s) if reliably else _LARGE_S)
+        wrong: list[tuple[float, str]] = []
+        earlier = 0
+        while True:
+            sent = clock.now()
+            exchange = self.read()
+            received = clock.now()
+            is_shown = self.shows(exchange, value, sample.kind)
+            if is_shown or sent > until:
+                break
+            if self.is_stale(exchange):
+                wrong, earlier = [], earlier + 1
+            else:
+                here = self.content(exchange)
+                wrong = [*(one for one in wrong if one[1] == here), (sent, here)]
+                if len(wrong) >= _SURE and sent - wrong[0][0] > _SURE_S:
+                    break
+            clock.sleep(PACE_S)
+        later = tuple(self.read() for _ in range(2)) if is_shown else ()
+        text = json.dumps(value)
+        return Shown(
+            self.call, reads.topic, sample.what, sample.kind, text, published.at, exchange, sent, received, is_shown,
+            reliably, earlier, later,
+        )  # fmt: skip
+
+    def complete(self, value: dict[str, Any]) -> dict[str, Any]:
+        """Return a message with all its fields."""
+        found: dict[str, Any] = self.gateway.robot.tell("complete", type=self.reads.type, value=value)["value"]
+        return found
+
+    def read(self) -> Exchange:
+        return self.gateway.send(self.gateway.request(self.call, self.reads), self.reads.timeout_s)
+
+    def shows(self, exchange: Exchange, value: dict[str, Any], kind: Kind) -> bool:
+        """Return whether a response shows a message."""
+        if kind is Kind.NON_FINITE and self.gateway.ros.non_finite == "refused":
+            return not exchange.response.ok
+        document = document_of(exchange.response.body)
+        return exchange.response.ok and not differences(document, value, self.definition, self.reads, self.gateway.ros)
+
+    def content(self, exchange: Exchange) -> str:
+        """Return what a response has in the message's place, as text."""
+        return str(value_at(document_of(exchange.response.body).value, self.reads.at))
+
+    def is_stale(self, exchange: Exchange) -> bool:
+        """Return whether a response shows no message, or one that was shown before."""
+        return not exchange.response.ok or self.content(exchange) in {"None", *self.contents}
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A message that an operation was sent.
+
+    Attributes:
+        operation: the operation.
+        topic: on which it publishes.
+        what: the message as a noun phrase.
+        value: JSON of the message; empty: it is none.
+        exchange: request and response.
+        sent, answered: when.
+        client: who sent it.
+    """
+
+    operation: str
+    topic: str
+    what: str
+    value: str
+    exchange: Exchange
+    sent: float
+    answered: float
+    client: int = 0
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it was answered 2xx."""
+        return self.exchange.response.ok
+
+
+@dataclass(frozen=True)
+class Burst:
+    """Messages that an operation was sent one after another or at once, and all that came of them.
+
+    Attributes:
+        operation: the operation.
+        how: as a noun phrase.
+        sent: in the order of sending.
+        heard: in the order of arrival.
+        reliable: whether the gateway publishes reliably, so that no message is lost on the way.
+    """
+
+    operation: str
+    how: str
+    sent: tuple[Sent, ...]
+    heard: tuple[Heard, ...]
+    reliable: bool = True
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def topic_writes(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
+    """Send messages of extreme values to the gateway one at a time, and hear what it publishes."""
+    return tuple(_bursts(gateway, lambda writer: writer.one_by_one(effort)))
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def topic_bursts(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
+    """Send messages in a row from one client, and at once from several, and hear what the gateway publishes."""
+    times = {"quick": 1, "standard": 3}.get(effort.name, 8)
+    return tuple(_bursts(gateway, lambda writer: (one for _ in range(times) for one in writer.in_bursts())))
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def topic_refusals(gateway: Gateway) -> tuple[Burst, ...]:
+    """Send messages that are none to the gateway, and hear whether it publishes anything."""
+    return tuple(_bursts(gateway, lambda writer: writer.malformed()))
+
+
+def _bursts(gateway: Gateway, of: Any) -> Iterator[Burst]:
+    gateway.need_permission()
+    for call, publishes in gateway.of(Publishes):
+        writer = _Writer(gateway, call, publishes)
+        with gateway.robot.publishing(publishes.publishes):
+            writer.begin()
+            yield from of(writer)
+            writer.end()
+
+
+@dataclass
+class _Writer:
+    gateway: Gateway
+    call: str
+    body: Publishes
+    reliable: bool = True
+
+    def __post_init__(self) -> None:
+        self.definition = self.gateway.definition(self.body.type)
+        self.maker = self.gateway.maker(self.definition)
+
+    def begin(self) -> None:
+        """Listen, and have the gateway publish until something comes: its publisher may begin with its first message.
+
+        Raises:
+            NotPossibleError: nothing comes.
+        """
+        robot, topic = self.gateway.robot, self.body.publishes
+        clock = WALL_CLOCK
+        until = clock.now() + 2 * self.body.timeout_s
+        while True:
+            self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
+            one = self.send(self.usual())
+            if robot.heard(topic, 1, 1.0):
+                # Those that were sent before may come late.
+                clock.sleep(_MORE_S)
+                robot.heard(topic)
+                return
+            if clock.now() > until:
+                came = one.exchange.came
+                raise NotPossibleError(f"{self.call} got {came}, and no message came on {topic} ({self.body.type})")
+            # A publisher that is there by now may be one of best effort, which a reliable subscriber does not hear.
+            robot.tell("forget", name=topic)
+
+    def usual(self) -> Sample:
+        """Return a message that differs from all others; a real robot hardly moves by it."""
+        return self.maker.usual() if self.gateway.plays else self.maker.gentle()
+
+    def end(self) -> None:
+        """Leave a real robot with the message of defaults, by which one that is driven rests."""
+        if not self.gateway.plays:
+            self.send(Sample("the message with its defaults", Kind.DEFAULT, {}))
+
+    def request(self, sample: Sample) -> Outgoing:
+        """Return the request for a message, with all its fields."""
+        return self.gateway.request(self.call, self.body, self.value(sample))
+
+    def value(self, sample: Sample) -> dict[str, Any]:
+        """Return the message as a whole."""
+        found: dict[str, Any] = self.gateway.robot.tell("complete", type=self.body.type, value=sample.value)["value"]
+        return found
+
+    def send(self, sample: Sample) -> Sent:
+        """Send a message."""
+        return self.sent(sample.what, json.dumps(self.value(sample)), self.request(sample))
+
+    def sent(self, what: str, value: str, made: Outgoing) -> Sent:
+        """Send a request."""
+        clock = WALL_CLOCK
+        sent = clock.now()
+        exchange = self.gateway.send(made, self.body.timeout_s)
+        return Sent(self.call, self.body.publishes, what, value, exchange, sent, clock.now())
+
+    def hear(self, count: int) -> tuple[Heard, ...]:
+        """Return what comes of so many accepted requests, and a moment after that."""
+        robot, topic = self.gateway.robot, self.body.publishes
+        heard = robot.heard(topic, count, self.body.timeout_s)
+        while len(heard) < count and (more := robot.heard(topic, 1, self.body.timeout_s)):
+            heard += more
+        return (*heard, *robot.heard(topic, 1, _MORE_S))
+
+    def one_by_one(self, effort: Effort) -> Iterator[Burst]:
+        """Yield each message with what came of it."""
+        if self.gateway.plays:
+            samples = list(self.maker.samples(_SAMPLES[effort.name], large=effort.name != "quick"))
+        else:
+            samples = [self.maker.gentle() for _ in range(_BURST)]
+        for sample in samples:
+            if sample.kind is Kind.NON_FINITE and self.gateway.ros.non_finite != "string":
+                # JSON has no such number, and null may be refused as well.
+                continue
+            one = self.send(sample)
+            yield Burst(self.call, sample.what, (one,), tuple(self.hear_of(one)), self.reliable)
+        # What comes now, came of one of them.
+        late = self.gateway.robot.heard(self.body.publishes, 1, 2 * _MORE_S)
+        yield Burst(self.call, "nothing more", (), tuple(late), self.reliable)
+
+    def hear_of(self, one: Sent) -> Iterator[Heard]:
+        """Yield what comes until the message of a request, or until it surely comes no more."""
+        if not one.accepted:
+            return
+        wanted, clock = json.loads(one.value), WALL_CLOCK
+        until = clock.now() + self.body.timeout_s
+        while (left_s := until - clock.now()) > 0:
+            came = self.gateway.robot.heard(self.body.publishes, 1, left_s)
+            yield from came
+            if any(equal(each.content, wanted) for each in came):
+                return
+            if came:
+                until = min(until, clock.now() + _MORE_S)
+
+    def in_bursts(self) -> Iterator[Burst]:
+        """Yield messages in a row of one client, and at once of several."""
+        samples = [self.usual() for _ in range(_BURST)]
+        made = [(one, json.dumps(self.value(one)), self.request(one)) for one in samples]
+        sent = tuple(self.sent(one.what, value, request) for one, value, request in made)
+        heard = self.hear(sum(one.accepted for one in sent))
+        yield Burst(self.call, f"{_BURST} messages in a row", sent, heard, self.reliable)
+        several: list[Sent] = []
+        samples = [self.usual() for _ in range(MOST_CLIENTS)]
+        made = [(one, json.dumps(self.value(one)), self.request(one)) for one in samples]
+        began = WALL_CLOCK.now()
+        attempts = send_together([[(self.gateway.api.client, request) for _, _, request in made]])[0]
+        ended = WALL_CLOCK.now()
+        for client, (attempt, (one, value, _)) in enumerate(zip(attempts, made, strict=True)):
+            if isinstance(attempt, Exchange):
+                several.append(Sent(self.call, self.body.publishes, one.what, value, attempt, began, ended, client))
+        heard = self.hear(sum(one.accepted for one in several))
+        yield Burst(self.call, f"messages of {MOST_CLIENTS} clients at once", tuple(several), heard, self.reliable)
+
+    def malformed(self) -> Iterator[Burst]:
+        """Yield requests that a gateway is likely to refuse, and what came of them."""
+        right = self.request(self.usual())
+        wrong = [("half of the body", right.body[: len(right.body) // 2]), ("no body", b"")]
+        if self.binding_is_json:
+            wrong += [("a list in place of the message", b"[]"), ("null", b"null"), ("a text", b'"x"')]
+            wrong += [("a message with a text in place of each value", self._texts(right.body))]
+        for what, body in wrong:
+            one = self.sent(what, "", Outgoing(right.method, right.target, right.headers, body))
+            heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)
+            yield Burst(self.call, what, (one,), tuple(heard), self.reliable)
+
+    @property
+    def binding_is_json(self) -> bool:
+        """Whether bodies are JSON."""
+        return self.gateway.binding.syntax == "JSON"
+
+    @staticmethod
+    def _texts(body: bytes) -> bytes:
+        def text(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {name: text(one) for name, one in value.items()}
+            return [text(one) for one in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
+
+        return json.dumps(text(json.loads(body))).encode()

@@ -1,0 +1,264 @@
+"""How the values of ROS messages are written on the web, and whether a web's value is that of a message.
+
+Numbers on the web are decimal (RFC 8259 6), so a value is judged by its digits, not by what a double makes of them.
+What the map leaves open is accepted.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import math
+import struct
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from typing import Any, Final
+
+from conformance.documents.xml import NotXmlError, elements, parse
+from conformance.documents.xml_names import local
+from conformance.documents.xml_values import value_of
+from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, put_at, value_at
+from conformance.statement.ros_map import Body, RosMap
+
+_SHOWN: Final = 80
+_UUID: Final = 16
+#: What non-finite numbers are as strings: in JSON by the map, in XML by XML Schema (3.2.5).
+_NAMES: Final = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf, "INF": math.inf, "-INF": -math.inf}
+_MISSING: Final = object()
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A field whose value on the web is not that of the ROS message.
+
+    Attributes:
+        at: the field, as a JSON pointer in the ROS message.
+        declared: its type.
+        web, ros: its value on either side, for readers.
+    """
+
+    at: str
+    declared: str
+    web: str
+    ros: str
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a body says.
+
+    Attributes:
+        value: JSON with its numbers as they are written, or the first element in a SOAP Body; None: it is neither.
+        is_xml: whether it is XML, in which each value is a text.
+    """
+
+    value: Any
+    is_xml: bool = False
+
+
+def document_of(octets: bytes) -> Document:
+    """Return what a body says. Never raises."""
+    if octets.lstrip()[:1] == b"<":
+        try:
+            root = parse(octets)
+        except NotXmlError:
+            return Document(None, is_xml=True)
+        bodies = [one for one in elements(root) if local(str(one.tag)) == "Body"]
+        return Document(next((value_of(one) for part in bodies for one in elements(part)), value_of(root)), is_xml=True)
+    try:
+        return Document(json.loads(octets, parse_float=Decimal))
+    except (ValueError, RecursionError):
+        return Document(None)
+
+
+def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
+    """Return the document that an operation gets to send a message: as the map says, or as JSON has it."""
+    message = _web(value, Shape(definition.root), definition, ros)
+    if body.fields:
+        mapped: Any = {}
+        for web, own in body.fields.items():
+            mapped = put_at(mapped, web, value_at(message, own))
+        message = mapped
+    return put_at(body.body, body.at, message)
+
+
+def _web(value: Any, shape: Shape, definition: Definition, ros: RosMap) -> Any:
+    if shape.is_octets:
+        return value["b64"] if ros.bytes == "base64" else list(base64.b64decode(value["b64"]))
+    if shape.is_array:
+        return [_web(one, Shape(shape.item), definition, ros) for one in value]
+    if shape.is_message:
+        fields = definition.fields(shape.item)
+        return {name: _web(value[name], one, definition, ros) for name, one in fields if name in value}
+    if shape.item in LONG and ros.integers == "string":
+        return str(value)
+    if shape.item in FLOATS and not math.isfinite(value):
+        return {"null": None, "string": _name_of(value)}.get(ros.non_finite or "", value)
+    return value
+
+
+def _name_of(value: float) -> str:
+    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+
+
+def differences(
+    document: Document, value: dict[str, Any], definition: Definition, body: Body, ros: RosMap
+) -> list[Difference]:
+    """Return the fields in which a web's message is not a ROS message; empty: they are the same.
+
+    Args:
+        document: that has the web's message.
+        value: of the ROS message, with all fields.
+        definition: of its type.
+        body: how the operation writes it.
+        ros: how the gateway writes values.
+    """
+    judge, message = _Comparison(definition, ros, document.is_xml), value_at(document.value, body.at)
+    if not body.fields:
+        return list(judge.compared(message, value, Shape(definition.root), ""))
+    found: list[Difference] = []
+    for web, own in body.fields.items():
+        shape = definition.at(own)
+        if shape is not None:
+            there = message if not web else _MISSING if value_at(message, web) is None else value_at(message, web)
+            found += judge.compared(there, value_at(value, own), shape, own)
+    return found
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    definition: Definition
+    ros: RosMap
+    is_xml: bool
+
+    def compared(self, web: Any, own: Any, shape: Shape, at: str) -> Iterator[Difference]:
+        """Yield the differences of a value and what it holds."""
+        if shape.is_octets:
+            if not self._are_octets(web, base64.b64decode(own["b64"])):
+                yield self._difference(at, shape, web, own["b64"])
+        elif shape.is_array:
+            yield from self._items(web, own, shape, at)
+        elif shape.is_message:
+            yield from self._fields(web, own, shape, at)
+        elif not self._is(web, own, shape.item):
+            yield self._difference(at, shape, web, own)
+
+    def _fields(self, web: Any, own: Any, shape: Shape, at: str) -> Iterator[Difference]:
+        if not isinstance(web, dict):
+            yield self._difference(at, shape, web, own)
+            return
+        for name, field in self.definition.fields(shape.item):
+            yield from self.compared(web.get(name, _MISSING), own[name], field, f"{at}/{name}")
+
+    def _items(self, web: Any, own: list[Any], shape: Shape, at: str) -> Iterator[Difference]:
+        if self.is_xml and not isinstance(web, list):
+            # XML writes what repeats as often as it is there: not at all, or once.
+            web = [] if web is _MISSING else [web]
+        if not isinstance(web, list) or len(web) != len(own):
+            yield self._difference(at, shape, web, own)
+            return
+        item = Shape(shape.item)
+        for number, (one, other) in enumerate(zip(web, own, strict=True)):
+            yield from self.compared(one, other, item, f"{at}/{number}")
+
+    def _are_octets(self, web: Any, own: bytes) -> bool:
+        form = self.ros.bytes
+        if isinstance(web, list) and form != "base64":
+            return len(web) == len(own) and all(map(self._is_whole, web, own))
+        if not isinstance(web, str):
+            return self.is_xml and web is _MISSING and not own
+        if form == "array":
+            return False
+        try:
+            if base64.b64decode(web, validate=True) == own:
+                return True
+        except (binascii.Error, ValueError):
+            pass
+        # A map that leaves open how octets are written leaves this open as well.
+        return form is None and (web.lower() == own.hex() or (len(own) == _UUID and web == str(uuid.UUID(bytes=own))))
+
+    def _is(self, web: Any, own: Any, item: str) -> bool:
+        if item == "boolean":
+            return web is own or (self.is_xml and web in ({"true", "1"} if own else {"false", "0"}))
+        if item in INTEGERS:
+            if item in LONG and isinstance(web, str) and not self.is_xml:
+                return self.ros.integers != "number" and web == str(own)
+            named = item in LONG and self.ros.integers == "string" and not self.is_xml
+            return not named and self._is_whole(web, own)
+        if item in FLOATS:
+            return self._is_real(web, own, item)
+        return bool(web == own) if isinstance(web, str) else self.is_xml and web is _MISSING and own == ""
+
+    def _is_real(self, web: Any, own: float, item: str) -> bool:
+        if not math.isfinite(own):
+            return self._is_not_finite(web, own)
+        try:
+            number = float(Decimal(web)) if self._is_number(web) else math.nan
+            return number == own or (item == "float" and struct.unpack("f", struct.pack("f", number))[0] == own)
+        except (InvalidOperation, ValueError, OverflowError):
+            return False
+
+    def _is_not_finite(self, web: Any, own: float) -> bool:
+        form = self.ros.non_finite
+        if isinstance(web, str):
+            named = _NAMES.get(web)
+            return form in {None, "string"} and named is not None and _same(named, own)
+        if isinstance(web, float):
+            return form in {None, "literal"} and _same(web, own)
+        return form is None or (form == "null" and web is None)
+
+    def _is_number(self, web: Any) -> bool:
+        return isinstance(web, str) if self.is_xml else isinstance(web, int | Decimal) and not isinstance(web, bool)
+
+    def _is_whole(self, web: Any, own: int) -> bool:
+        """Return whether a web's value is an integer: 5.0 is the number 5 (RFC 8259 6)."""
+        return bool(web == str(own)) if self.is_xml else self._is_number(web) and bool(web == own)
+
+    def _difference(self, at: str, shape: Shape, web: Any, own: Any) -> Difference:
+        declared = f"{shape.item}[]" if shape.is_array else shape.item
+        return Difference(at or "/", declared, _shown(web), _shown(own))
+
+
+def _same(one: float, other: float) -> bool:
+    return one == other or (math.isnan(one) and math.isnan(other))
+
+
+def equal(own: Any, other: Any) -> bool:
+    """Return whether a ROS message has all values of another one, which may lack fields; NaN is NaN."""
+    if isinstance(other, dict):
+        return isinstance(own, dict) and all(name in own and equal(own[name], one) for name, one in other.items())
+    if isinstance(other, list):
+        return isinstance(own, list) and len(own) == len(other) and all(map(equal, own, other))
+    if isinstance(other, float) or isinstance(own, float):
+        return isinstance(own, int | float) and isinstance(other, int | float) and _same(own, other)
+    return bool(own == other)
+
+
+def changed(own: Any, other: Any, at: str = "") -> Iterator[tuple[str, str, str]]:
+    """Yield where a ROS message is not another one: the field, its value here and there."""
+    if isinstance(other, dict) and isinstance(own, dict) and "b64" not in other:
+        for name, one in other.items():
+            yield from changed(own.get(name), one, f"{at}/{name}")
+    elif isinstance(other, list) and isinstance(own, list) and len(own) == len(other):
+        for number, pair in enumerate(zip(own, other, strict=True)):
+            yield from changed(*pair, f"{at}/{number}")
+    elif not equal(own, other):
+        yield at or "/", _shown(own), _shown(other)
+
+
+def _shown(value: Any) -> str:
+    if value is _MISSING:
+        return "nothing"
+    if isinstance(value, dict) and set(value) == {"b64"}:
+        value = value["b64"]
+    if isinstance(value, list) and not any(isinstance(one, list | dict) for one in value):
+        text = f"[{', '.join(map(_shown, value[:_SHOWN]))}]"
+    else:
+        text = str(value) if isinstance(value, Decimal) else repr(value)
+    if len(text) <= _SHOWN:
+        return text
+    size = f" ({len(value)} items)" if isinstance(value, list) else f" ({len(text)} characters)"
+    return f"{text[: _SHOWN - 20]}…{size}"
