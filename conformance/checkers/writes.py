@@ -7,8 +7,10 @@ with nothing between them count, and members that change by themselves do not.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from datetime import datetime
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
@@ -34,6 +36,8 @@ _MOST_OCTETS: Final = 65_536
 _SEEN: Final = 2
 # Whole numbers beyond this have no double of their own (RFC 8259 6).
 _EXACT: Final = 2**53
+# Doubles that differ by no more are equal; those that differ by more than the second are no rounding.
+_EQUAL, _CLOSE = 1e-14, 0.005
 _READ, _KEPT, _DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
 
 
@@ -78,6 +82,13 @@ class _Change(NamedTuple):
         """The request in words."""
         return f"{self.operation.label} with status {self.write.response.status}"
 
+    @property
+    def told(self) -> dict[str, Any]:
+        """The members that its response shows."""
+        response = self.write.response
+        answer = read_json(response.body).value if is_json(response.media_type) else None
+        return represented(answer, {plain_name(one) for one in self.now})
+
     def is_settled(self, name: str, names: Any) -> bool:
         """Return whether the device has acted by the second read, which a device that acts later has not.
 
@@ -85,9 +96,7 @@ class _Change(NamedTuple):
         """
         if self.is_old:
             return True
-        response = self.write.response
-        answer = read_json(response.body).value if is_json(response.media_type) else None
-        told = represented(answer, {plain_name(one) for one in self.now})
+        told = self.told
         is_told = bool(told) and same(told.get(name), self.now.get(name)) and len(told) > 1
         return is_told or any(
             not same(self.now.get(one), self.before.get(one)) for one in names if one != name and one not in self.moving
@@ -260,7 +269,11 @@ class Writes:
                 continue
             now, key = change.now[name], (change.operation.label, name)
             wrong = ""
-            if is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
+            if part.get("format") == "double" and _is_rounded(value, now):
+                self._doubts[key].add(str(value).encode())
+                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(name), now)
+                wrong = f"{shown(now)} as {name}" if is_sure else ""
+            elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
                 if (
@@ -273,6 +286,8 @@ class Writes:
                     wrong = f"{shown(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
                 wrong = f"{now} as {name}" if 0 < abs(now - value) <= abs(value) >> 52 else ""
+            elif part.get("format") == "date-time" and not same(now, change.before.get(name)) and _is_moved(value, now):
+                wrong = f"{now} as {name}"
             elif isinstance(value, list) and isinstance(now, list) and not same(now, change.before.get(name)):
                 wrong = self._items(name, value, now, part)
             else:
@@ -349,6 +364,24 @@ class Writes:
                 if len(self._doubts[label, f"{name} reset"]) >= _SEEN:
                     expected = f"{shown(was)} as {name}, which {change.label} does not name"
                     yield occasion.case(_READ, False, expected, f"{shown(now)} as {name}", cause=f"{label} {name} kept")  # noqa: FBT003
+
+
+def _is_rounded(value: Any, now: Any) -> bool:
+    """Return whether a double reads as another one that is close to it."""
+    if isinstance(value, bool) or isinstance(now, bool) or not (is_number(value) and is_number(now)):
+        return False
+    return not math.isclose(value, now, rel_tol=_EQUAL) and math.isclose(value, now, rel_tol=_CLOSE)
+
+
+def _is_moved(value: Any, now: Any) -> bool:
+    """Return whether a time reads with the same hour in another time zone, which is another instant."""
+    try:
+        sent, read = datetime.fromisoformat(value), datetime.fromisoformat(now)
+    except (TypeError, ValueError):
+        return False
+    if sent.tzinfo is None or read.tzinfo is None:
+        return False
+    return sent != read and sent.replace(tzinfo=None, microsecond=0) == read.replace(tzinfo=None, microsecond=0)
 
 
 def _parts(schema: Schema | None) -> Mapping[str, Any]:

@@ -199,6 +199,7 @@ class _Cycle:
             told = ", ".join(f"{shown(one)} as {name}" for name, one in said.items()) or "the thing"
             expected = f"{told}, as {action.label} with status {sent.response.status} said"
             living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing)
+            thing.last = found.exchange if found.exchange.response.ok else thing.last
             # An action may change what was written, and end the thing.
             wrong = living.other(thing, found.exchange)
             thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN

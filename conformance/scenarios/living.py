@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,9 +13,12 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, represented
-from conformance.documents.json_schema import Schema
+from conformance.documents.json_schema import Schema, is_number
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.scenarios.special_bodies import parts_of
 from conformance.scenarios.whole_list import WholeList, chooses, read_whole
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange
@@ -27,6 +31,9 @@ _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
 _STATES: Final = ("state", "status", "phase")
+# Members whose text depends on where it is read, and texts that are times.
+_PLACES: Final = re.compile(r"(?:url|uri|href|link|links|self|path)$")
+_TIME: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _MANY: Final = 10
 # A collection that keeps the newest so many things drops the oldest.
 _RING: Final = 3
@@ -38,6 +45,7 @@ class Kind(StrEnum):
     THERE = "there"  # what was created is lost, not listed, or has the identifier of something else
     KEPT = "kept"  # what was written reads otherwise later
     GONE = "gone"  # what was deleted is back, or still listed
+    SHOWN = "shown"  # the list shows other values than the thing itself
     REFUSED = "refused"  # a refused request has changed something
 
 
@@ -156,6 +164,7 @@ class Living:
     _capped: bool = False
     # Whether a thing has outlived the creation of another one, and what was lost by one before that was seen.
     _lasts: bool = False
+    _is_shown_otherwise: bool = False
     _replaced: list[Look] = field(default_factory=list)
 
     @property
@@ -293,6 +302,28 @@ class Living:
         for thing, kind, expected, other in wrong:
             self.note(kind, operation, listing.exchange, f"{expected} after {_said(after)}", other, thing)
             thing.is_told = True
+        for thing in self.of(State.ALIVE)[-_LOOKED:] if not self._is_shown_otherwise else ():
+            self._compare(thing, operation)
+
+    def _compare(self, thing: Thing, operation: str) -> None:
+        """Compare a thing in the list with itself, again and again where they differ and the thing is steady."""
+        if self.lister is None or self.listing is None or not thing.last.response.ok:
+            return
+        names, expected = alike_members(self.read, self.lister), "the values that the thing itself has before and after"
+        if not otherwise(thing.last, self.listing, thing.id, names):
+            if thing.id in self.listing.ids and names:
+                self.note(Kind.SHOWN, operation, self.listing.exchange, expected, "", thing)
+            return
+
+        def read() -> tuple[WholeList, list[str]]:
+            first, listing, last = self._read(thing), self.list_of(thing), self._read(thing)
+            is_steady = first.response.ok and last.response.body == first.response.body
+            return listing, otherwise(last, listing, thing.id, names) if is_steady else []
+
+        listing, wrong = self.writer.until(read, lambda one: not one[1])
+        self._is_shown_otherwise = bool(wrong)
+        if not is_stored(listing.exchange):
+            self.note(Kind.SHOWN, operation, listing.exchange, expected, "; ".join(wrong), thing)
 
     def look_at_older(self) -> None:
         """Look whether the list has what the run created before, and what can be read and is in a listed state."""
@@ -339,6 +370,47 @@ class Living:
             elif thing.state is State.ALIVE and thing.id in listing.twice:
                 found.append((thing, Kind.THERE, f"a list with the thing {thing.id} once", "a list with it twice"))
         return found
+
+
+def alike_members(read: Operation, lister: Operation) -> frozenset[str]:
+    """Return the members that a list and its items have by the same schema, and that read alike wherever they are."""
+    own, whole = parts_of(read.shape or {}), flat(lister.shape or {})
+    inner = [whole, *(flat(one) for one in whole.get("properties", {}).values() if isinstance(one, dict))]
+    items: Schema = next((one["items"] for one in inner if isinstance(one.get("items"), dict)), {})
+    listed = flat(items).get("properties", {})
+    return frozenset(
+        name
+        for name in own.keys() & listed.keys()
+        if flat(own[name]) == flat(listed[name]) and not is_shared(name) and not _PLACES.search(plain_name(name))
+    )
+
+
+def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[str]) -> list[str]:
+    """Return in what a list shows a thing otherwise than it reads, as noun phrases."""
+    item = next((one for one, key in zip(listing.items, listing.ids, strict=True) if key == id_ and id_), {})
+    now = members(found, names)
+    return [
+        f"{shown(item[name])} as {name}"
+        for name in sorted(names & item.keys() & now.keys())
+        if _is_other(now[name], item[name])
+    ]
+
+
+def _is_other(value: Any, listed: Any) -> bool:
+    """Return whether two scalars differ: not in what a list shortens, nor times, which may be written in two ways."""
+    if isinstance(value, bool) or isinstance(listed, bool) or (is_number(value) and is_number(listed)):
+        return bool(value != listed)
+    if not (isinstance(value, str) and isinstance(listed, str)):
+        return False
+    is_short = value.startswith(listed.rstrip(". \u2026")) and len(listed) < len(value)
+    return value != listed and not (is_short or _TIME.match(value))
+
+
+def is_stored(exchange: Exchange) -> bool:
+    """Return whether a response may be an older one, by its header fields (RFC 9111 5.1, 5.2.2.1)."""
+    control = (exchange.response.header("cache-control") or "").lower()
+    age = re.search(r"max-?age\s*=\s*0*([1-9])", control)
+    return age is not None or exchange.response.header("age") is not None
 
 
 def _has(name: str, listing: WholeList) -> bool:

@@ -21,12 +21,14 @@ from conformance.documents.representation import flat
 
 #: With an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and what other formats escape.
 TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
-# Parts of numbers that are no whole ones: of each member several are sent. An integer that is no double.
+# Parts of numbers that are no whole ones: of each member several are sent. One that needs all digits of a double, and
+# an integer that is none.
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
+_ALL_DIGITS: Final = 0.12345678901234
 _BEYOND_DOUBLES: Final = 2**53 + 1
 # So many members are removed by null, where a patch may.
 _NULLS: Final = 2
-_TIME: Final = "2026-02-{:02}T12:00:00+02:00"
+_TIME: Final = "2026-02-{:02}T12:34:56+02:00"
 
 
 def special_bodies(
@@ -43,7 +45,7 @@ def special_bodies(
     """
     usual, first = usual_inputs(change, values)[0], now()
     schema = change.bodies[usual.media_type].schema
-    shown = _parts(read.shape or {})
+    shown = parts_of(read.shape or {})
     if JSON_PATCH in usual.media_type:
         yield from _patches(schema, shown, now, values, may)
         return
@@ -51,7 +53,7 @@ def special_bodies(
         return
     if owned := with_owned(change, read, {} if change.method == "PATCH" else usual.body):
         yield owned
-    parts = _parts(schema)
+    parts = parts_of(schema)
     there = {name: one for name, one in first.items() if name in parts and not parts[name].get("readOnly")}
     there = {name: one for name, one in there.items() if fits(parts[name], one)}
     changed = {name: one for name, one in telling(schema, there, 1, values.collections).items() if may(name)}
@@ -81,7 +83,7 @@ def _replacing(
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
         other = telling(schema, least, 2, values.collections)
         least |= {name: one for name, one in other.items() if may(name)}
-        left_out = [flat(one) for name, one in _parts(schema).items() if name not in least]
+        left_out = [flat(one) for name, one in parts_of(schema).items() if name not in least]
         if any("default" in one for one in left_out) and fits(schema, least):
             yield least
     if fits(schema, base):
@@ -102,7 +104,7 @@ def half_valid(change: Operation, usual: Inputs, valid: dict[str, Any]) -> Itera
 
 def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
     """Return other values for members of a body that show what a device does not keep: fractions, order, time zones."""
-    parts, found = _parts(schema), another(schema, body, turn, collections)
+    parts, found = parts_of(schema), another(schema, body, turn, collections)
     for name in found:
         given = flat(parts.get(name, {}))
         if is_devices(name, given, collections):
@@ -116,6 +118,8 @@ def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
 def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
     kinds = kinds_of(schema)
     if is_number(value) and "number" in kinds:
+        if schema.get("format") == "double":
+            yield from (int(value) + turn * _ALL_DIGITS, int(value) - turn * _ALL_DIGITS)
         for part in (*_PARTS[turn % len(_PARTS) :], *_PARTS):
             yield from (int(value) + part, int(value) - part)
     elif is_number(value) and (schema.get("format") == "int64" or schema.get("maximum", 0) >= _BEYOND_DOUBLES):
@@ -218,7 +222,7 @@ def with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] 
     if not isinstance(body, dict):
         return None
     schema = change.bodies[media_type].schema
-    shown = {**flat(schema).get("properties", {}), **_parts(read.shape or {})}
+    shown = {**flat(schema).get("properties", {}), **parts_of(read.shape or {})}
     own = {name: _own_value(one) for name, one in shown.items() if isinstance(one, dict) and flat(one).get("readOnly")}
     identifying = {plain_name(one.name) for one in read.parameter("path")} | {"id"}
     own = {name: one for name, one in own.items() if one is not None and plain_name(name) not in identifying}
@@ -233,7 +237,7 @@ def _own_value(schema: Schema) -> Any:
     return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)
 
 
-def _parts(schema: Schema) -> dict[str, Any]:
+def parts_of(schema: Schema) -> dict[str, Any]:
     """Return the members of a schema, or of the object in its envelope."""
     outer: dict[str, Any] = flat(schema).get("properties", {})
     inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]

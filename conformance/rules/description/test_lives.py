@@ -17,6 +17,8 @@ from conformance.scenarios.keys import Keyed, repeated_keys
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
+from conformance.scenarios.safe_reads import Watched, safe_reads
+from conformance.scenarios.tables import Table, tables
 from conformance.scenarios.whole_list import read_items
 from conformance.scenarios.writing import Writer
 from conformance.verdict.case import Case
@@ -80,11 +82,31 @@ def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outc
         yield Case(not one.fault, shown, expected, f"{shown.came}: {one.fault}", cause=one.operation)
 
 
+@rule("description/same-values", on=(lifecycles,))
+def same_values(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether a list shows its items with the values that they have themselves."""
+    yield from _looks(trace, Kind.SHOWN)
+
+
+@rule("description/same-values", on=(tables,))
+def same_rows(trace: tuple[Table, ...]) -> Iterable[Outcome]:
+    """Judge whether a list as CSV has the rows and the numbers that it has as JSON."""
+    for one in trace:
+        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=one.operation)
+
+
 @rule("description/idempotency-key", on=(repeated_keys,))
 def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
     """Judge whether a key stands for one request: it is performed once, and no other one gets its response."""
     for one in trace:
         yield Case(not one.fault, one.shown, one.expected, one.fault, cause=f"{one.operation} {one.way}")
+
+
+@rule("description/safe", on=(safe_reads,))
+def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
+    """Judge whether safe requests have left what clients write as it was."""
+    for one in trace:
+        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=one.operation)
 
 
 @pytest.fixture(scope="session")

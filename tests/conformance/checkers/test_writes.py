@@ -17,6 +17,8 @@ _PARTS = {
     "mode": {"type": "string", "enum": ["off", "on", "auto"], "default": "on"},
     "loud": {"type": "boolean", "default": False},
     "note": {"type": ["string", "null"]},
+    "exact": {"type": "number", "format": "double"},
+    "from": {"type": "string", "format": "date-time"},
     "path": {"type": "array", "items": {"type": "number"}},
     "words": {"type": "array", "items": {"type": "string"}},
     "stops": {"type": "array", "items": {"type": "object", "properties": {"x": {"type": "integer"}}}},
@@ -77,6 +79,7 @@ def _op(kind, path, value=None, **more):
 
 
 _LONG = 2**53 + 1
+_EAST = "2026-02-01T12:34:56+02:00"
 _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
@@ -98,6 +101,18 @@ BROKEN = {
     "a default of PUT, a number, of a thing, the response shows it": (
         [_get("/things/1"), _put("/things/1", gain=1.5, mode="on", loud=False, told={"count": 7}),
          _get("/things/1", mode="on", loud=False)], DEFAULTS,
+    ),
+    "doubles as single floats, twice": (
+        [
+            *(_get("/merge"), _patch("/merge", {"exact": 3.12345678901234}), _get("/merge", exact=3.1234567)),
+            *(_patch("/merge", {"exact": 2.12345678901234}), _get("/merge", exact=2.1234567)),
+        ], READ,
+    ),
+    "a double is rounded, as the response says": (
+        [_get("/merge"), _patch("/merge", {"exact": 3.12345678901234}, exact=3.12), _get("/merge", exact=3.12)], READ,
+    ),
+    "an offset is lost": (
+        [_get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56Z"})], READ,
     ),
     "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}), _get("/merge")], READ),
     "null keeps, seen by another change": (
@@ -173,6 +188,24 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a double as it was, and once as another client wrote it": [
+        *(_get("/merge"), _patch("/merge", {"exact": 3.12345678901234}), _get("/merge", exact=3.12345678901234)),
+        *(_patch("/merge", {"exact": 2.5}), _get("/merge", exact=2.5000001)),
+    ],
+    "a number of no format, rounded": [
+        *(_get("/merge"), _patch("/merge", {"gain": 3.123456789}), _get("/merge", gain=3.12)),
+        *(_patch("/merge", {"gain": 2.123456789}), _get("/merge", gain=2.12)),
+    ],
+    "a time in another zone, the same instant": [
+        _get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T10:34:56Z"}),
+    ],
+    "a time that is written later": [
+        _get("/merge", **{"from": "2026-02-01T12:34:56Z"}),
+        _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56Z"}),
+    ],
+    "a time without a zone": [
+        _get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56"}),
+    ],
     "readOnly ignored": [_get(), _put(**{**_FIRST, "built": "x"}), _get()],
     "readOnly refused": [_get(), _put(status=422, built="roaas-own"), _get()],
     "a member of the device's that changes": [_get(level=1), _get(level=2), _put(**_FIRST, level=9), _get(level=9)],

@@ -19,7 +19,7 @@ _NONE_MATCH = {"name": "If-None-Match", "in": "header", "schema": {"type": "stri
 _BAD = {"4XX": REFUSED}
 _WRITABLE = {
     "name": {"type": "string", "minLength": 1, "maxLength": 60},
-    "minutes": {"type": "number", "minimum": 0, "maximum": 600},
+    "minutes": {"type": "number", "format": "double", "minimum": 0, "maximum": 600},
     "litres": {"type": "integer", "format": "int64", "minimum": 0, "maximum": 2**60},
     "starts": {"type": "string", "format": "date-time"},
     "valves": {"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 99}, "maxItems": 8},
@@ -27,6 +27,7 @@ _WRITABLE = {
 _FIRST = {"minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": []}
 _SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "additionalProperties": False}
 _PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
+_READ = "description/written-is-read"
 _STATES = ["idle", "running", "paused", "done"]
 _LOG = "".join(f"{number:04} valve opened\n" for number in range(40)).encode()
 
@@ -58,8 +59,8 @@ class Sprinklers:
         self.zones, self.maps, self.keys, self.old = {}, {}, {}, {}
         self.issued, self.numbers, self.ticks = set(), itertools.count(1), itertools.count(1)
         self.settings = {"season": "summer", "rain_stop": True, "pressure": 2.5}
-        self.cached, self.background = None, None
-        self.errors = self.since_s = 0
+        self.cached = None
+        self.since_s = float("-inf")
         for name in ("lawn", "roses"):
             self.add({"name": name})
 
@@ -153,6 +154,8 @@ class Sprinklers:
         kept = dict(body)
         if self.has("the offset is lost") and "starts" in kept:
             kept["starts"] = re.sub(r"[+-]\d\d:\d\d$", "Z", kept["starts"])
+        elif self.style.get("utc") and "starts" in kept:
+            kept["starts"] = datetime.fromisoformat(kept["starts"]).astimezone(UTC).isoformat().replace("+00:00", "Z")
         if self.has("two decimals are kept") and "minutes" in kept:
             kept["minutes"] = round(kept["minutes"], 2)
         if self.has("numbers are single floats") and "minutes" in kept:
@@ -186,22 +189,16 @@ class Sprinklers:
         media_type = self.wants(request, "application/json", "text/csv")
         if not media_type:
             return error(406, "JSON or CSV")
-        if request.method == "HEAD" and self.has("HEAD renames"):
-            for zone in self.zones.values():
+        for zone in self.zones.values():
+            if request.method == "HEAD" and self.has("HEAD renames"):
                 zone["name"] = "seen"
-        if self.has("a list resets") and request.query_string == "":
-            for zone in self.zones.values():
+            if self.has("a list resets") and request.query_string == "":
                 zone["minutes"] = 10
-        found = [self.shown(one, "list") for one in self.zones]
-        if self.has("a cached list is old"):
-            self.cached = self.cached or copy.deepcopy(found)
-            ids = {one["id"] for one in found}
-            known = {one["id"]: one for one in self.cached if one["id"] in ids}
-            found = [known.get(one["id"], one) for one in found]
-            self.cached = copy.deepcopy(found)
-        vary = {"Vary": "Accept"}
+        found, headers = self.listed(), {"Vary": "Accept"}
+        if self.style.get("caches"):
+            headers["Cache-Control"] = f"max-age={self.style['caches']}"
         if media_type == "application/json":
-            return web.json_response(found, headers=vary)
+            return web.json_response(found, headers=headers)
         rows = [[str(one[name]) for name in ("id", "name", "minutes", "state")] for one in found]
         if self.has("CSV lacks the last row"):
             rows = rows[:-1]
@@ -209,7 +206,20 @@ class Sprinklers:
             rows = [[id_, name, str(float(minutes) * 60), state] for id_, name, minutes, state in rows]
         lines = [",".join(_quoted(one) for one in row) for row in [["id", "name", "minutes", "state"], *rows]]
         body = "\r\n".join([*lines, ""]).encode()
-        return web.Response(body=body, content_type="text/csv", charset="utf-8", headers=vary)
+        return web.Response(body=body, content_type="text/csv", charset="utf-8", headers=headers)
+
+    def listed(self):
+        """Return the zones as the list shows them, in one style as it was a while ago."""
+        found = [self.shown(one, "list") for one in self.zones]
+        if self.style.get("caches"):
+            if time.monotonic() > self.since_s + self.style["caches"]:
+                self.cached, self.since_s = copy.deepcopy(found), time.monotonic()
+            return self.cached
+        if self.has("a cached list is old"):
+            known = {one["id"]: one for one in self.cached or ()}
+            found = [known.get(one["id"], one) for one in found]
+            self.cached = copy.deepcopy(found)
+        return found
 
     async def create(self, request):
         is_acceptable = bool(self.wants(request, "application/json"))
@@ -396,6 +406,8 @@ class Sprinklers:
             return error(406, "JSON only")
         if self.style.get("background"):
             self.settings["pressure"] = 2 + next(self.ticks) % 7 / 4
+        if self.style.get("drifts"):
+            self.settings["pressure"] = 2 + int(time.monotonic() / self.style["drifts"]) % 7 / 4
         value = dict(self.settings)
         return web.json_response(value)
 
@@ -421,6 +433,8 @@ class Sprinklers:
     async def weather(self, request):
         if not self.wants(request, "application/json"):
             return error(406, "JSON only")
+        if self.has("a forecast deletes zones"):
+            self.zones = {id_: one for id_, one in self.zones.items() if not one["name"].startswith("Zo")}
         if self.has("a forecast stops the rain"):
             self.settings["rain_stop"] = not self.settings["rain_stop"]
         return web.json_response({"rain": False, "at": datetime.now(UTC).isoformat()})
@@ -553,9 +567,10 @@ RIGHT = {
     "without conditions": {"asks": False, "keys": False, "takes": 0.3},
     "weak tags": {"etag": "weak", "asks": False},
     "no tags": {"etag": "none", "asks": False, "ranges": "none"},
-    "late": {"late": 0.8, "asks": False},
+    "late": {"late": 0.8, "asks": False, "utc": True},
     "counts reads": {"counts": True, "etag": "weak", "asks": False},
     "moves by itself": {"background": True, "takes": 0.05},
+    "another client": {"drifts": 0.9, "caches": 2},
     "keys that are refused again": {"repeats": "refused", "remembers": 3},
     "keys without fingerprints": {"prints": False, "remembers": 2, "asks": False},
 }
@@ -567,7 +582,7 @@ FAULTS = [
             "a stale If-Match is taken": "description/if-match",
             "another body gets the first answer": "description/idempotency-key",
             "a part begins one later": "http/range",
-            "a file ends at NUL": "description/written-is-read",
+            "a file ends at NUL": _READ,
             "the digest is wrong": "description/digest",
         },
     ),
@@ -590,7 +605,7 @@ FAULTS = [
             "a repeated key acts and says nothing": "description/idempotency-key",
             "what is refused with 406 is created": "description/refused-keeps",
             "what is refused with 428 is written": "description/refused-keeps",
-            "line ends of a file are changed": "description/written-is-read",
+            "line ends of a file are changed": _READ,
         },
     ),
     (
@@ -601,5 +616,26 @@ FAULTS = [
             "a new key gets an old answer": "description/idempotency-key",
         },
     ),
+    (
+        "as described",
+        {
+            "HEAD renames": "description/safe",
+            "CSV lacks the last row": "description/same-values",
+            "two decimals are kept": _READ,
+        },
+    ),
+    (
+        "without conditions",
+        {"a forecast deletes zones": "description/safe", "CSV has other values": "description/same-values"},
+    ),
+    (
+        "weak tags",
+        {
+            "a forecast stops the rain": "description/safe",
+            "the list shows another state": "description/same-values",
+            "the offset is lost": _READ,
+        },
+    ),
+    ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
     ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
 ]

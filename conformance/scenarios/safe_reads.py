@@ -1,0 +1,250 @@
+"""Read all there is by GET, HEAD and OPTIONS, and look before and after whether what a client wrote has changed.
+
+Only what clients write counts, and what they create: counters, times and measured values change by themselves, and so
+may states. What has changed counts if it stays as it is for as long without these requests, and changes with them, in
+each of several rounds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import Any, Final
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.patches import same
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import collection_of, is_devices, is_shared
+from conformance.api.rest.values import Values
+from conformance.documents.json_text import shown
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.representation import flat
+from conformance.scenarios.living import ABSENT
+from conformance.scenarios.own_things import created_path
+from conformance.scenarios.scenario import NoOccasionError, scenario
+from conformance.scenarios.singletons import is_changeable, is_free
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Surveyor
+from conformance.scenarios.writing import Writer, members
+from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
+
+# In so many rounds a change has to show, after the first; and so many resources are watched.
+_ROUNDS, _WATCHED = 3, 12
+# What is left alone meanwhile is left alone for at least so long, s, and at most.
+_LEAST_S, _MOST_S = 0.3, 5.0
+# So many safe requests are sent one by one, to find the one that acts.
+_SINGLE: Final = 150
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What safe requests have made of one resource.
+
+    Attributes:
+        operation: label of the operation that reads it.
+        shown: the safe request that has changed it, or the read that shows it.
+        expected: what should have been read, as a noun phrase.
+        fault: what was read; empty: that.
+    """
+
+    operation: str
+    shown: Exchange
+    expected: str
+    fault: str = ""
+
+
+@dataclass
+class _Resource:
+    """A resource that a client writes.
+
+    Attributes:
+        read: reads it.
+        path: where it is.
+        write: writes it; None: it can only be created.
+        names: its members that clients write.
+        delete: deletes it, if this run has created it; None otherwise.
+        was: these members as they should be.
+        last: the last read.
+    """
+
+    read: Operation
+    path: str
+    write: Operation | None
+    names: frozenset[str]
+    delete: Operation | None = None
+    was: dict[str, Any] = field(default_factory=dict)
+    last: Exchange | None = None
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
+def safe_reads(api: RestInterface, values: Values) -> tuple[Watched, ...]:
+    """Read what clients write before and after all safe requests, and again without them where it has changed."""
+    watch = _Watch(Writer(api, values))
+    api.run.limit.check()
+    with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+        found = watch.play()
+        if found:
+            return tuple(found)
+    raise NoOccasionError("nothing that a client writes could be read")
+
+
+@dataclass
+class _Watch:
+    """The resources of a device and its safe requests."""
+
+    writer: Writer
+    resources: list[_Resource] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        api = self.writer.api
+        usable = [one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams]
+        self._operations = {(one.method, one.template.rstrip("/")): one for one in usable}
+        for (method, path), read in self._operations.items():
+            if method == "GET" and len(self.resources) < _WATCHED:
+                self.resources += self._resource(path, read)
+
+    def _resource(self, path: str, read: Operation) -> list[_Resource]:
+        """Return a resource to watch: one that is written where it always is, or one that is created."""
+        writes = [self._operations[name, path] for name in ("PUT", "PATCH") if (name, path) in self._operations]
+        writes = [one for one in writes if is_json(next(iter(one.bodies), ""))]
+        write = writes[0] if writes else None
+        if not read.parameter("path"):
+            single = write is not None and is_free(write, path) and write
+            return [_Resource(read, "", single, self._names(single, single=True))] if single else []
+        create = self._operations.get(("POST", collection_of(path)))
+        if create is None or create.motion or len(read.parameter("path")) > 1:
+            return []
+        made = created_path(Surveyor(self.writer.api, self.writer.values), create, read)
+        delete = self._operations.get(("DELETE", path))
+        return [_Resource(read, made, write, self._names(create), delete)] if made else []
+
+    def _names(self, operation: Operation, *, single: bool = False) -> frozenset[str]:
+        """Return the members that a client writes by an operation."""
+        body = next(iter(operation.bodies.values()), None)
+        parts = flat(body.schema).get("properties", {}) if body is not None else {}
+        collections = self.writer.values.collections
+        return frozenset(
+            name
+            for name, one in parts.items()
+            if not (is_devices(name, one, collections) or is_shared(name))
+            and (not single or is_changeable(name, one, collections))
+        )
+
+    def play(self) -> list[Watched]:
+        """Return what became of each resource."""
+        try:
+            self.resources = [one for one in self.resources if self._settled(one)]
+            found = dict[str, Watched]()
+            # What GET toggles, HEAD may toggle back.
+            for methods in (("GET",), ("HEAD", "OPTIONS")):
+                began = time.monotonic()
+                self._send(self._safe(methods))
+                took = min(_MOST_S, max(_LEAST_S, time.monotonic() - began))
+                for one in self.resources:
+                    if not (one.read.label in found and found[one.read.label].fault):
+                        found[one.read.label] = self._judged(one, methods, took)
+            return list(found.values())
+        finally:
+            for one in self.resources:
+                if one.delete is not None:
+                    self.writer.conditional(one.delete, one.read, one.path)
+
+    def _settled(self, one: _Resource) -> bool:
+        """Note how a resource reads, twice alike; return whether it can be watched."""
+        for _ in range(2):
+            before, one.last = one.last, self._read(one)
+            if not one.last.response.ok:
+                return False
+            now = {name: value for name, value in members(one.last, one.names).items() if name in one.names}
+            was = members(before, one.names) if before is not None else now
+            one.was = {name: value for name, value in now.items() if same(was.get(name), value)}
+        return bool(one.was)
+
+    def _read(self, one: _Resource) -> Exchange:
+        return self.writer.send(one.read, one.path)
+
+    def _safe(self, methods: Sequence[str]) -> Iterator[Outgoing]:
+        """Yield requests by safe methods: of each operation that reads, of what this run has created where there is."""
+        made = {one.read.template.rstrip("/"): one.path for one in self.resources if one.path}
+        for (method, template), read in self._operations.items():
+            if method != "GET":
+                continue
+            request = written(read, usual_inputs(read, self.writer.values)[0])
+            own = next((one for one in made if f"{template}/".startswith(f"{one}/")), "")
+            if own and "{" not in template[len(own) :]:
+                rest = "".join(request.target.partition("?")[1:])
+                request = replace(request, target=made[own].rstrip("/") + template[len(own) :] + rest)
+            yield from (replace(request, method=name) for name in methods)
+            for media_type in [name for name in read.formats if not is_json(name)][:1] if "GET" in methods else ():
+                yield replace(request, headers=(*request.headers, ("Accept", media_type)))
+
+    def _send(self, requests: Iterable[Outgoing]) -> Exchange | None:
+        """Send safe requests; return the last exchange."""
+        last = None
+        for request in requests:
+            with suppress(NotPermittedError, NoAnswerError):
+                last = self.writer.api.send(request)
+        return last
+
+    def _wrong(self, one: _Resource) -> str:
+        """Read a resource; return what is not as it should be, as a noun phrase."""
+        one.last = self._read(one)
+        if one.last.response.status in ABSENT:
+            return one.last.came
+        now = members(one.last, one.names) if one.last.response.ok else one.was
+        other = [name for name, value in one.was.items() if name in now and not same(now[name], value)]
+        return "; ".join(f"{shown(now[name])} as {name} in place of {shown(one.was[name])}" for name in other)
+
+    def _judged(self, one: _Resource, methods: Sequence[str], took: float) -> Watched:
+        """Judge one resource after safe requests, and if it has changed by rounds with and without them."""
+        expected = f"what was written before {' and '.join(methods)} of everything"
+        wrong, last = self._wrong(one), one.last
+        if last is None or not wrong:
+            return Watched(one.read.label, last or self._read(one), expected)
+        for _ in range(_ROUNDS):
+            if not self._restored(one):
+                break
+            time.sleep(took)
+            if self._wrong(one):
+                break  # it changes without any request as well
+            self._send(self._safe(methods))
+            if not (wrong := self._wrong(one)):
+                break
+        else:
+            guilty = self._guilty(one, methods)
+            return Watched(one.read.label, guilty or one.last or last, expected, wrong)
+        self._restored(one)
+        return Watched(one.read.label, last, expected)
+
+    def _guilty(self, one: _Resource, methods: Sequence[str]) -> Exchange | None:
+        """Return the safe request after which a resource has changed; None if only several together change it."""
+        if not self._restored(one):
+            return None
+        for request in islice(self._safe(methods), _SINGLE):
+            sent = self._send([request])
+            if self._wrong(one):
+                return sent
+        return None
+
+    def _restored(self, one: _Resource) -> bool:
+        """Write a resource as it was, or create another one in its place; return whether it reads so."""
+        if one.path and one.last is not None and one.last.response.status in ABSENT:
+            create = self._operations["POST", collection_of(one.read.template.rstrip("/"))]
+            one.path = created_path(Surveyor(self.writer.api, self.writer.values), create, one.read)
+            one.last = None
+            return bool(one.path) and self._settled(one)
+        if one.write is None:
+            return False
+        usual = self.writer.bodies(one.write, 0, members(one.last, ()) if one.last is not None else {})
+        schema = one.write.bodies[next(iter(one.write.bodies))].schema
+        parts = flat(schema).get("properties", {})
+        whole = {**(usual[1] if len(usual) > 1 else {}), **{name: one.was[name] for name in one.was if name in parts}}
+        if not fits(schema, whole) or not self.writer.conditional(one.write, one.read, one.path, whole).response.ok:
+            return False
+        found = self.writer.until(lambda: self._read(one), lambda _: not self._wrong(one))
+        return found.response.ok and not self._wrong(one)

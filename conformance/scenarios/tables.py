@@ -1,0 +1,120 @@
+"""Read lists as CSV between two readings as JSON: they have the same rows, with the same values (RFC 4180)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.api.rest.applicable import allowed
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.listing import listing_of, page_of
+from conformance.api.rest.values import Values
+from conformance.documents.json_schema import is_number
+from conformance.documents.json_text import shown
+from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.scenarios.scenario import NoOccasionError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.transport.exchange import Exchange, NoAnswerError
+
+_CSV: Final = "text/csv"
+# A table may round what JSON has in full.
+_NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}
+_LARGEST: Final = 1 << 20
+
+
+@dataclass(frozen=True)
+class Table:
+    """A list as CSV.
+
+    Attributes:
+        operation: label of the operation that lists.
+        shown: the response with CSV.
+        fault: what is otherwise than in JSON, as a noun phrase; empty: nothing.
+        expected: what should be there.
+    """
+
+    operation: str
+    shown: Exchange
+    expected: str
+    fault: str = ""
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
+def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
+    """Read each list that is declared as CSV and as JSON; what differs counts if it differs again."""
+    found = list[Table]()
+    for read in operations_of(api.run.contract):
+        declared = read.formats
+        is_both = _CSV in declared and any(map(is_json, declared))
+        if read.method != "GET" or not is_both or not allowed(api, read) or read.label in api.streams:
+            continue
+        api.run.limit.check()
+        with suppress(NoAnswerError):  # the survey tells what breaks a connection
+            first = _compared(api, values, read)
+            again = _compared(api, values, read) if first is not None and first.fault else first
+            found += [one for one in (again,) if one is not None]
+    if not found:
+        raise NoOccasionError("no list is declared as CSV and as JSON, and was the same twice")
+    return tuple(found)
+
+
+def _compared(api: RestInterface, values: Values, read: Operation) -> Table | None:
+    """Read a list as JSON, as CSV and as JSON; None if it has changed meanwhile, or is no list with the same names."""
+    request = written(read, usual_inputs(read, values)[0])
+    json_type = next(filter(is_json, read.formats))
+    kept = tuple(one for one in request.headers if one[0].lower() != "accept")
+    before, table, after = (
+        api.client.send("GET", request.target, headers=(*kept, ("Accept", name)))
+        for name in (json_type, _CSV, json_type)
+    )
+    pages = [page_of(one.response, read) for one in (before, after)]
+    answer = table.response
+    if pages[0] is None or pages[1] is None or answer.media_type != _CSV or not (answer.ok and before.response.ok):
+        return None
+    items = [one for one in pages[0].items if isinstance(one, dict)]
+    if not items or pages[0].items != pages[1].items or len(items) < len(pages[0].items) or answer.cut:
+        return None
+    text = answer.body.decode("utf-8-sig", "replace") if len(answer.body) <= _LARGEST else ""
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    columns = _columns(rows[0], items) if rows else {}
+    if len(columns) < 2:  # noqa: PLR2004 - one name may be chance
+        return None
+    is_paged = pages[0].goes_on or (listing_of(read) is not None and len(rows) - 1 > len(items))
+    fault = next(_differences(rows[1:], items, columns, is_paged=is_paged), "")
+    return Table(read.label, table, f"the {len(items)} items that JSON has before and after, one a row", fault)
+
+
+def _columns(head: list[str], items: list[dict[str, Any]]) -> dict[str, int]:
+    """Return by the name of a member the column that has its name."""
+    places = {plain_name(name): place for place, name in enumerate(head)}
+    return {name: places[plain_name(name)] for name in items[0] if plain_name(name) in places}
+
+
+def _differences(
+    rows: list[list[str]], items: list[dict[str, Any]], columns: dict[str, int], *, is_paged: bool
+) -> Iterator[str]:
+    """Yield what a table has otherwise than JSON: the number of its rows, and numbers and identifiers in them."""
+    if len(rows) != len(items):
+        if not is_paged:
+            yield f"{len(rows)} rows"
+        return
+    for number, (row, item) in enumerate(zip(rows, items, strict=True), 1):
+        for name, place in columns.items():
+            value, text = item.get(name), row[place].strip() if place < len(row) else ""
+            other = _number(text) if isinstance(value, int | float) and is_number(value) else None
+            if other is not None and not math.isclose(float(value or 0), other, **_NEAR):
+                yield f"{text} as {name} in row {number}, and {shown(value)} in JSON"
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
