@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,6 +23,13 @@ _START_S = 60
 # One operation, and the client that needs the least processor time. So robot and load generator do not overload a
 # shared machine, and the difference is significant after half a minute.
 _MEASURED = ("--operation", "delivery", "--client", "wire", "--rate", "200", "--warmup", "1")
+# What the summary says of each page.
+_PAGES = {
+    "certificate.html": "the verdict; below it, folded, each requirement and how it was judged",
+    "latency.html": "how long SOAP and REST take, and how sure that is",
+}
+# Lines of a failed command that are shown.
+_LAST = 8
 _STATEMENT = Path(__file__).parent / "reference_robot" / "statement.toml"
 
 
@@ -42,9 +50,10 @@ def main() -> int:
         endpoints += ["--subscribers-wsdl", soap.replace("publisher", "subscriber")]
         common = [*endpoints, "--allow-motion", "--out", str(options.out)]
         _say("2/3", f"certifying it: REST {rest}, SOAP {soap}")
-        certified = _roaas("certify", *common, "--profile", "full", "--effort", "quick", "--ros-domain-id", str(domain))
+        judged = ("--profile", "full", "--effort", "quick", "--ros-domain-id", str(domain))
+        certified = _roaas(options.out, "certify", *common, *judged)
         _say("3/3", f"measuring SOAP against REST for {options.duration:g} s")
-        loaded = _roaas("load", *common, *_MEASURED, "--duration", f"{options.duration:g}")
+        loaded = _roaas(options.out, "load", *common, *_MEASURED, "--duration", f"{options.duration:g}")
     _summary(options.out, time.monotonic() - started)
     return certified or (0 if loaded == ExitCode.INCONCLUSIVE else loaded)
 
@@ -68,12 +77,29 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
         yield ready[1], ready[2]
 
 
-def _roaas(*arguments: str) -> int:
+def _roaas(out: Path, *arguments: str) -> int:
+    """Run a command; keep what it says of its progress in a file, and show the last line of it on a terminal."""
     # Each command starts with an environment without the robot's domain.
     environment = {key: value for key, value in os.environ.items() if key != "ROS_DOMAIN_ID"}
-    # Progress and errors go to standard error; the results go to files, which the summary reads.
-    command = [*_ROAAS, *arguments]
-    return subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False).returncode  # noqa: S603 - ours
+    out.mkdir(parents=True, exist_ok=True)
+    log = out / f"demo-{arguments[0]}.log"
+    shown = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    # The results go to files, which the summary reads.
+    command, streams = [*_ROAAS, *arguments], {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with (
+        log.open("w", encoding="utf-8") as kept,
+        subprocess.Popen(command, env=environment, text=True, errors="replace", **streams) as process,  # noqa: S603 - ours
+    ):
+        for line in process.stderr or ():
+            kept.write(line)
+            if shown:
+                width = shutil.get_terminal_size().columns - 1
+                print(f"\r\x1b[K{line.rstrip()[:width]}", end="", file=sys.stderr, flush=True)  # noqa: T201 - it talks
+    if shown:
+        print("\r\x1b[K", end="", file=sys.stderr, flush=True)  # noqa: T201 - as above
+    if process.returncode not in {ExitCode.PASSED, ExitCode.INCONCLUSIVE}:
+        print("\n".join(log.read_text(encoding="utf-8").splitlines()[-_LAST:]), file=sys.stderr)  # noqa: T201 - as above
+    return process.returncode
 
 
 def _say(step: str, text: str) -> None:
@@ -81,6 +107,7 @@ def _say(step: str, text: str) -> None:
 
 
 def _summary(out: Path, seconds: float) -> None:
+    """Print the two results, and what to look at."""
     result, latency = (_read(out / name) for name in ("result.json", "latency.json"))
     lines = [f"== done in {seconds:.0f} s"]
     if result:
@@ -88,8 +115,9 @@ def _summary(out: Path, seconds: float) -> None:
         lines.append(f"conformance: {result['verdict']}, {passed} of {len(result['classes'])} classes passed")
     if latency:
         lines.append(f"latency: {latency['headline']['sentence']}")
-    pages = [out / name for name in ("certificate.html", "latency.html")]
-    lines += ["Open in a browser:", *(f"  {path}" for path in pages if path.exists())]
+    pages = [(out / name, what) for name, what in _PAGES.items() if (out / name).exists()]
+    lines += ["", "Look at these in a browser:", *(f"  {path}   {what}" for path, what in pages)]
+    lines += ["", "Then judge a device of your own: roaas certify http://DEVICE/openapi.json"]
     print("\n" + "\n".join(lines))  # noqa: T201 - a demo talks
 
 

@@ -28,9 +28,9 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
 from conformance.contract.requirement_sets import RequirementSetError, judged_by
-from conformance.documents.description import DescriptionError
+from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import operations_of
-from conformance.statement.statement import Statement, StatementError
+from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.target.naming import Judged, hold_folder, named_or_usual, told_apart, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
@@ -50,10 +50,7 @@ Call operations that change something as well:
   roaas certify http://robot:8000/openapi.json --call 'POST /api/move/*'
 
 See whether it moves and stops as told; this moves it:
-  roaas certify http://robot:8000/openapi.json --drive 'PUT /velocity' --allow-motion
-
-Write down what is known of the device in a file, which later runs are given:
-  roaas certify http://robot:8000/openapi.json --init roaas.toml"""
+  roaas certify http://robot:8000/openapi.json --drive 'PUT /velocity' --allow-motion"""
 
 
 @click.command(cls=ResultCommand, start=_START)
@@ -237,7 +234,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
         return _plan(chosen, options, contract)
     if options.drive:
         judged = with_map(judged, options, _run(chosen, options, contract), source)
-    outcome = _certify(door, judged, options, statement)
+    outcome = _certify(door, judged, options, statement, source)
     if outcome.unwritten:
         print_summary(outcome)
         kept = "What is printed is all that is kept" if outcome.path.parent == options.out else f"See {outcome.path}"
@@ -280,7 +277,9 @@ def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> Com
     return CommandResult(ExitCode.PASSED)
 
 
-def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, statement: Path | None) -> Certification:
+def _certify(
+    door: FrontDoor | None, judged: Judged, options: CertifyOptions, statement: Path | None, source: str | None
+) -> Certification:
     chosen, contract, remarks = judged
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
     from conformance.engine.certification import certify as judge  # noqa: PLC0415
@@ -300,7 +299,7 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options.baseline) if options.baseline else None,
             nonce=options.nonce,
-            places=places(contract, statement),
+            places=_places(contract, statement, source),
         )
     except (OSError, BaselineError, RequirementSetError) as error:
         raise StatementError(str(error)) from error
@@ -316,6 +315,16 @@ def _certify(door: FrontDoor | None, judged: Judged, options: CertifyOptions, st
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return judge(robot, options.out, command=command, baseline=baseline, **said)
+
+
+def _places(contract: Contract, statement: Path | None, source: str | None) -> dict[str, Any]:
+    """Return the lines that reports point to; of a description at a URL those of the copy beside the result."""
+    if not contract.openapi_path or contract.is_claimed:
+        return places(contract, statement)
+    api = api_of(statement) if statement and source is None else None
+    named = source or (api.openapi if api else None)
+    file = Path(named) if named and not is_url(named) else contract.openapi_path
+    return places(contract, statement, file, [one.label for one in operations_of(contract)])
 
 
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:

@@ -80,7 +80,8 @@ def write_described_pack(
     for file, content in (
         (DOCUMENT_NAME, document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
     ):  # fmt: skip
-        write_json(folder / file, content, ensure_ascii=False)
+        # Reports point to lines of the description.
+        write_json(folder / file, content, indent=1 if file == DOCUMENT_NAME else None, ensure_ascii=False)
     return folder
 
 

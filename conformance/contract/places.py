@@ -4,6 +4,7 @@ TOML parsers discard line numbers, so the two files are searched as text.
 """
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,49 @@ from conformance.contract.pack import Contract
 _TABLE = re.compile(r'^\s*\[\s*"?([\w-]+)"?\s*\.\s*"?([\w-]+)"?\s*\]', re.MULTILINE)
 _CLAIMS = re.compile(r"^\s*\[\s*claims\s*\]", re.MULTILINE)
 _NEXT_TABLE = re.compile(r"^\s*\[[\w\s\"'.-]+\]\s*(?:#.*)?$", re.MULTILINE)
+# A key of a mapping at the beginning of a line, in JSON or YAML.
+_KEY = re.compile(r"""\s*["']?(/[^"'\s]*|[a-z]+)["']?\s*:(?:\s|$)""")
+_METHODS = frozenset({"get", "head", "options", "put", "post", "patch", "delete", "trace", "query"})
 _NAME = re.compile(r"[\"']([\w-]+)[\"']")
 
 
-def places(contract: Contract, statement: Path | None) -> dict[str, Any]:
-    """Return the ``places`` of result.json: lines in the ledgers, and in the statement if there is one.
+def places(
+    contract: Contract, statement: Path | None, description: Path | None = None, labels: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Return the ``places`` of result.json: lines in the ledgers, in the statement, and in the device's description.
 
     Lines count from 1. Files are named relative to the working directory if they are below it.
+
+    Args:
+        contract: what the device is judged by.
+        statement: the statement's file, or None.
+        description: the description's file, or None.
+        labels: its operations, each as method and path.
     """
     own, generic = contract.directory / LEDGER, GENERIC_RULES / LEDGER
     return {
         "statement": None if statement is None else {"file": _shown(statement), **_claim_lines(_text(statement))},
         "ledger": _ledger(own if own.is_file() else generic, contract),
         "generic_ledger": _ledger(generic, contract),
+        **({} if description is None else {"description": _described(description, labels)}),
     }
+
+
+def _described(path: Path, labels: Iterable[str]) -> dict[str, Any]:
+    """Return the line of each operation in a description, as JSON or YAML writes its keys on lines of their own."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    keys = [(number, found[1]) for number, line in enumerate(lines, 1) if (found := _KEY.match(line))]
+    at: dict[str, int] = {}
+    place = ""
+    for number, key in keys:
+        if key.startswith("/"):
+            place = key
+        elif place and key in _METHODS:
+            at.setdefault(f"{key.upper()} {place}", number)
+    return {"file": _shown(path), "lines": {label: at[label] for label in labels if label in at}}
 
 
 def _ledger(path: Path, contract: Contract) -> dict[str, Any]:

@@ -1,12 +1,14 @@
 """The content of result.json (format roaas-result/1)."""
 
 import datetime as dt
+import hashlib
 import platform
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from msgspec import to_builtins
+from msgspec.json import encode
 
 from conformance.commandline.atomic_write import write_json
 from conformance.commandline.out_folder import without_folders
@@ -69,7 +71,11 @@ def result_document(
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": run.digests["suite"]},
         "pack": {"name": run.contract.name, "version": run.contract.version, "title": run.contract.title},
         "requirement_set": run.requirement_set.told if run.requirement_set else None,
-        "digests": {"statement": run.given.statement, "contract": run.digests["contract"]},
+        "digests": {
+            "statement": run.given.statement,
+            "contract": run.digests["contract"],
+            **({"map": _digest(statement.motion_map)} if statement.motion_map else {}),
+        },
         "baseline": {"digest": run.given.baseline} if run.given.baseline else None,
         **({"stale": list(accepted.stale)} if accepted.stale else {}),
         **({"selected": sorted(run.selection.ids)} if run.selection.ids is not None else {}),
@@ -117,6 +123,11 @@ def result_document(
         **_api(robot, causes),
         **_beside(robot, aside),
     }
+
+
+def _digest(value: Any) -> str:
+    """Return a digest of data."""
+    return f"sha256:{hashlib.sha256(encode(value, order='deterministic')).hexdigest()}"
 
 
 def _faults(run: Run) -> dict[str, Any]:

@@ -111,6 +111,24 @@ class Difference:
         }
 
     @property
+    def origin(self) -> str:
+        """Return in a sentence what changed between the runs: suite, statement, motion map, description or device."""
+        changed = list(_changed(self.old, self.new))
+        if not changed:
+            return (
+                "Suite, statement, motion map and description are the same in both runs. A changed verdict comes from "
+                "the device, or from a fault that does not show in every run."
+            )
+        device = [one for one in changed if one.startswith("the device")]
+        others = [one for one in changed if one not in device]
+        told = f"Changed between the runs: {', '.join(changed)}."
+        if not others:
+            return told
+        return (
+            f"{told} A changed verdict may come from {'these' if len(others) > 1 else 'this'}, and not from the device."
+        )
+
+    @property
     def regressions(self) -> tuple[Change, ...]:
         """Return the changes that are regressions (see `Change.regression`)."""
         return tuple(change for change in self.changes if change.regression)
@@ -199,6 +217,26 @@ def _failed(item: Requirement) -> bool:
 
 def _judged(item: Requirement) -> bool:
     return item["verdict"] in {"pass", "fail", "warn"}
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what differs of what judges and what is judged, with the versions if they differ."""
+    files = "the description" if "api" in new else "the contract"
+    for name, version, digest in (
+        ("the suite", "suite.version", "suite.digest"),
+        ("the statement", "", "digests.statement"),
+        ("the motion map", "", "digests.map"),
+        (files, "api.version", "digests.contract"),
+    ):
+        before, now = _at(old, digest), _at(new, digest)
+        # An older suite wrote fewer digests.
+        known = old["suite"]["digest"] == new["suite"]["digest"] or "none" not in {before, now}
+        if before != now and known:
+            versions = [_at(one, version) for one in (old, new)] if version else []
+            yield name + (f" ({' → '.join(versions)})" if len(set(versions)) > 1 else "")
+    robots = [_at(one, "statement.robot.version") for one in (old, new)]
+    if robots[0] != robots[1]:
+        yield f"the device ({' → '.join(robots)})"
 
 
 def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

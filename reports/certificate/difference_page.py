@@ -27,7 +27,7 @@ def headline(found: Difference) -> str:
 
 def difference_text(found: Difference) -> str:
     """Return the changes between two results as text for a terminal, at most 50 of each kind."""
-    lines = [headline(found)]
+    lines = [headline(found), on_a_line(found.origin)]
     for kind, changes in found.groups.items():
         lines += ["", f"{opened(kind)} ({len(changes)}). {MEANINGS[kind]}"]
         for change in changes[:SHOWN]:

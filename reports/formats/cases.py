@@ -216,20 +216,33 @@ class Place:
 
 
 def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
-    """Return the lines where the vendor claims the case's class and where the contract defines the requirement.
+    """Return the lines of the operation that shows the case, of the vendor's claim, and of the requirement.
 
     The list has at least one place; a place that result.json does not know is left out.
     """
     return list(_places(result, case))
 
 
+def _described(lines: Mapping[str, int], case: Case) -> int | None:
+    """Return the line of the first operation of the case's findings, in the description; None if it is not there."""
+    for finding in case.findings:
+        named = [one["operation"] for one in finding.failure.get("operations", ())]
+        for label in (*named, finding.subject.partition("?")[0]):
+            if label in lines:
+                return lines[label]
+    return None
+
+
 def _places(result: Mapping[str, Any], case: Case) -> Iterator[Place]:
     known = result.get("places", {})
     statement, ledger = known.get("statement"), known.get("ledger")
+    described = known.get("description")
+    if described and (line := _described(described["lines"], case)):
+        yield Place(described["file"], line)
     if statement:
         yield Place(statement["file"], statement["classes"].get(case.class_name, statement["line"]))
     stated = [one for one in (ledger, known.get("generic_ledger")) if one and case.name in one["lines"]]
     if stated:
         yield Place(stated[0]["file"], stated[0]["lines"][case.name])
-    elif not statement:
+    elif not (statement or (described and _described(described["lines"], case))):
         yield Place(ledger["file"] if ledger else _UNKNOWN, 1)

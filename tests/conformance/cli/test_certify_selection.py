@@ -1,6 +1,7 @@
 """What is judged of a device can be chosen; known failures are accepted; the terminal says all in one vocabulary."""
 
 import datetime as dt
+import json
 import os
 import pty
 import re
@@ -9,6 +10,9 @@ import sys
 
 import pytest
 from small_device import answers, certified, constant, described, small_device
+
+from reports.formats.annotations import annotations
+from reports.formats.sarif import sarif
 
 _SCHEMA = {"type": "object", "required": ["name"]}
 # The 404 of an unknown parameter's value is declared nowhere, and the object lacks its member.
@@ -111,3 +115,26 @@ def test_words_wrap_at_the_width_and_the_bar_counts_as_the_summary_does(device, 
     summary = re.search(r"(\d+ fail)(?:, (\d+ warn))?", plain)
     last = progress.strip().splitlines()[-1]
     assert all(part in last for part in summary.groups() if part), (summary.groups(), last)
+
+
+def test_findings_point_at_the_line_of_the_description(device, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    description = tmp_path / "api.yaml"
+    base = device.removesuffix("/openapi.json")
+    description.write_text(
+        f"openapi: 3.0.3\ninfo: {{title: device, version: '1'}}\nservers: [{{url: '{base}'}}]\npaths:\n  /state:\n"
+        "    get:\n      responses:\n        '200':\n          description: ok\n          content:\n"
+        "            application/json:\n              schema: {type: object, required: [name]}\n",
+        encoding="utf-8",
+    )
+    certified("api.yaml", tmp_path / "out", "--select", _BROKEN)
+    certified(device, tmp_path / "url", "--select", _BROKEN)
+    for folder, file in (("out", "api.yaml"), ("url", "url/description/openapi.json")):
+        result = json.loads((tmp_path / folder / "result.json").read_text(encoding="utf-8"))
+        run = json.loads(sarif(result))["runs"][0]
+        found = next(one for one in run["results"] if one["ruleId"] == _BROKEN)
+        place = found["locations"][0]["physicalLocation"]
+        assert place["artifactLocation"]["uri"] == file
+        line = (tmp_path / file).read_text(encoding="utf-8").splitlines()[place["region"]["startLine"] - 1]
+        assert re.match(r'\s*"?get"?:', line), line
+        assert f"file={file},line={place['region']['startLine']}," in annotations(result)

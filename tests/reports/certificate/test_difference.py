@@ -145,3 +145,34 @@ def test_what_is_beside_the_verdict_is_shown_and_no_regression(pair):
     assert not found.regressions
     lost = {"requirements": [requirement("skip", id="web-server/host-missing", aliases=["http/host-missing"])]}
     assert not difference(old, {**new, "web_server": lost}).regressions
+
+
+SAME = "Suite, statement, motion map and description are the same in both runs."
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, SAME),
+        (
+            {"suite": {"version": "9.9", "contract": "1.2", "digest": "sha256:x"}},
+            "Changed between the runs: the suite (",
+        ),
+        ({"digests": {"statement": "sha256:y", "map": "sha256:1"}}, "Changed between the runs: the statement. "),
+        ({"digests": {"statement": "sha256:x", "map": "sha256:2"}}, "Changed between the runs: the motion map. "),
+    ],
+)
+def test_it_says_what_changed_the_suite_the_statement_the_map_or_the_device(pair, changes, told):
+    old, new = pair([requirement("pass")], [requirement("fail")])
+    old["digests"] = new["digests"] = {"statement": "sha256:x", "map": "sha256:1"}
+    new.update(changes)
+    found = difference(old, new)
+    assert found.origin.startswith(told)
+    for text in (difference_text(found), difference_html(found, ("a", "b")), difference_markdown(found, ("a", "b"))):
+        assert told.split("(")[0] in text.replace("\\", "")
+
+
+def test_a_new_version_of_the_device_explains_a_change(pair):
+    old, new = pair([requirement("pass")], [requirement("fail")])
+    new["statement"]["robot"]["version"] = "9.0"
+    assert difference(old, new).origin == "Changed between the runs: the device (2.4.1 → 9.0)."
