@@ -30,7 +30,7 @@ from conformance.statement.endpoints import Endpoints
 from loadtests.clients.failures import CallError
 from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
-from loadtests.result.files import with_unstopped
+from loadtests.result.files import stops_lines, with_unstopped
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
 from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, CliOptions
 from loadtests.settings.settings import STEP_S, Settings, SettingsError
@@ -231,6 +231,14 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option(
     "--tolerance", callback=SHARE, default="5%", help="How much slower than the other, or the baseline, it may be."
 )
+@options_of(Group.MEASURED)
+@click.option(
+    "--operators",
+    type=click.IntRange(2, 64),
+    metavar="N",
+    help="Also see how late a stop takes effect while N operators read the state; one of them drives, by the motion "
+    "map.",
+)
 @options_of(Group.CALLS)
 @click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
 @options_of(Group.COMPARED)
@@ -272,6 +280,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
             settings = device.settings(_command_line())
         with TemporaryDirectory(prefix="roaas-load-") as folder:
             result = _run_load(settings, Path(folder, "written"), summary, device.stopping if device else stopping)
+            result = device.beside_operators(result) if device else result
     except (TomlFileError, SettingsError, BaselineError) as error:
         click.echo(f"roaas load: {inert(str(error))}", err=True)
         return CommandResult(ExitCode.USAGE)
@@ -285,6 +294,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
             unstopped = "; ".join(filter(None, (each.stop() for each in (device.stopping if device else stopping))))
         if unstopped:
             click.secho(f"WARNING: {inert(unstopped)}", fg="red")
+    for line in stops_lines(result.file):
+        click.echo(line)
     summary.seek(0)
     click.echo(summary.read(), nl=False)
     result = with_unstopped(result, unstopped) if unstopped else result

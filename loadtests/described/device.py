@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 DESCRIBED_ONLY = (
     "openapi", "wsdl", "schemas", "overlays", "base_url", "allow_files", "allow", "never", "basic_file", "digest_file",
     "username_token_file", "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file",
-    "client_key_passphrase_file", "streams", "stamp_field", "clock_field", "scenario",
+    "client_key_passphrase_file", "streams", "stamp_field", "clock_field", "scenario", "operators",
 )  # fmt: skip
 #: The credentials in options, by their names in Python.
 CREDENTIALS = (

@@ -4,14 +4,20 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+import click
+
+from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
 from conformance.documents.description import is_url
 from conformance.papers_robot.statement import Load, RobotStatement
 from conformance.target.describing import is_wsdl
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import callable_robot, named_alike, scenario_of
+from loadtests.described.operators import stops_beside
 from loadtests.described.pairs import Choice
 from loadtests.described.stopping import Stopping
 from loadtests.described.streams import streams_to_hear
+from loadtests.result.files import with_operators
 from loadtests.schedule.plan import step_operation
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Selection, Settings, SettingsError, Target
@@ -82,9 +88,10 @@ class Described:
         """Return the operations that the options name."""
         options = self.options
         devices, others = (_selected(each, options["interfaces"]) for each in (self.devices, self.others))
-        choice = Choice.of(devices, options["operations"])
+        state = self._read_by_operators()
+        choice = Choice.of(devices, options["operations"] or state)
         names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
-        if changing:
+        if changing or options["operators"]:
             self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
         robot = choice.robot()
         levels = choice.levels(partial=self.named.wsdl is not None)
@@ -105,6 +112,30 @@ class Described:
             ),
             streams=streams_to_hear(self.devices[0], options),
         )
+
+    def _read_by_operators(self) -> tuple[str, ...]:
+        """Return the operation that operators read, if there are to be several.
+
+        Raises:
+            SettingsError: the statement has no motion map, or the run may not move the device.
+        """
+        device = self.devices[0]
+        if not self.options["operators"]:
+            return ()
+        if device.statement.motion_map is None or not device.api.run.allow_motion:
+            raise SettingsError("--operators drives and stops the device: it needs a [motion] map and --allow-motion")
+        return (device.statement.motion_map.state.read,)
+
+    def beside_operators(self, result: CommandResult) -> CommandResult:
+        """See how late a stop takes effect beside several operators, and write it into the result."""
+        wanted, motion = self.options["operators"], self.devices[0].statement.motion_map
+        if not wanted or motion is None or result.file is None or result.exit_code == ExitCode.INTERRUPTED:
+            return result
+        click.echo(f"driving and stopping the device, alone and beside {wanted - 1} who read its state", err=True)
+        found = stops_beside(self.devices[0], motion, wanted)
+        late = any(each["late"] for each in found["by_number"])
+        code = ExitCode.FAILED if late else ExitCode.INCONCLUSIVE if found["error"] else ExitCode.PASSED
+        return with_operators(result, found, code)
 
     def _of_scenario(self, file: str) -> Target:
         """Return the operations that a scenario may call."""

@@ -12,6 +12,7 @@ from hdrh.histogram import HdrHistogram
 from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
+from conformance.commandline.terminal import inert
 
 FORMAT = "roaas-latency/1"
 _NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")
@@ -45,6 +46,37 @@ def with_unstopped(result: CommandResult, why: str) -> CommandResult:
         document["exit_code"] = document["exit_code"] or int(ExitCode.INCONCLUSIVE)
         write_json(result.file, document, indent=1, allow_nan=False)
     return result._replace(exit_code=result.exit_code or ExitCode.INCONCLUSIVE)
+
+
+def with_operators(result: CommandResult, found: dict[str, Any], code: int) -> CommandResult:
+    """Write into latency.json what stops did beside other operators; the code counts where the run itself passed."""
+    if result.file is None:
+        return result
+    document = json.loads(result.file.read_text(encoding="utf-8"))
+    document |= {"operators": found, "exit_code": document["exit_code"] or int(code)}
+    write_json(result.file, document, indent=1, allow_nan=False)
+    return result._replace(exit_code=result.exit_code or code)
+
+
+def stops_lines(file: Path | None) -> list[str]:
+    """Return what latency.json says of stops beside other operators, a line for each number of them."""
+    found = None if file is None else json.loads(file.read_text(encoding="utf-8")).get("operators")
+    if found is None:
+        return []
+    promised = f" (by the motion map: {found['promised_ms']:g} ms)" if found["promised_ms"] else ""
+    lines = []
+    for each in found["by_number"]:
+        if not each["stops"]:
+            continue
+        rest, answer = each["rest_ms"], each["answer_ms"]
+        late = f"; it moved on for too long after {each['late']} of {each['stops']}" if each["late"] else ""
+        who = f"{each['operators']} operator{'' if each['operators'] == 1 else 's'}"
+        lines.append(
+            f"{who}: the device rested {rest['p50']:.0f} ms after a stop at the median, {rest['max']:.0f} ms at most, "
+            f"known to {each['known_to_ms']:.0f} ms{promised}; the response took {answer['p50']:.1f} ms at the median, "
+            f"{answer['max']:.1f} ms at most{late}"
+        )
+    return [*lines, *([f"operators: {inert(found['error'])}"] if found["error"] else [])]
 
 
 def percentile_distribution(encoded: str) -> str:

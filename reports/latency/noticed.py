@@ -27,7 +27,7 @@ def noticed(result: Mapping[str, Any]) -> list[str]:
     lines = [sentence for one in told[:_MOST] for sentence in _of_series(one, result)]
     if len(told) > _MOST:
         lines.append(f"The other {len(told) - _MOST} are faster than these.")
-    return [*lines, *_of_streams(result), *_limits(result, any(one["errors"] for one in told))]
+    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(one["errors"] for one in told))]
 
 
 def _tail(one: Mapping[str, Any]) -> tuple[str, float]:
@@ -91,6 +91,26 @@ def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
                 f"{name}: the data is {old}, and a display that shows it until the next shows data that is up to "
                 f"{ms(ages['max'] + error + intervals['max'])} ms old."
             )
+
+
+def _of_stops(result: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how late a stop took effect, alone and beside other operators."""
+    found = result.get("operators") or {"by_number": [], "error": None}
+    for one in found["by_number"]:
+        if not one["stops"]:
+            continue
+        number = "One operator" if one["operators"] == 1 else f"Each of {one['operators']} operators reads the state"
+        rest, late = one["rest_ms"], one["late"]
+        promised = found.get("promised_ms")
+        yield (
+            f"{number}: a stop takes effect after {ms(rest['p50'])} ms at the median and {ms(rest['max'])} ms at most "
+            f"(± {ms(one['known_to_ms'])} ms"
+            + (f"; the motion map promises {ms(promised)} ms" if promised else "")
+            + (f", which {late} of {one['stops']} stops did not keep" if late else "")
+            + ")."
+        )
+    if found["error"]:
+        yield f"How late a stop takes effect is not known: {excerpt(found['error'], 200)}."
 
 
 def _round(value: float) -> float:
