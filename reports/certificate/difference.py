@@ -111,6 +111,11 @@ class Difference:
         }
 
     @property
+    def is_explained(self) -> bool:
+        """Return whether something is known to have changed between the runs."""
+        return any(_changed(self.old, self.new))
+
+    @property
     def origin(self) -> str:
         """Return in a sentence what changed between the runs: suite, statement, motion map, description or device."""
         changed = list(_changed(self.old, self.new))

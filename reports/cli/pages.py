@@ -4,12 +4,13 @@ from pathlib import Path
 
 import click
 
+from reports.certificate.runs import results_below, write_history
 from reports.cli.options import FOLDER, PATH
 from reports.formats.catalogue import FORMATS
 from reports.given_files import showing
 from reports.pages.page import write_pages
 from reports.pages.untrusted import on_a_line
-from reports.reading import LATENCY_NAME, read_latency
+from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_latency
 from reports.rendering import render, render_formats
 
 EXIT_OK = 0
@@ -27,14 +28,25 @@ EXIT_INVALID = 4
     help="Write result.json in this format instead of the pages; may be given several times.",
 )
 def report(directory: Path, formats: tuple[str, ...]) -> None:
-    """Write the pages of the result files in DIR again.
+    """Write the pages of the result files in DIR again, or the history of a device whose runs are in folders of DIR.
 
     result.json becomes certificate.html, certificate.md and junit.xml. latency.json becomes latency.html and
     latency.md. fleet.json becomes fleet.html and fleet.md. --format writes one file for a CI system or a code host.
-    Exit code 2: DIR holds no result file, or one that cannot be read.
+    If DIR holds no result file, and folders in it do, history.html shows their runs by the version of the device.
+    Exit code 2: there is no result file, or one that cannot be read.
     """
+    if not formats and _holds_runs(directory):
+        for path in write_history(directory):
+            click.echo(path)
+        return
     for path in render_formats(directory, formats) if formats else render(directory):
         click.echo(path)
+
+
+def _holds_runs(directory: Path) -> bool:
+    """Return whether a folder holds no result file, and folders in it do."""
+    own = any((directory / name).exists() for name in (RESULT_NAME, LATENCY_NAME, FLEET_NAME))
+    return not own and bool(results_below(directory))
 
 
 @click.command()
