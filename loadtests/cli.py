@@ -174,7 +174,7 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 )
 @options_of(Group.EFFORT, rare=True)
 @click.option("--timeout", "timeout_s", type=float, help="Deadline of one request, in seconds.")
-@click.option("--seed", type=int, default=1, help="Seed of schedule, payloads and intervals.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of schedule, payloads and intervals.")
 @click.option(
     "--repeat",
     type=click.IntRange(1, 100),
@@ -248,6 +248,16 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--baselines", type=_FILE, metavar="DIR", default=FOLDER, help="Folder of baselines.")
 @options_of(Group.OUTPUT)
 @click.option("--out", metavar="DIR", default=DEFAULT_OUT, help="Folder for the results.")
+@click.option("--json", "as_json", is_flag=True, help="Print latency.json to stdout in place of the summary.")
+@click.option("--quiet", "-q", "progress", flag_value="none", help="Write no progress; the same as --progress none.")
+@options_of(Group.OUTPUT, rare=True)
+@click.option(
+    "--progress",
+    type=click.Choice(["auto", "lines", "none"]),
+    default="auto",
+    help="What is written to stderr: auto is one line that is renewed on a terminal, and a line in ten seconds "
+    "elsewhere; lines is one each second.",
+)
 def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     """Measure how fast a robot responds, and compare SOAP with REST.
 
@@ -262,13 +272,14 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     end_like_ctrl_c()
     end_with_parent()
     device: Described | None = None
+    as_json = bool(options.pop("as_json"))
     stopping: list[Stopping] = []
     context = click.get_current_context()
     summary = context.with_resource(TemporaryFile("w+", encoding="utf-8"))  # noqa: SIM115 - click closes it
     try:
         _hold_folder(context, Path(options["out"]))
         named = Named.of(targets, options)
-        kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"))
+        kept = _Baselines.of(options.pop("baselines"), options.pop("save"), options.pop("baseline"), as_json=as_json)
         tolerance = options["tolerance"]
         if named.source is None:
             settings = _papers_robot(named.statement, options)
@@ -293,13 +304,16 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         with undisturbed():
             unstopped = "; ".join(filter(None, (each.stop() for each in (device.stopping if device else stopping))))
         if unstopped:
-            click.secho(f"WARNING: {inert(unstopped)}", fg="red")
-    for line in stops_lines(result.file):
-        click.echo(line)
-    summary.seek(0)
-    click.echo(summary.read(), nl=False)
+            click.secho(f"WARNING: {inert(unstopped)}", fg="red", err=as_json)
     result = with_unstopped(result, unstopped) if unstopped else result
-    return kept.after(result, tolerance, context.obj)
+    if as_json and result.file is not None:
+        click.echo(result.file.read_text(encoding="utf-8"), nl=False)
+    elif not as_json:
+        for line in stops_lines(result.file):
+            click.echo(line)
+        summary.seek(0)
+        click.echo(summary.read(), nl=False)
+    return kept.after(result, tolerance, context.obj)._replace(tell=not as_json)
 
 
 def _stopping_of(settings: Settings) -> Iterator[Stopping]:
@@ -342,12 +356,14 @@ class _Baselines:
     old: Path | None
 
     @classmethod
-    def of(cls, baselines: Path, save: str | None, baseline: str | None) -> Self:
+    def of(cls, baselines: Path, save: str | None, baseline: str | None, *, as_json: bool) -> Self:
         """Check the options before the run.
 
         Raises:
-            BaselineError: a name is not allowed, or there is nothing to compare with.
+            BaselineError: a name is not allowed, there is nothing to compare with, or the output is for programs.
         """
+        if as_json and (save or baseline):
+            raise BaselineError("--json prints one document; --save and --baseline print for people: leave one out")
         old = newest(folder_of(baselines, baseline)) if baseline is not None else None
         return cls(folder_of(baselines, save) if save is not None else None, old)
 

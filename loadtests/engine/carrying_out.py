@@ -14,7 +14,7 @@ from conformance.commandline.endings import ending_signals
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from loadtests.engine.run import Run
-from loadtests.engine.watching import follow_parent, tell
+from loadtests.engine.watching import follow_parent
 from loadtests.result.document import compose
 from loadtests.result.files import write
 from loadtests.result.outcome import RunAborted
@@ -29,6 +29,13 @@ def _begin(run: Run) -> Path | None:
     with suppress(OSError):  # told in the end
         return write(Path(run.settings.output.folder), document | {"interrupted": True})
     return None
+
+
+def _complain(run: Run, message: str) -> None:
+    """Say what went wrong, also where progress is not wanted."""
+    run.progress.end()
+    sys.stderr.write(f"roaas load: {message}\n")
+    sys.stderr.flush()
 
 
 def carry_out(settings: Settings, begun: Callable[[Path], object] = lambda _: None) -> CommandResult:
@@ -48,10 +55,11 @@ def carry_out(settings: Settings, begun: Callable[[Path], object] = lambda _: No
         run.measure()
     except RunAborted as reason:
         aborted = reason
-        tell(f"roaas load: {aborted}")
+        _complain(run, str(aborted))
     except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
         traceback.print_exc()
         aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
+    run.progress.end()
     run.name_called()
     code, document = compose(run.outcome, run.plan, aborted)
     path, folder = None, Path(settings.output.folder)
@@ -60,10 +68,10 @@ def carry_out(settings: Settings, begun: Callable[[Path], object] = lambda _: No
             early.unlink()
     else:
         try:
-            tell(f"written: {(path := write(folder, document))}")
+            run.progress.say(f"written: {(path := write(folder, document))}")
         except OSError as error:  # what was measured is printed below
             code = ExitCode.INCONCLUSIVE
-            tell(f"roaas load: {folder}: cannot write there: {error.strerror or error}")
+            _complain(run, f"{folder}: cannot write there: {error.strerror or error}")
     if aborted is None:
         sys.stdout.write(summary(document))
         sys.stdout.flush()

@@ -12,7 +12,8 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import with_addresses
 from loadtests.engine.deciding import until_decided
 from loadtests.engine.planning import duel_plan
-from loadtests.engine.watching import Watch, show_web_ui, tell, tell_plan
+from loadtests.engine.progress import Progress
+from loadtests.engine.watching import Watch, show_web_ui, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
@@ -39,7 +40,8 @@ class Run:
         self.outcome = Outcome(settings, self.robots, Started())
         self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
         self.collector: Collector | None = None
-        self._watch = Watch(self.outcome, REPORT_S if settings.generator.expect else 0.0)
+        self.progress = Progress(settings.output.progress)
+        self._watch = Watch(self.outcome, REPORT_S if settings.generator.expect else 0.0, self.progress)
 
     @property
     def _promise(self) -> str:
@@ -143,13 +145,13 @@ class Run:
                     self.collector = Collector(lambda: executor.recorder, plan.operations)
                     stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
                 if generator.web_port is not None:
-                    show_web_ui(executor, generator.web_host, generator.web_port)
+                    show_web_ui(executor, generator.web_host, generator.web_port, self.progress.say)
                 executor.prepare(self.robots, plan, settings.scenario)
             except GeneratorError as error:
                 raise RunAborted(
                     ExitCode.INTERRUPTED if self.outcome.interrupted else ExitCode.USAGE, str(error)
                 ) from None
-            tell_plan(plan, executor.pacing)
+            tell_plan(plan, executor.pacing, self.progress.say)
             self.outcome.robot_process = RobotProcess.find(self.robots[0])
             plan = self._repeat(plan, executor)
             if self._over:
@@ -157,13 +159,13 @@ class Run:
             if settings.scenario is None:
                 self._pause(plan)
             self._follow_deliveries()
-            self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, tell)
+            self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, self.progress.say)
             if settings.steps.asked and not self._over:
                 self._load_more(plan, executor)
 
     def _pause(self, plan: Plan) -> None:
         """Measure requests after a pause."""
-        tell("measuring requests after a pause")
+        self.progress.say("measuring requests after a pause")
         settings = self.settings
         self.outcome.paused = after_pauses(
             self.robots[0],
@@ -177,7 +179,7 @@ class Run:
     def _load_more(self, plan: Plan, executor: Executor) -> None:
         """Search the knee."""
         outcome = self.outcome
-        load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, tell)
+        load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, self.progress.say)
         outcome.knee_searches += load.knees()
 
     @property
@@ -193,7 +195,7 @@ class Run:
         for number in range(repeats.number):
             if number:
                 plan = plan.again()
-                tell(f"repeat {number + 1} of {repeats.number}, over new connections")
+                self.progress.say(f"repeat {number + 1} of {repeats.number}, over new connections")
                 self._start_anew(repeats.restart_command, plan)
             if self._over:
                 break
@@ -202,7 +204,7 @@ class Run:
         if other is None:
             return plan
         part = partial(self._carry_out, executor=executor)
-        return until_decided(plan, other, executor.recorder, part, lambda: self._over, tell)
+        return until_decided(plan, other, executor.recorder, part, lambda: self._over, self.progress.say)
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
         """Restart the robot with a command, if there is one, and wait until the robot responds."""
@@ -221,10 +223,10 @@ class Run:
             return
         number = self.plan.operations.index("delivery")
         ways = tuple(name for name in self.plan.interfaces if number in self.plan.offered(name, "wire"))
-        tell(f"end to end: {wanted.rounds} rounds over {', '.join(ways)} and ROS itself")
+        self.progress.say(f"end to end: {wanted.rounds} rounds over {', '.join(ways)} and ROS itself")
         try:
             outcome.journeys = end_to_end(
-                self.robots[0], wanted, ways, self.settings.load.seed, lambda: outcome.interrupted, tell
+                self.robots[0], wanted, ways, self.settings.load.seed, lambda: outcome.interrupted, self.progress.say
             )
         except ProbeError as error:
             outcome.invalid.append(f"deliveries could not be followed to the application: {error}")
@@ -233,7 +235,7 @@ class Run:
         generator = self.settings.generator
         if generator.expect:
             folder = self.settings.output.folder
-            return DistributedExecutor(generator, folder, tell, lambda: self.outcome.interrupted)
+            return DistributedExecutor(generator, folder, self.progress.say, lambda: self.outcome.interrupted)
         return LocalExecutor()
 
     def _carry_out(self, plan: Plan, executor: Executor) -> None:

@@ -2,13 +2,13 @@
 
 import math
 import os
-import sys
 from collections.abc import Callable
 
 import gevent
 
 from conformance.commandline.endings import PARENT_VARIABLE
 from loadtests.engine.liveness import Liveness
+from loadtests.engine.progress import Progress
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
@@ -22,13 +22,7 @@ from loadtests.statistics.recorder import Recorder
 _OFTEN_S = 0.2
 
 
-def tell(message: str) -> None:
-    """Write a line of progress to standard error."""
-    sys.stderr.write(message + "\n")
-    sys.stderr.flush()
-
-
-def tell_plan(plan: Plan, pacing: str) -> None:
+def tell_plan(plan: Plan, pacing: str, tell: Callable[[str], None]) -> None:
     """Say what will be measured, and how."""
     load = f"{plan.load.rate:g} requests/s" if plan.open_model else f"{plan.load.users} users"
     tell(
@@ -60,7 +54,7 @@ def _fewest(plan: Plan) -> tuple[int, str] | None:
     return min((each for each in found if each[0]), default=None)
 
 
-def show_web_ui(executor: Executor, host: str, port: int) -> None:
+def show_web_ui(executor: Executor, host: str, port: int, tell: Callable[[str], None]) -> None:
     """Show Locust's web UI, which only watches the run.
 
     Raises:
@@ -90,12 +84,13 @@ class Watch:
     Args:
         outcome: of the run.
         report_s: how late the counts may be, in seconds.
+        progress: where it is said how far the run is.
     """
 
-    def __init__(self, outcome: Outcome, report_s: float) -> None:
+    def __init__(self, outcome: Outcome, report_s: float, progress: Progress) -> None:
         self._outcome = outcome
         self._liveness = Liveness(report_s)
-        self._told = 0.0
+        self._progress = progress
 
     def look(self, carried: Carried, recorder: Recorder, elapsed: float) -> bool:
         """Report progress; returns whether to end now."""
@@ -103,13 +98,11 @@ class Watch:
         carried.elapsed_s = max(0.0, min(elapsed, plan.length_s))
         elapsed += plan.offset_s
         if outcome.dead_at is None and self._liveness.is_due(elapsed):
+            recorder.flush()
             succeeded = sum(cell.service.total for cell in recorder.cells.values())
             failed = sum(failure.count for failure in recorder.failures.values())
             outcome.dead_at = self._liveness.dead_since(elapsed, succeeded, failed)
             if outcome.dead_at is not None:
-                tell(f"no request has succeeded since {outcome.dead_at:.1f} s: ending the run")
-        if elapsed - self._told >= 1.0:
-            self._told = elapsed
-            done = sum(cell.service.total for cell in recorder.cells.values())
-            tell(f"{elapsed:6.1f} s of {plan.offset_s + plan.length_s:.0f} s: {done} requests answered")
+                self._progress.say(f"no request has succeeded since {outcome.dead_at:.1f} s: ending the run")
+        self._progress.look(recorder, max(0.0, elapsed), plan.offset_s + plan.length_s)
         return outcome.interrupted or outcome.dead_at is not None or bool(recorder.faults)

@@ -184,6 +184,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         undecided,
         kept,
         overloaded,
+        interrupted=outcome.interrupted and len(reasons) == 1 and bool(counted.answered),
     )
     document = {
         "format": FORMAT,

@@ -35,7 +35,7 @@ class CliOptions:
     duration_s: float | None = None
     warmup_s: float | None = None
     arrivals: str = "constant"
-    seed: int = 1
+    seed: int = 0
     step_s: float = STEP_S
     knee: bool = False
     knee_searches: int = KNEE_SEARCHES
@@ -48,6 +48,7 @@ class CliOptions:
     ros_domain_id: int | None = None
     tolerance: float = TOLERANCE
     out: str = ""
+    progress: str = "auto"
     command: str = ""
 
     @classmethod

@@ -84,11 +84,18 @@ class Generator:
 
 @dataclass(frozen=True)
 class Output:
-    """The folder for the result, and texts that the result repeats: command line, robot name, vendor and version."""
+    """Where results go.
+
+    Attributes:
+        folder: of the result.
+        command: the command line; about: the robot's name, vendor and version. The result repeats them.
+        progress: `auto`, `lines` or `none`.
+    """
 
     folder: str
     command: str
     about: dict[str, str]
+    progress: str = "auto"
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ _AGAINST = {
     UNCLEAR: "Inconclusive whether it is slower than the other robot",
 }
 _WORTHLESS = "Not valid: these figures say nothing about the robot"
+_INTERRUPTED = "Interrupted"
 _OVERLOADED = "The robot is overloaded"
 _UNDECIDED = "This run is inconclusive"
 _NOTHING = "No series has enough successful requests for a figure."
@@ -39,6 +40,7 @@ class Found:
         undecided: why the run has nothing to compare; thresholds are judged all the same.
         levels: outcomes of the service levels.
         overload: how the robot was overloaded, if it was.
+        interrupted: by Ctrl-C, and valid until then.
     """
 
     plan: Plan
@@ -52,10 +54,13 @@ class Found:
     undecided: Sequence[str] = field(default=())
     levels: Sequence[str] = ()
     overload: Overload | None = None
+    interrupted: bool = False
 
 
 def headline(found: Found) -> dict[str, str]:
     """Return the `headline` of latency.json: a few `words`, and a `sentence` that stands alone."""
+    if found.interrupted:
+        return {"words": _INTERRUPTED, "sentence": f"{_INTERRUPTED}; until then: {_measured(found)[1]}"}
     if found.worthless:
         return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
     judged = "; ".join(filter(None, (_levels(found.levels), _thresholds(found.outcomes))))

@@ -115,6 +115,7 @@ class Recorder:
 
     Attributes:
         window: the plan under way: its first segment, and when its measured part begins and ends (monotonic ns).
+        live: all response times so far.
         in_time, afterwards: successful responses that came within that part and after it, by the plan's first segment.
     """
 
@@ -132,6 +133,7 @@ class Recorder:
         self.spans: defaultdict[tuple[int, int], Spans] = defaultdict(Spans)
         self.failures: dict[FailureKey, Failure] = {}
         self.counters: Counter[str] = Counter()
+        self.live = Histogram()
         self.in_time: Counter[int] = Counter()
         self.afterwards: Counter[int] = Counter()
         self.busy: dict[int, float] = {}
@@ -226,6 +228,7 @@ class Recorder:
         response = Histogram()
         response.record(done - due)
         cell.response.merge(response)
+        self.live.merge(response)
         if self.listener is not None:
             self.listener(self.series_of.get(segment, -1), operation, response)
         cell.late += int(((start - due > LATE_NS) | queued).sum())
@@ -242,6 +245,7 @@ class Recorder:
         """Add all records of another recorder."""
         for key, cell in other.cells.items():
             self.cells[key].merge(cell)
+            self.live.merge(cell.response)
         for series, spans in other.spans.items():
             self.spans[series].merge(spans)
         for kind, failure in other.failures.items():

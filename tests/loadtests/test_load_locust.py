@@ -90,7 +90,7 @@ def test_a_worker_from_elsewhere_joins_the_master(toy, load, wait_for, free_port
 
 def test_the_web_ui_shows_the_runs_numbers(toy, load, free_port):
     process, finish = load.begin(
-        f"--rest {toy().url} --rate 60 --duration 3 --warmup 0.2 --client wire --web-port {free_port}"
+        f"--rest {toy().url} --rate 60 --duration 3 --warmup 0.2 --client wire --progress lines --web-port {free_port}"
     )
     counts = []
     for line in process.stderr:

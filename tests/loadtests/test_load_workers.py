@@ -109,7 +109,8 @@ def python_of(process):
 
 def test_nothing_is_lost_in_silence_over_a_slow_network(network, worker, begin, wait_for):
     other, doomed, late = worker(own_clock=True), worker(), worker()
-    process, finish, join = begin("--rate 80 --duration 4 --warmup 0.4 --processes 0 --expect-workers 2")
+    options = "--rate 80 --duration 4 --warmup 0.4 --processes 0 --expect-workers 2"
+    process, finish, join = begin(options + " --progress lines")
     join(other, doomed)
     for _ in range(2):
         wait_for(process, r"[1-9]\d* requests answered")
