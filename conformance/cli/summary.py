@@ -178,6 +178,6 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
 
 
 def _command(curl: str, number: int, folder: Path) -> str:
-    """Return the command that sends a finding's request; one that is too long for a terminal is left to the result."""
-    shown = len(curl) <= _SHOWN_CURL and not curl.startswith("#")
+    """Return the command that sends a finding's request; what nobody can read is left to the result."""
+    shown = len(curl) <= _SHOWN_CURL and curl.startswith("curl ")
     return curl if shown else f"roaas replay {shlex.quote(str(folder))} {number}"

@@ -126,3 +126,14 @@ def test_names_of_operations_do_no_harm(described_result, hostile_text):
 
 def test_the_badge_has_the_words(described_result):
     assert json.loads(badge(described_result))["message"].startswith("does not keep its own description (")
+
+
+def test_what_a_user_asks_of_a_moving_device_comes_first(described_result):
+    described_result["motion"] = [
+        {"question": "Does it stop when told?", "answer": answer, "figure": "0.3 s", "picture": ""}
+        for answer in ("yes", "no", "not seen")
+    ]
+    page = html.document_fromstring(certificate_html(described_result))
+    assert [head.get("id") for head in page.xpath("//h2")][:2] == ["answers", "first"]
+    shown = [" ".join(one.text_content().split()) for one in page.xpath("//ul[@class='answers']/li")]
+    assert [one.split(" Does")[0][2:] for one in shown] == ["Yes", "No", "Not seen"]
