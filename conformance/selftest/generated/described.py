@@ -12,7 +12,13 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.mutation.messages import Change, Request, Response
 from conformance.selftest.generated import described_failures as failures
-from conformance.selftest.generated import described_http, described_lists, described_requests, described_things
+from conformance.selftest.generated import (
+    described_http,
+    described_lists,
+    described_promises,
+    described_requests,
+    described_things,
+)
 from conformance.selftest.generated.bodies import BODIES, crossed
 from conformance.selftest.generated.breaches import breaks, undeclared_status, undeclared_type
 from conformance.selftest.generated.described_fields import FIELD_OPERATORS
@@ -58,6 +64,7 @@ def _of_operation(operation: Operation, exchange: Exchange) -> Iterator[Generate
     yield from _whole(operation, replace(exchange, classes=("robustness",)))
     yield from described_lists.of_lists(operation, description)
     yield from described_things.of_things(operation, description)
+    yield from described_promises.of_promises(operation, description)
     yield from described_requests.lenient(operation, description)
     yield from described_requests.strict(operation, description)
     yield from described_requests.crashing(operation, replace(exchange, classes=("robustness",)))
