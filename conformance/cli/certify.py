@@ -57,6 +57,8 @@ See whether it moves and stops as told; this moves it:
 @click.argument("targets", nargs=-1, metavar="[DESCRIPTION] [STATEMENT]")
 @options_of(Group.DEVICE)
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the device's descriptions; test nothing.")
+@click.option("--ros", is_flag=True, help="Judge a ROS 2 web gateway by the ROS map in its statement, from both ends.")
+@click.option("--ros-play", is_flag=True, help="The same, with the suite in the robot's place: no robot is needed.")
 @options_of(Group.DEVICE, rare=True)
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
@@ -79,6 +81,7 @@ See whether it moves and stops as told; this moves it:
     "--allow-motion", is_flag=True, help="Allow the suite to move the robot; most of the paper's contract needs that."
 )
 @drive_options
+@options_of(Group.CALLS)
 @click.option(
     "--request-rate", type=click.FloatRange(min=1), metavar="R", help="At most R requests per second, 1 or more."
 )
@@ -136,8 +139,6 @@ See whether it moves and stops as told; this moves it:
 @click.option(
     "--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out"), help="Folder for the results."
 )
-@click.option("--ros", is_flag=True, help="Judge a ROS 2 web gateway by the ROS map in its statement, from both ends.")
-@click.option("--ros-play", is_flag=True, help="The same, with the suite in the robot's place: no robot is needed.")
 @click.option(
     "--baseline", type=click.Path(path_type=Path), help="Accepted failures, each with reason and expiry date (TOML)."
 )

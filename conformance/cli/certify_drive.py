@@ -13,6 +13,7 @@ import msgspec
 from click.core import ParameterSource
 
 from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.help_pages import Group, options_of
 from conformance.commandline.terminal import inert
 from conformance.contract.described import MOTION
 from conformance.contract.toml_file import basic_string
@@ -32,6 +33,7 @@ _OPTIONS = (
         help="Judge how the robot moves, without a file: 'PUT /velocity' commands it. Its axes are found by driving it "
         "a little; asks before it moves.",
     ),
+    options_of(Group.CALLS, rare=True),
     click.option("--read", metavar="OPERATION", help="With --drive: 'GET /state' tells where it is.  [default: found]"),
     click.option("--yes", is_flag=True, help="With --drive: move the robot without asking."),
     click.option(
