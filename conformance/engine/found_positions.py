@@ -45,6 +45,7 @@ class PositionFinder(Finder):
 
     def found(self) -> Found:
         """Return the map; see Finder.found()."""
+        self._refused: list[str] = []
         self._watch(_BEFORE_S)
         counts = {one.label: self._named_places(one.label) for one in self._reads}
         read = max(counts, key=lambda label: len(counts[label]))
@@ -73,6 +74,8 @@ class PositionFinder(Finder):
                         moved[number.name] = found
         finally:
             self._command(start)
+        if not moved and self._refused:
+            raise NotPossibleError(self._refused[0])
         if not moved:
             raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} did not follow any target")
         self._found.lines = list(self._goto_lines(read, start, moved))
@@ -128,9 +131,8 @@ class PositionFinder(Finder):
         sent = self._clock.now()
         if not exchange.response.ok:
             said = exchange.response.body[:300].decode("utf-8", "replace")
-            raise NotPossibleError(
-                f"{self._plan.drive.label} with {number.name} {goal:.4g} got {exchange.came}: {said}"
-            )
+            self._refused.append(f"{self._plan.drive.label} with {number.name} {goal:.4g} got {exchange.came}: {said}")
+            return self._refused[-1]
         self._answer = self._binding.content(exchange.response.body)
         near = max(_FOLLOWS * abs(way), 6 * sigma)
 

@@ -68,30 +68,54 @@ class VelocityFinder(Finder):
         return begun, last
 
     def _responses(self) -> dict[str, dict[tuple[str, str], Response]]:
-        """Return how each number that was read responds, by what was commanded, operation and place."""
+        """Return how each number that was read responds, by what was commanded, operation and place.
+
+        Raises:
+            NotPossibleError: all of what can be commanded was refused.
+        """
         found: dict[str, dict[tuple[str, str], Response]] = {}
+        refused: dict[str, NotPossibleError] = {}
         self._settle_s = 0.3
         for number in self._plan.numbers:
-            least, most = number.limits
-            speeds = [number.little] if most > 0 else []
-            speeds += [-number.little] if least < 0 else []
-            drives = []
-            for speed in speeds:
-                rested = self._clock.now()
-                self._watch(_BEFORE_S)
-                begun, _ = self._drive(number, speed)
-                ended = self._clock.now()
-                self._watch(_AFTER_S)
-                drives.append((speed, rested, begun, ended, self._clock.now()))
-                if len(drives) == 1 and not self._alike(drives):
-                    break
+            try:
+                drives = self._forth_and_back(number)
+            except NotPossibleError as problem:
+                # A body has numbers that the device cannot actuate, such as the height of a rover's Twist.
+                refused[number.name] = problem
+                found[number.name] = {}
+                continue
             found[number.name] = self._alike(drives)
             for (operation, place), response in found[number.name].items():
                 speed, _, _, ended, done = drives[-1]
                 after = self._looks.samples(operation, place, ended, done)
                 since = rests_from(after, response.sigma, response.ratio * speed)
                 self._settle_s = max(self._settle_s, 1.5 * (since - ended) + 0.15 if since else 1.0)
+        if len(refused) == len(self._plan.numbers):
+            raise next(iter(refused.values()))
+        self._found.notes += [f"{name} stays 0: {problem}" for name, problem in refused.items()]
+        self._refused = frozenset(refused)
         return found
+
+    def _forth_and_back(self, number: Commanded) -> list[tuple[float, ...]]:
+        """Drive to each side; return the velocities, each with when it rested, began, ended and was looked at last.
+
+        Raises:
+            NotPossibleError: a velocity was refused.
+        """
+        least, most = number.limits
+        speeds = [number.little] if most > 0 else []
+        speeds += [-number.little] if least < 0 else []
+        drives: list[tuple[float, ...]] = []
+        for speed in speeds:
+            rested = self._clock.now()
+            self._watch(_BEFORE_S)
+            begun, _ = self._drive(number, speed)
+            ended = self._clock.now()
+            self._watch(_AFTER_S)
+            drives.append((speed, rested, begun, ended, self._clock.now()))
+            if len(drives) == 1 and not self._alike(drives):
+                break
+        return drives
 
     def _alike(self, drives: Sequence[tuple[float, ...]]) -> dict[tuple[str, str], Response]:
         found = {}
@@ -145,7 +169,7 @@ class VelocityFinder(Finder):
                     f"{', '.join(turns)} stays 0: nothing shows how fast it drives once it has turned."
                 )
         for one in self._plan.numbers:
-            if shown[one.name] is None:
+            if shown[one.name] is None and one.name not in self._refused:
                 why = "nothing changed with it" if not own[one.name] else "no single number shows it"
                 self._found.notes.append(f"{one.name} stays 0: {why}.")
         found = {name: one for name, one in shown.items() if one}

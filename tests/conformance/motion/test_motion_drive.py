@@ -85,6 +85,35 @@ def test_an_arm_that_is_sent_to_positions_is_found_by_the_names_of_its_joints(tm
     assert 'body = { id = "{goto:/id}" }' in done.stderr, "the stop takes what the move told"
 
 
+class Refusing(Rover):
+    """A rover that takes velocities, and refuses any of these but 0."""
+
+    def __init__(self, *refused):
+        super().__init__()
+        self.names = refused
+
+    def answer(self, method, path, octets):
+        if (method, path) == ("PUT", "/velocity") and any(json.loads(octets).get(name) for name in self.names):
+            return 422, {"detail": f"{' and '.join(self.names)} cannot be actuated"}
+        return super().answer(method, path, octets)
+
+
+def test_what_a_rover_cannot_actuate_stays_0(tmp_path):
+    with serving_rover(Refusing("left")) as url:
+        done, _, given = _driven(url, tmp_path)
+    assert "no" not in given, done.stdout
+    assert given, done.stderr
+    assert "left stays 0: PUT /velocity with left 0.05 got status 422" in done.stderr
+    assert 'body = { ahead = "{ahead}", left = 0 }' in done.stderr
+
+
+def test_a_rover_that_refuses_every_velocity_is_told_with_its_words(tmp_path):
+    with serving_rover(Refusing("ahead", "left")) as url:
+        done, _, given = _driven(url, tmp_path)
+    assert (done.returncode, given) == (2, [])
+    assert "ahead and left cannot be actuated" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
