@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from conformance.documents.openapi import Operation
-from conformance.statement.motion_map import is_for
+from conformance.statement.motion_calls import named_by
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
@@ -138,10 +138,10 @@ def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[s
         mapped: the calls that maps in the statement send in this run.
     """
     by_reason: dict[Reason, list[str]] = {}
+    moving = named_by(mapped, [operation.label for operation in operations])
     for operation in operations:
         reason = rules.decide(operation)
-        is_mapped = any(is_for(call, operation.label) for call in mapped)
-        sent = is_mapped and not reason.may and reason not in {Reason.NEVER, Reason.EXCLUDED}
+        sent = operation.label in moving and not reason.may and reason not in {Reason.NEVER, Reason.EXCLUDED}
         by_reason.setdefault(Reason.MAPPED if sent else reason, []).append(operation.label)
     called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
     changing = by_reason.get(Reason.ALLOWED, []) + by_reason.get(Reason.MAPPED, [])

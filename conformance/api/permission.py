@@ -11,7 +11,7 @@ from conformance.api.call_rules import CallRules, Reason
 from conformance.contract.classes import Prerequisite
 from conformance.documents.openapi import Operation
 from conformance.documents.resources import is_normal, matching
-from conformance.statement.motion_map import is_for
+from conformance.statement.motion_calls import covers
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.transport.reach import moved
@@ -90,7 +90,9 @@ class Permission:
         if declared is None and method in SAFE_METHODS:
             return ""  # whatever is there, it changes nothing
         reason = rules.decide(declared or Operation(path, method, path))
-        mapped = declared is not None and any(is_for(call, declared.label) for call in self._run.mapped)
+        mapped = declared is not None and any(
+            covers(call, f"{method} {path}") or covers(call, f"{method} {sent}") for call in self._run.mapped
+        )
         if mapped and reason not in {Reason.NEVER, Reason.EXCLUDED}:
             return ""
         if declared is not None and (reason.may or (declared.stop and not declared.never)):

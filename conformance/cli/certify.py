@@ -233,6 +233,10 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
     if options.plan:
         return _plan(chosen, options, contract)
+    if chosen.motion_map is not None and not contract.is_claimed:
+        from conformance.engine.map_faults import check_map  # noqa: PLC0415 - of a map alone
+
+        check_map(_run(chosen, options, contract), statement)
     if options.drive:
         judged = with_map(judged, options, _run(chosen, options, contract), source)
     outcome = _certify(door, judged, options, statement, source)

@@ -10,7 +10,6 @@ response to the last accepted move.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal
@@ -18,10 +17,9 @@ from typing import Annotated, Any, Final, Literal
 import msgspec
 
 from conformance.contract.toml_file import Finite, NotNegative, Positive
+from conformance.statement.motion_calls import NAME, SIGNED, SIZE
 
 _NO_NAMES: Final[Mapping[str, str]] = MappingProxyType({})
-NAME: Final = re.compile(r"\{([^{}]+)\}")
-"""A name in a template."""
 Pointer = Annotated[str, msgspec.Meta(pattern=r"^(/.*)?$")]
 Call = Annotated[str, msgspec.Meta(pattern=r"^[A-Z]+ /\S*$")]
 Angle = Literal["roll", "pitch", "yaw"]
@@ -40,6 +38,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         rest: how fast it may seem to move at rest, units per second; None: a fifth of its tolerance.
         angle: it turns freely, in rad: the angle of this name, of a quaternion or as a number; empty: it does not. Its
             limits say which targets are tried.
+        read: the operation that says where it is; empty: that of the state.
     """
 
     at: Pointer
@@ -50,6 +49,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     noise: NotNegative = 0.0
     rest: Positive | None = None
     angle: Angle | Literal[""] = ""
+    read: Call | Literal[""] = ""
 
     def __post_init__(self) -> None:
         """Check the limits.
@@ -270,6 +270,62 @@ class Stop(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rests_within_s: Positive = 0.5
 
 
+class Lease(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a client must hold while it commands the device. Its value is {lease} in templates.
+
+    Attributes:
+        acquire: the operation that gives it.
+        body: JSON of that, or None.
+        token: where the response has its value; empty: it has none.
+        header: the header in which commands carry it; empty: none.
+        renew: the operation that keeps it; empty: nothing does.
+        renew_body: JSON of that, or None.
+        every_s: so often it must be renewed, s.
+        release: the operation that gives it back; empty: there is none.
+    """
+
+    acquire: Call
+    body: Any = None
+    token: Pointer = ""
+    header: str = ""
+    renew: Call | Literal[""] = ""
+    renew_body: Any = None
+    every_s: Positive = 5.0
+    release: Call | Literal[""] = ""
+
+
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A command before the device can move, such as enable and home, or after it has moved.
+
+    Attributes:
+        send: the operation.
+        body: JSON, or None.
+        read: the operation that says when it is done; empty: at once.
+        at: where its response says it.
+        shows: what it has there then.
+        within_s: time until then, s.
+    """
+
+    send: Call
+    body: Any = None
+    read: Call | Literal[""] = ""
+    at: Pointer = ""
+    shows: Any = None
+    within_s: Positive = 30.0
+
+
+class Failed(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"is_not": "not"}):
+    """How a response of 200 says that its request failed.
+
+    Attributes:
+        at: where the response says it.
+        is_not: what it has there if the request succeeded.
+    """
+
+    at: Pointer
+    is_not: Any = 0
+
+
 class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How a device moves.
 
@@ -280,6 +336,10 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         stop: how it is stopped; None: not declared, or by a velocity of zero.
         action: what a move says of itself; None: not declared.
         switches: what has a few states, by name.
+        failed: how a response of 200 says that its request failed; None: its status says it.
+        lease: what a client must hold meanwhile; None: nothing.
+        before: what is sent before the device can move, in order.
+        after: what is sent last, in order.
     """
 
     state: State
@@ -288,6 +348,10 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stop: Stop | None = None
     action: Action | None = None
     switches: dict[str, Switch] = {}
+    failed: Failed | None = None
+    lease: Lease | None = None
+    before: tuple[Step, ...] = ()
+    after: tuple[Step, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that something moves, and that the templates name each axis and nothing that is not known.
@@ -334,8 +398,11 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
         sent = [call for call, _ in self.bodies]
-        read = [self.state.read, *self.state.agrees, *(one.read for one in self.switches.values() if one.read)]
-        return (*read, *sent, *([self.action.read] if self.action else ()))
+        read = [self.state.read, *self.state.agrees, *(one.read for one in self.switches.values())]
+        read += [one.read for one in self.state.axes.values()]
+        held = [self.lease.acquire, self.lease.renew, self.lease.release] if self.lease else []
+        steps = [call for one in (*self.before, *self.after) for call in (one.send, one.read)]
+        return tuple(filter(None, (*read, *sent, *([self.action.read] if self.action else ()), *held, *steps)))
 
     def tolerance(self, axis: str) -> float:
         """Return how far from its target an axis may rest, in the axis's unit."""
@@ -351,33 +418,24 @@ def _check_names(
     table: str, given: Goto | Velocity | Way | Switch, needed: set[str], more: Mapping[str, str] = _NO_NAMES
 ) -> None:
     """Check the names in a template; ``more``: others that it may have, each with the axis that it moves."""
-    found = {more.get(name, name) for name in names_in([given.send, given.body])}
+    sizes = {f"{name}:{SIZE}": name for name in needed}
+    found = {more.get(name, sizes.get(name, name)) for name in names_in([given.send, given.body])}
     if missing := needed - found:
         raise ValueError(f"{table} has no {{{min(missing)}}} in send or body, so nothing would move that axis")
     _refuse_strange(found - needed - more.keys())
 
 
 def _refuse_strange(names: set[str]) -> None:
-    if strange := {name for name in names if not name.startswith("goto:/")}:
+    if strange := {name for name in names if not (name.startswith("goto:/") or name == "lease")}:
         raise ValueError(f"a template names {{{min(strange)}}}, which is neither an axis nor known")
 
 
 def names_in(template: Any) -> set[str]:
     """Return the names that a template contains."""
     if isinstance(template, Mapping):
+        if template.keys() == SIGNED:
+            return set()
         return set().union(*map(names_in, template.values()))
     if isinstance(template, list | tuple):
         return set().union(*map(names_in, template))
     return set(NAME.findall(template)) if isinstance(template, str) else set()
-
-
-def shape_of(call: str) -> str:
-    """Return an operation without the names in its path, which map and description may choose differently."""
-    return NAME.sub("{}", call)
-
-
-def is_for(call: str, label: str) -> bool:
-    """Return whether a map's call is for the operation of a description: by its template, or by a path that fits it."""
-    if shape_of(call) == shape_of(label):
-        return True
-    return re.fullmatch("[^/]+".join(map(re.escape, shape_of(label).split("{}"))), call.partition("?")[0]) is not None

@@ -11,6 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_toml
 from conformance.statement.endpoints import Auth, Endpoints, beside
 from conformance.statement.load import Load, ServiceLevel
+from conformance.statement.motion_calls import written_out
 from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import RosMap, read_ros_map
 
@@ -204,7 +205,11 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise StatementError(
                     f"{path}: [{name}] is for a device that is judged by its own description: see [api]"
                 )
-        moves = None if self.motion is None else fit({"motion": self.motion}, _Map, str(path), StatementError).motion
+        try:
+            motion = written_out(self.motion, self.values)
+        except ValueError as error:
+            raise StatementError(f"{path}: [motion] {error}") from error
+        moves = None if motion is None else fit({"motion": motion}, _Map, str(path), StatementError).motion
         ros = None if self.ros is None else read_ros_map(self.ros, str(path), StatementError)
         return Statement(**self.common(contract, path), motion_map=moves, ros_map=ros)
 

@@ -22,7 +22,8 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.motion_map import MotionMap, is_for
+from conformance.statement.motion_calls import named_by
+from conformance.statement.motion_map import MotionMap
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -244,7 +245,7 @@ def _check_map(declared: Statement, contract: Contract) -> None:
     calls = [("motion", call) for call in (declared.motion_map.calls if declared.motion_map else ())]
     calls += [("ros.operations", call) for call in (declared.ros_map.calls if declared.ros_map else ())]
     for table, call in calls:
-        if not any(is_for(call, label) for label in labels):
+        if not named_by([call], labels):
             near = difflib.get_close_matches(call, labels, 1, 0)
             raise StatementError(
                 f"[{table}] names {call!r}, which the description does not have"

@@ -17,7 +17,7 @@ from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import Operation, operations_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.motion_map import shape_of
+from conformance.statement.motion_calls import named_by
 from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.target.connecting import connection_of
 from conformance.target.describing import is_wsdl, soap_contract, trusting
@@ -198,7 +198,9 @@ class Device:
     def is_moved_by(self, operation: Operation) -> bool:
         """Return whether the motion map of the statement commands the device by an operation."""
         motion = self.statement.motion_map
-        return motion is not None and shape_of(operation.label) in {shape_of(call) for call, _ in motion.bodies}
+        return motion is not None and operation.label in named_by(
+            [call for call, _ in motion.bodies], [operation.label]
+        )
 
     def half(self, name: str) -> str:
         """Return this device's operation of a pair in the statement's [load.pairs]; any other name as it is."""

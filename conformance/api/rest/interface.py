@@ -38,6 +38,7 @@ class RestInterface:
         slow: operations that once took more than a second to respond.
         stop_device: stops a device by its motion map, and returns why it may still move, or an empty text; None: it has
             no map, or may not be moved.
+        preparation: what keeps the device ready to move, for all that move it by its map; None: nothing has moved it.
         values: what the survey of a described API knows for parameters and bodies, or None.
         looked: the exchanges by which the run has connected, before anything observed them.
         server: the Server field of the first response that had one; empty: none had.
@@ -61,6 +62,7 @@ class RestInterface:
     streams: set[str] = field(default_factory=set)
     slow: set[str] = field(default_factory=set)
     stop_device: Callable[[], str] | None = None
+    preparation: Any = None
     values: Any = None
     looked: list[Exchange] = field(default_factory=list)
     server: str = ""

@@ -71,7 +71,8 @@ def _refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
         soap = one.exchange is not None and is_soap(one.exchange)
         expected = "a fault" if soap else " or ".join(map(str, statuses)) or "4xx"
         found = one.exchange
-        holds = found is not None and is_refusal(found) and (soap or not statuses or found.response.status in statuses)
+        sure = soap or one.failed or not statuses or (found is not None and found.response.status in statuses)
+        holds = found is not None and sure and (one.failed or is_refusal(found))
         yield Case(holds, found, f"{expected} for {one.what}", cause=one.kind)
 
 

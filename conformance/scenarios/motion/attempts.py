@@ -104,7 +104,8 @@ def _tries_of(sender: _Sender) -> Iterator[Callable[[], Tried]]:
     if sender.mapped.binding.has_credentials:
         yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
     if sender.given.body is not None:
-        yield partial(sender.send_broken, away)
+        if not sender.is_form(away):  # nearly every text is a form
+            yield partial(sender.send_broken, away)
         for promised in (10, None):
             yield partial(sender.vanish, away, promised)
 
@@ -129,16 +130,22 @@ class _Sender:
         """Return whether the description forbids a command."""
         return self.mapped.binding.forbids(*self.mapped.call_of(self.given, values))
 
+    def is_form(self, values: dict[str, Any]) -> bool:
+        """Return whether a command is written as a form."""
+        return "form" in self.mapped.request_of(self.given, values).media_type
+
     def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Tried:
         """Send a command."""
         made = self.mapped.request_of(self.given, values, authorized=authorized)
-        return Tried(kind, what, self.mapped.send(made, authorized=authorized))
+        exchange = self.mapped.send(made, authorized=authorized)
+        return Tried(kind, what, exchange, self.mapped.has_failed(exchange))
 
     def send_broken(self, values: dict[str, Any]) -> Tried:
         """Send a command whose body is not in its syntax."""
         made = self.mapped.request_of(self.given, values)
         exchange = self.mapped.send(replace(made, body=made.body + b"}"))
-        return Tried("invalid", f"{self.what} whose body is not {self.mapped.binding.syntax}", exchange)
+        what = f"{self.what} whose body is not {self.mapped.binding.syntax}"
+        return Tried("invalid", what, exchange, self.mapped.has_failed(exchange))
 
     def vanish(self, values: dict[str, Any], promised: int | None) -> Tried:
         """Send a command of which some bytes are missing, and close the connection."""

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Protocol
-from urllib.parse import urlencode
+import re
+from typing import Any, Final, Protocol
 
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, validity
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.writing import xml_bytes
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.resources import matching
+from conformance.documents.writing import form_body, multipart_body, xml_bytes
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, parse
@@ -20,6 +24,10 @@ from conformance.documents.xml_values import NoElementError, node_of, value_of
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Outgoing
+
+_FORM: Final = "application/x-www-form-urlencoded"
+_MULTIPART: Final = "multipart/form-data"
+_NUMBER: Final = re.compile(r"-?\d+\.\d+(e-?\d+)?")
 
 
 class Binding(Protocol):
@@ -60,13 +68,18 @@ class JsonBinding:
 
     syntax = "JSON"
 
-    def __init__(self, api: RestInterface) -> None:
-        self._api = api
+    def __init__(self, api: RestInterface | None, contract: Contract | None = None) -> None:
+        self._api, self._contract = api, contract
+
+    @classmethod
+    def of(cls, contract: Contract) -> JsonBinding:
+        """Return how requests are made by a description, without a device."""
+        return cls(None, contract)
 
     @property
     def has_credentials(self) -> bool:
         """Whether the connection has any."""
-        return bool(self._api.client.connection.credentials.items)
+        return self._api is not None and bool(self._api.client.connection.credentials.items)
 
     def made(
         self,
@@ -80,12 +93,21 @@ class JsonBinding:
         """Return the request of a call."""
         method, _, path = call.partition(" ")
         fields: Headers = (("Accept", "application/json"),) if body is None and method == "GET" else ()
+        declared = matching(self._contract, method, path.partition("?")[0]) if self._contract else None
+        path = _with_whole_numbers(path, declared) if declared else path
         if body is None:
             return Outgoing(method, path, fields, b"")
+        media_type = _declared_type(media_type, declared)
+        given = declared.bodies.get(media_type) if declared else None
+        body = _whole(body, given.schema) if given else body
         if root:
             written = xml_bytes(body, root)
+        elif media_type == _MULTIPART:
+            media_type, written = multipart_body(body, given.encoding if given else None)
+        elif media_type == _FORM:
+            written = form_body(body, given.encoding if given else {})
         else:
-            written = json.dumps(body).encode() if media_type == JSON else urlencode(body).encode()
+            written = json.dumps(body).encode()
         return Outgoing(method, path, (("Content-Type", media_type),), written)
 
     def content(self, octets: bytes) -> Any:
@@ -94,8 +116,43 @@ class JsonBinding:
 
     def forbids(self, call: str, body: Any) -> bool:
         """Return whether the OpenAPI description forbids a call."""
+        if self._contract is None:
+            return False
         one = self.made(call, body)
-        return validity(self._api.run.contract, one.method, one.target, one.media_type, one.body).verdict == INVALID
+        return validity(self._contract, one.method, one.target, one.content_type, one.body).verdict == INVALID
+
+
+def _declared_type(wanted: str, declared: Operation | None) -> str:
+    """Return the media type in which a body is written: never JSON where the description has a form in its place."""
+    if wanted != JSON or declared is None or not declared.bodies or any(map(is_json, declared.bodies)):
+        return wanted
+    return next((name for name in (_FORM, _MULTIPART) if name in declared.bodies), wanted)
+
+
+def _with_whole_numbers(path: str, declared: Operation) -> str:
+    """Return a path with whole numbers where the description has integers."""
+    whole = {f"{{{one.name}}}" for one in declared.parameter("path") if kinds_of(one.schema) == {"integer"}}
+    parts, names = path.split("/"), declared.template.split("/")
+    if not whole or len(parts) != len(names):
+        return path
+    return "/".join(
+        str(round(float(part))) if name in whole and _NUMBER.fullmatch(part) else part
+        for part, name in zip(parts, names, strict=True)
+    )
+
+
+def _whole(value: Any, schema: Schema) -> Any:
+    """Return a value with whole numbers where its schema has integers: no map has another way to write them."""
+    if isinstance(value, float) and kinds_of(schema) == {"integer"}:
+        return round(value)
+    if not isinstance(value, dict):
+        return value
+    members: dict[str, Schema] = {}
+    for part in (schema, *(one for key in ("allOf", "anyOf", "oneOf") for one in schema.get(key, ()))):
+        members = {**part.get("properties", {}), **members} if isinstance(part, dict) else members
+    return {
+        name: _whole(one, members[name]) if isinstance(members.get(name), dict) else one for name, one in value.items()
+    }
 
 
 class SoapBinding:
@@ -161,4 +218,4 @@ def binding_of(api: RestInterface) -> Binding:
         NotPossibleError, NoAnswerError: see DescribedMessages.of().
     """
     messages = DescribedMessages.of(api)
-    return JsonBinding(api) if messages is None else SoapBinding(api, messages)
+    return JsonBinding(api, api.run.contract) if messages is None else SoapBinding(api, messages)

@@ -11,6 +11,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding, JsonBinding
+from conformance.scenarios.motion.preparing import Preparation
 from conformance.scenarios.motion.resting import at_rest, fastest
 from conformance.scenarios.motion.room import Room
 from conformance.scenarios.motion.templates import (
@@ -75,6 +76,9 @@ class MappedDevice:
         self.api, self.motion, self.clock = api, motion, clock
         self.binding: Binding = binding or JsonBinding(api)
         self.room = Room(motion)
+        if api.preparation is None:
+            api.preparation = Preparation(motion, self.binding, self._exchange, clock)
+        self.ready: Preparation = api.preparation
         self._answer: Any = None
         self._read_at, self._last = 0.0, Position()
         self.resting, self.rests = Resting(), False
@@ -126,8 +130,12 @@ class MappedDevice:
         self.clock.sleep(self._read_at + _PACE_S - self.clock.now())
         self._read_at = sent = self.clock.now()
         exchange, document = self.get(state.read)
+        values = positions_at(document, {name: one.at for name, one in state.axes.items() if not one.read}, state.axes)
+        for call in dict.fromkeys(one.read for one in state.axes.values() if one.read):
+            own = {name: one.at for name, one in state.axes.items() if one.read == call}
+            values |= positions_at(self.get(call)[1], own, state.axes)
+        values = values if len(values) == len(state.axes) else {}
         received = self.clock.now()
-        values = positions_at(document, {name: axis.at for name, axis in state.axes.items()}, state.axes)
         # What turns goes on beyond a whole turn.
         values = {name: state.axes[name].near(one, self._last.get(name, one)) for name, one in values.items()}
         self._last = values or self._last
@@ -155,6 +163,14 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
+        self.ready.keep()
+        exchange = self._exchange(made, **how)
+        if self.ready.lost(exchange):
+            self.ready.keep()
+            exchange = self._exchange(self.ready.with_lease(made), **how)
+        return exchange
+
+    def _exchange(self, made: Outgoing, **how: Any) -> Exchange:
         sent = self.clock.now()
         exchange = self.api.client.send(made.method, made.target, headers=made.headers, body=made.body, **how)
         self.room.slowest_s = max(self.room.slowest_s, self.clock.now() - sent)
@@ -185,6 +201,7 @@ class MappedDevice:
                 values |= quaternion_of(name, values[name], axis.angle) if axis.angle else {}
         elif isinstance(given, Velocity | Way):
             values = {**dict.fromkeys(self.drives.axes, 0.0), **values}
+        values = {**values, "lease": self.ready.lease}
         return filled(given.send, values, self._answer), filled(given.body, values, self._answer)
 
     def request_of(
@@ -192,13 +209,14 @@ class MappedDevice:
     ) -> Outgoing:
         """Return the request of a command; see call_of()."""
         self.rests = False
+        self.ready.keep()
         form = (given.media_type, given.root) if isinstance(given, Way) else ()
-        return self.binding.made(*self.call_of(given, values), *form, authorized=authorized)
+        return self.ready.with_lease(self.binding.made(*self.call_of(given, values), *form, authorized=authorized))
 
     def _sent(self, made: Outgoing, targets: Position, **how: Any) -> Command:
         sent = self.clock.now()
         exchange = self.send(made, **how)
-        return Command(sent, self.clock.now(), targets, exchange)
+        return Command(sent, self.clock.now(), targets, exchange, self.has_failed(exchange))
 
     def goto(self, targets: Mapping[str, float], ends: Mapping[str, float] | None = None) -> Command:
         """Send a move; ``ends``: where it must end, if not at the targets.
@@ -241,6 +259,16 @@ class MappedDevice:
             written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
         made = self.request_of(way or self.drives, written, authorized=authorized)
         return self._sent(made, wanted, authorized=authorized, fresh=fresh)
+
+    def has_failed(self, exchange: Exchange) -> bool:
+        """Return whether the content of a 2xx says that its request failed, as the map has it."""
+        failed = self.motion.failed
+        if failed is None or not exchange.response.ok:
+            return False
+        try:
+            return bool(at(self.binding.content(exchange.response.body), failed.at) != failed.is_not)
+        except NoValueError:
+            return False
 
     def note(self, exchange: Exchange) -> None:
         """Keep the response to an accepted move, if it can be read: a stop may name its id."""
@@ -359,7 +387,17 @@ class MappedDevice:
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
 
     def leave_at_rest(self) -> str:
-        """Stop what goes on, and see that the device rests; return why it may still move, or an empty text."""
+        """Stop what goes on, see that the device rests, and give it back; return why it may still move, or nothing."""
+        problem = self._left_at_rest()
+        try:
+            self.ready.end()
+        except (NotPossibleError, NotPermittedError) as error:
+            return problem or str(error)
+        except NoAnswerError as none:
+            return problem or f"{self._named(none.unanswered)}: {none}"
+        return problem
+
+    def _left_at_rest(self) -> str:
         problem = ""
         try:
             command = self.halt()

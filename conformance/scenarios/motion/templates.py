@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from conformance.statement.motion_map import NAME, Angle, Axis
+from conformance.statement.motion_calls import NAME, SIGNED, SIZE
+from conformance.statement.motion_map import Angle, Axis
 
 _PARTS: Final = ("x", "y", "z", "w")
 # The axis about which each angle turns.
@@ -30,6 +31,9 @@ def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
         NoValueError: a value is not known.
     """
     if isinstance(template, Mapping):
+        if template.keys() == SIGNED:
+            number = _value(template["sign_of"], values, answer)
+            return template["negative" if isinstance(number, int | float) and number < 0 else "positive"]
         return {key: filled(item, values, answer) for key, item in template.items()}
     if isinstance(template, list | tuple):
         return [filled(item, values, answer) for item in template]
@@ -45,6 +49,8 @@ def _value(name: str, values: Mapping[str, Any], answer: Any) -> Any:
     if name in values:
         return values[name]
     source, _, pointer = name.partition(":")
+    if pointer == SIZE and source in values:
+        return abs(values[source]) if isinstance(values[source], int | float) else values[source]
     if source == "goto" and answer is not None:
         return at(answer, pointer)
     raise NoValueError(f"the template's {{{name}}} is not known")

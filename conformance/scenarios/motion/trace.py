@@ -55,22 +55,24 @@ class Command:
         sent, answered: when.
         targets: positions, or velocities, by axis; empty for a stop.
         exchange: request and response.
+        failed: whether the content of a 2xx says that it failed.
     """
 
     sent: float
     answered: float
     targets: dict[str, float]
     exchange: Exchange
+    failed: bool = False
 
     @property
     def accepted(self) -> bool:
-        """Whether it was answered 2xx."""
-        return self.exchange.response.ok
+        """Whether it was answered 2xx, and did not fail by its content."""
+        return self.exchange.response.ok and not self.failed
 
     @property
     def refused(self) -> bool:
         """Whether the device refused it."""
-        return is_refusal(self.exchange)
+        return self.failed or is_refusal(self.exchange)
 
     def was_late(self, readings: Sequence[Reading]) -> bool:
         """Return whether its response came late, compared with readings: link or device held it back."""
@@ -206,11 +208,13 @@ class Tried:
         kind: beyond, invalid, incomplete or unauthorised.
         what: as a noun phrase.
         exchange: request and response; None: the connection was closed before a response could come.
+        failed: whether the content of a 2xx says that it failed.
     """
 
     kind: str
     what: str
     exchange: Exchange | None
+    failed: bool = False
 
 
 @dataclass(frozen=True)

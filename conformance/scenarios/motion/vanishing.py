@@ -45,8 +45,10 @@ def _vanished(mapped: MappedDevice, way: str) -> Drive:
     made = with_room(mapped, [_speeds(mapped, name)], drives.settle_s + _DRIVEN_S + rests_s)[0]
     commands, readings = _driven(mapped, made, drives.settle_s + _DRIVEN_S)
     with ExitStack() as links:
+        links.callback(mapped.ready.speak)
         if way in {CLOSED, HALF_OPEN} and commands[-1].accepted:
             commands.append(_unread(mapped, made, commands[-1], links, close=way == CLOSED))
+        mapped.ready.fall_silent()
         rests_at = commands[-1].answered + rests_s
         if way != POLLING:
             mapped.clock.sleep(rests_at - mapped.clock.now())

@@ -58,7 +58,7 @@ class Api:
 
     def __init__(self, device, clock, takes_s):
         self.device, self.clock, self.client, self.takes_s = device, clock, self, takes_s
-        self.stop_device = None
+        self.stop_device = self.preparation = None
 
     def send(self, method, path, *, headers=(), body=b"", **_):
         self.clock.sleep(self.takes_s() / 2)

@@ -1,0 +1,159 @@
+"""What a device wants before it moves, and after: a lease that is kept, and commands such as enable and home."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from conformance.observe.clock import Clock
+from conformance.scenarios.motion.binding import Binding
+from conformance.scenarios.motion.templates import NoValueError, at, filled
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_map import MotionMap, Step
+from conformance.transport.client import is_drafting
+from conformance.transport.exchange import Exchange, Outgoing
+
+# Of the time between two renewals: a lease is renewed after that part.
+_SOON: Final = 0.5
+_LOOKS_S: Final = 0.05
+#: Statuses by which a device says that it wants a lease: Conflict, Locked, Precondition Required.
+WANTS_LEASE: Final = frozenset({409, 423, 428})
+
+
+class Preparation:
+    """Keeps a device ready to move: begins, keeps, and ends.
+
+    Args:
+        motion: the map.
+        binding: how calls become requests.
+        send: sends a request and returns the exchange.
+        clock: the run's.
+
+    Attributes:
+        lease: its value; "held" where it has none; empty: there is no lease now.
+    """
+
+    def __init__(self, motion: MotionMap, binding: Binding, send: Callable[[Outgoing], Exchange], clock: Clock) -> None:
+        self._motion, self._binding, self._send, self._clock = motion, binding, send, clock
+        self._busy = False
+        self._is_ready = not (motion.lease or motion.before)
+        self._kept_s = 0.0
+        self.lease = ""
+        self._is_silent = False
+
+    def keep(self) -> None:
+        """Make the device ready if it is not, and renew the lease if it is time for that.
+
+        Raises:
+            NotPossibleError: the device refuses it.
+            NoAnswerError: there is no response.
+        """
+        if self._busy or self._is_silent or is_drafting():
+            return
+        self._busy = True
+        try:
+            lease = self._motion.lease
+            if lease and self.lease and lease.renew and self._clock.now() >= self._kept_s + _SOON * lease.every_s:
+                exchange = self._called(lease.renew, lease.renew_body)
+                self._kept_s = self._clock.now()
+                if not exchange.response.ok:
+                    # It has ended, as after a while in which nothing was sent.
+                    self.lease = ""
+            if lease and not self.lease:
+                self._acquire()
+            if not self._is_ready:
+                self._is_ready = True
+                self._steps(self._motion.before)
+        finally:
+            self._busy = False
+
+    def fall_silent(self) -> None:
+        """Renew nothing from now on, as a client that has vanished."""
+        self._is_silent = True
+
+    def speak(self) -> None:
+        """Renew the lease again."""
+        self._is_silent = False
+
+    def lost(self, exchange: Exchange) -> bool:
+        """Return whether a response says that the lease is no more, which a silent client cannot have renewed."""
+        lease = self._motion.lease
+        wants = exchange.response.status in WANTS_LEASE and not self._busy
+        if not (lease and wants and self._clock.now() > self._kept_s + lease.every_s):
+            return False
+        self.lease = ""
+        return True
+
+    def with_lease(self, made: Outgoing) -> Outgoing:
+        """Return a request with the lease, where it goes into a header."""
+        lease = self._motion.lease
+        if not (lease and self.lease and lease.header):
+            return made
+        others = tuple(one for one in made.headers if one[0] != lease.header)
+        return Outgoing(made.method, made.target, (*others, (lease.header, self.lease)), made.body)
+
+    def end(self) -> None:
+        """Send what comes last, and release the lease.
+
+        Raises:
+            NotPossibleError: the device refuses it.
+            NoAnswerError: there is no response.
+        """
+        if self._busy:
+            return
+        if is_drafting():
+            self._draft_end()
+            return
+        self._busy = True
+        try:
+            self._steps(self._motion.after)
+            if self._motion.lease and self.lease and self._motion.lease.release:
+                self._called(self._motion.lease.release, None)
+        finally:
+            self._busy, self.lease = False, ""
+            self._is_ready = not self._motion.before
+
+    def _draft_end(self) -> None:
+        """Draft what ends the use of the device, for whoever sends it if this process is killed."""
+        lease = self._motion.lease
+        if not lease or self.lease:
+            for step in self._motion.after:
+                self._called(step.send, step.body)
+            if lease and lease.release:
+                self._called(lease.release, None)
+
+    def _acquire(self) -> None:
+        lease = self._motion.lease
+        if lease is None:
+            return
+        exchange = self._called(lease.acquire, lease.body)
+        if not exchange.response.ok:
+            raise NotPossibleError(f"[motion.lease] {lease.acquire} got {exchange.came}")
+        self._kept_s, self.lease = self._clock.now(), "held"
+        if lease.token:
+            try:
+                self.lease = str(at(self._binding.content(exchange.response.body), lease.token))
+            except NoValueError as error:
+                raise NotPossibleError(f"[motion.lease] token: {error}") from error
+
+    def _steps(self, steps: Iterable[Step]) -> None:
+        for step in steps:
+            exchange = self._called(step.send, step.body)
+            if not exchange.response.ok:
+                raise NotPossibleError(f"[motion] {step.send} got {exchange.came}")
+            until = self._clock.now() + step.within_s
+            while step.read and self._shown(step) != step.shows:
+                if self._clock.now() > until:
+                    raise NotPossibleError(f"[motion] {step.read} does not show {step.shows!r} after {step.send}")
+                self._clock.sleep(_LOOKS_S)
+
+    def _shown(self, step: Step) -> Any:
+        exchange = self._called(step.read, None)
+        try:
+            return at(self._binding.content(exchange.response.body), step.at)
+        except NoValueError:
+            return None
+
+    def _called(self, call: str, body: Any) -> Exchange:
+        values = {"lease": self.lease}
+        return self._send(self.with_lease(self._binding.made(filled(call, values), filled(body, values))))
