@@ -32,7 +32,7 @@ from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.result.files import stops_lines, with_unstopped
 from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
-from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, CliOptions
+from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, STAGES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings, SettingsError
 from loadtests.settings.settle import (
     AGAINST_LOOKS,
@@ -153,6 +153,12 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--client", "clients", multiple=True, type=click.Choice(CLIENTS), help="Only this client.")
 @options_of(Group.EFFORT)
 @click.option("--rate", type=float, help=f"Open model: requests per second (default {DEFAULT_RATE:g}).")
+@click.option(
+    "--stages",
+    callback=STAGES,
+    metavar="R:S,…",
+    help="Open model: change to the rate R in S, as in 10:30s,100:1m,100:5m,10:0s; the first stage begins at 0.",
+)
 @click.option("--users", type=int, help="Closed model: users, each of which waits for its response.")
 @options_of(Group.EFFORT, rare=True)
 @click.option(

@@ -144,7 +144,8 @@ def refused(device: Device, operation: Operation) -> str:
 
 #: What a scenario decides by itself, or what needs requests at set times; by name in Python, with the value by default.
 _OTHERWISE = {
-    "operations": (), "rate": None, "arrivals": "constant", "knee": False, "against": None, "restart_command": None,
+    "operations": (), "rate": None, "stages": (), "arrivals": "constant", "knee": False, "against": None,
+    "restart_command": None,
 }  # fmt: skip
 
 

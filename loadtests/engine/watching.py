@@ -25,6 +25,8 @@ _OFTEN_S = 0.2
 def tell_plan(plan: Plan, pacing: str, tell: Callable[[str], None]) -> None:
     """Say what will be measured, and how."""
     load = f"{plan.load.rate:g} requests/s" if plan.open_model else f"{plan.load.users} users"
+    if plan.load.stages:
+        load = f"{len(plan.load.stages)} stages of up to {load}"
     tell(
         f"measuring {'a scenario' if plan.scenario else ', '.join(plan.operations)} over "
         f"{' and '.join(plan.interfaces)} at {load} for {plan.load.duration_s:g} s after {plan.load.warmup_s:g} s of "

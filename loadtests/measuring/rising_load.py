@@ -46,7 +46,9 @@ class RisingLoad:
         """Offer a rate over an interface; None if the run was stopped."""
         if self.stopped():
             return None
-        load = replace(self.first.load, rate=rate, users=None, duration_s=self.settings.steps.step_s, warmup_s=0.0)
+        load = replace(
+            self.first.load, rate=rate, users=None, stages=(), duration_s=self.settings.steps.step_s, warmup_s=0.0
+        )
         plan = replace(
             self.first,
             interfaces=(interface,),

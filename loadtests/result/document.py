@@ -34,6 +34,7 @@ from loadtests.statistics.measured import Measured
 from loadtests.statistics.overload import overload
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import between_runs
+from loadtests.statistics.stages import stage_figures
 
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
@@ -102,6 +103,7 @@ def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[
         "model": "open" if plan.open_model else "closed",
         "arrivals": load.arrivals if plan.open_model else None,
         "rate": load.rate,
+        "stages": [[rate, seconds] for rate, seconds in load.stages],
         "users": load.users,
         "duration_s": load.duration_s * parts,
         "warmup_s": load.warmup_s,
@@ -204,6 +206,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "overload": overloaded,
         "generator": generator,
         "workers": workers,
+        "stages": stage_figures(measured),
         "series": series,
         "comparisons": comparisons,
         "heat_map": modes.heat_map(measured),

@@ -1,6 +1,6 @@
 """The summary of a run, for the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from conformance.commandline.terminal import inert
@@ -38,6 +38,7 @@ def summary(document: dict[str, Any]) -> str:
             f"{_ms(response['p99'])}"
         )
     lines += _counts(document["counts"])
+    lines += _stages(document["stages"])
     lines += _medians(document)
     lines += _end_to_end(document.get("end_to_end"))
     lines += _against(document.get("against"))
@@ -76,6 +77,23 @@ def _counts(counts: Mapping[str, Any]) -> list[str]:
     ]
     always = {"asked", "sent", "answered", "failed", "in the series"}
     return [f"{name:18} {number:9,}  {said}".rstrip() for name, number, said in rows if number or name in always]
+
+
+def _stages(stages: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what each stage of a changing load showed."""
+    lines = []
+    for each in stages:
+        times = ", ".join(
+            f"{name} {each['response_ms'][name]:.3f}"
+            for name in ("p50", "p95", "p99", "max")
+            if each["response_ms"][name] is not None
+        )
+        lines.append(
+            f"stage {each['stage']}, {each['from_rate']:g} to {each['to_rate']:g}/s in {each['seconds']:g} s, "
+            f"{each['operation']} over {each['interface']} ({each['client']}): {each['answered']:,} answered, "
+            f"{each['failed']:,} failed{f'; response {times} ms' if times else ''}"
+        )
+    return lines
 
 
 def _medians(document: dict[str, Any]) -> list[str]:

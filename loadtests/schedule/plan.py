@@ -13,7 +13,7 @@ Three interfaces take turns in the same way, in sextets; two robots over one int
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import count, product
+from itertools import accumulate, count, product
 from typing import Any, Self
 
 import msgspec
@@ -50,10 +50,12 @@ class Load:
     """How many requests the robot gets, and for how long.
 
     Attributes:
-        rate: arrivals per second over all workers (open model); None in the closed model.
+        rate: arrivals per second over all workers (open model), at most; None in the closed model.
         users: users that each wait for their response (closed model).
         arrivals: `constant` or `poisson`.
         seed: fixes schedule, payloads and intervals.
+        stages: rates, and the seconds in which the rate changes to each from the one before, at first from 0; empty:
+            the rate is the same throughout.
     """
 
     rate: float | None
@@ -62,6 +64,22 @@ class Load:
     warmup_s: float
     arrivals: str
     seed: int
+    stages: tuple[tuple[float, float], ...] = ()
+
+    def stage_at(self, moment_s: float) -> int:
+        """Return the number of the stage, from 0, at a moment since the beginning of the measured part, in seconds."""
+        ends = accumulate(seconds for _, seconds in self.stages)
+        return min(sum(moment_s >= end for end in ends), max(0, len(self.stages) - 1))
+
+    def rate_at(self, moment_s: float) -> float:
+        """Return the rate at a moment since the beginning of the measured part, in seconds."""
+        if not self.stages:
+            return self.rate or 0.0
+        number = self.stage_at(moment_s)
+        target, seconds = self.stages[number]
+        before = self.stages[number - 1][0] if number else 0.0
+        into = moment_s - sum(seconds for _, seconds in self.stages[:number])
+        return before + (target - before) * min(1.0, max(0.0, into / seconds)) if seconds else target
 
 
 @dataclass(frozen=True)
@@ -225,7 +243,8 @@ class Plan:
         placed = []
         for index, segment in enumerate(self._rounds):
             start, end = (int((origin + self.block_s * edge) * _NS) for edge in (index, index + 1))
-            placed.append(replace(segment, start_ns=start, end_ns=end))
+            rate = self.load.rate_at((index + 0.5) * self.block_s)
+            placed.append(replace(segment, start_ns=start, end_ns=end, rate=rate))
         return placed
 
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:

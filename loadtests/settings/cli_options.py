@@ -1,5 +1,6 @@
 """The options of the command line."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
@@ -32,6 +33,7 @@ class CliOptions:
     generator: Generator = field(default_factory=Generator)
     rate: float | None = None
     users: int | None = None
+    stages: tuple[tuple[float, float], ...] = ()
     duration_s: float | None = None
     warmup_s: float | None = None
     arrivals: str = "constant"
@@ -78,4 +80,16 @@ def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Contex
     return callback
 
 
+_UNITS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0}
+_STAGE = re.compile(r"(\d+(?:\.\d+)?):(\d+(?:\.\d+)?)(ms|s|m|h)")
+
+
+def _stages(text: str) -> tuple[tuple[float, float], ...]:
+    found = [_STAGE.fullmatch(part.strip()) for part in text.split(",")] if text else []
+    if not all(found):
+        raise ValueError(text)
+    return tuple((float(each[1]), float(each[2]) * _UNITS[each[3]]) for each in found if each)
+
+
+STAGES = _parsed(_stages, "a list of stages such as 10:30s,100:1m,10:30s")
 SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")

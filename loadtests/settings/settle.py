@@ -36,7 +36,19 @@ def contradiction(options: CliOptions) -> str | None:
             return f"{name} {value:g} is out of range: above {low:g}, at most {high:g}"
     if options.warmup_s is not None and not 0 <= options.warmup_s <= _MOST_DURATION_S:
         return f"--warmup {options.warmup_s:g} is out of range: 0 or more"
-    return _restarting(options)
+    return _in_stages(options) or _restarting(options)
+
+
+def _in_stages(options: CliOptions) -> str | None:
+    """Return what is wrong with the stages."""
+    if not options.stages:
+        return None
+    given = {"rate": options.rate, "users": options.users, "duration": options.duration_s}
+    if other := next((name for name, value in given.items() if value is not None), None):
+        return f"--stages says rates and durations: leave out --{other}"
+    if max(rate for rate, _ in options.stages) <= 0 or sum(seconds for _, seconds in options.stages) <= 0:
+        return "--stages needs a rate and a duration above 0"
+    return None
 
 
 def _restarting(options: CliOptions) -> str | None:
@@ -84,6 +96,9 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
     wrong = contradiction(options)
     if wrong is not None:
         raise SettingsError(wrong)
+    if options.stages:
+        rates, lasting = zip(*options.stages, strict=True)
+        options = replace(options, rate=max(rates), duration_s=sum(lasting), warmup_s=options.warmup_s or 0.0)
     allowed = _Allowed.of(statement, moves=target.moves)
     # Defaults are lowered to what is allowed; options that exceed it are refused.
     usual = target.rate_of_levels or DEFAULT_RATE
@@ -102,6 +117,7 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
             warmup_s=DEFAULT_WARMUP_S if options.warmup_s is None else options.warmup_s,
             arrivals=options.arrivals,
             seed=options.seed,
+            stages=options.stages,
         ),
         steps=_steps(options, statement, moves=target.steps_move),
         repeats=options.repeats,

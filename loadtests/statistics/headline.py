@@ -132,6 +132,9 @@ def _rank(entry: SoapOverRest | Series) -> tuple[bool, int]:
 def _how(entry: SoapOverRest | Series | Change, found: Found) -> str:
     """Return the client and the load, as the end of a sentence."""
     load = found.plan.load
+    if load.stages:
+        rates = [rate for rate, _ in load.stages]
+        return f"{entry.client} client, {len(rates)} stages of up to {max(rates):g} requests/s"
     if load.users is None:
         return f"{entry.client} client, {load.rate:g} requests/s"
     users = f"{entry.client} client, {load.users} user{'' if load.users == 1 else 's'}"

@@ -115,7 +115,7 @@ def _above(histogram: Histogram, most_ms: float) -> int:
 def _rate(measured: Measured, name: SeriesName, blocks: Sequence[Block]) -> float | None:
     """Return the requests per second of a series: as scheduled, or in the closed model as sent."""
     plan = measured.plan
-    if plan.load.rate is not None:
+    if plan.load.rate is not None and not plan.load.stages:
         offered = len(plan.offered(name[1], name[2]))
         return plan.load.rate * share_of_requests(plan.operations.index(name[0]), plan.weights, offered)
     seconds = sum(block.segment.active_s for block in blocks)

@@ -158,6 +158,8 @@ def _same_load(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str,
             f"{names[0]} was measured with {old.get('users')} users and {names[1]} with {new.get('users')}"
         )
     _same_cap(old, new, names)
+    if (old.get("stages") or []) != (new.get("stages") or []):
+        raise ResultsIncompatibleError(f"{names[0]} and {names[1]} were measured with different stages")
     scenarios = [plan.get("scenario") for plan in (old, new)]
     if scenarios[0] != scenarios[1]:
         raise ResultsIncompatibleError(f"{names[0]} and {names[1]} were measured with different scenarios")

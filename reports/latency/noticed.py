@@ -133,6 +133,8 @@ def _limits(result: Mapping[str, Any], failed: bool) -> Iterator[str]:  # noqa: 
     plan = result["plan"]
     users = f"{plan.get('users')} user{'' if plan.get('users') == 1 else 's'}"
     load = f"at {rate(plan['rate'])} requests/s" if plan.get("rate") else f"with {users}"
+    if plan.get("stages"):
+        load = f"in {len(plan['stages'])} stages of up to {rate(plan['rate'])} requests/s"
     near = (result["environment"].get("robot") or {}).get("same_machine")
     network = " on the robot's own machine: a network adds its delay" if near else ""
     yield f"{'' if failed else 'No request failed. '}Measured {load} for {plan['duration_s']:g} s{network}."
