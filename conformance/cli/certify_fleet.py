@@ -25,7 +25,7 @@ PARALLEL = 4
 # Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
 _FOR_ALL = (
     "profile", "classes", "pack", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
-    "key", "trust_hosts",
+    "key", "trust_hosts", "select", "exclude",
 )  # fmt: skip
 _OWN = ("fleet", "parallel", "out", "allow_motion", "progress", "as_json")
 

@@ -66,11 +66,12 @@ def _rule(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
         said = f"Class {case.class_name}: {title}" if title else f"The verdict of {case.name}"
         return {"id": case.rule, "shortDescription": {"text": _text(said)}}
     page = page_of(requirement["source"])
-    source = f"Source: {requirement['source']}"
+    source = f"Source: {requirement['source']}."
+    fix = f" How to fix it: {requirement['fix']}" if "fix" in requirement else ""
     return {
         "id": case.rule,
         "shortDescription": {"text": _text(requirement["text"])},
-        "help": {"text": _text(f"{requirement['text']} {source}")},
+        "help": {"text": _text(f"{requirement['text']} {source}{fix}")},
         **({"helpUri": page} if page else {}),
         "defaultConfiguration": {"level": "error" if requirement["level"] == "MUST" else "warning"},
         "properties": {"tags": [case.class_name, requirement["level"], requirement["verdict"]]},
