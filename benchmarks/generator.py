@@ -111,7 +111,11 @@ def open_model(port: int, seconds: float, rounds: int) -> bool:
     met = True
     for rate in (50, 200, 500, 4000, 6000):
         found = [wire(port, seconds, "--rate", rate) for _ in range(rounds)]
-        runs = [document["generator"] for document in found if document["generator"]["lag_ms"]["p50"] is not None]
+        runs = [
+            document["generator"] | document["counts"]
+            for document in found
+            if document["generator"]["lag_ms"]["p50"] is not None
+        ]
         if not runs:
             return report(f"open model, {rate}/s: nothing started on time: {found[0]['invalid_because']}", met=False)
         lags = [run["lag_ms"]["p99"] for run in runs if run["lag_ms"]["p99"] is not None]  # null below 1,000 requests
@@ -137,7 +141,7 @@ def closed_model(port: int, seconds: float, rounds: int, users: int = 20) -> boo
     """Compare the throughput of closed-model users with FastHttpUser's."""
     ours, theirs = [], []
     for _ in range(rounds):
-        ours.append(wire(port, seconds, "--users", users)["generator"]["achieved_rate"])
+        ours.append(wire(port, seconds, "--users", users)["counts"]["achieved_rate"])
         theirs.append(fast_http_user(f"http://127.0.0.1:{port}", users, seconds))
     ratio = statistics.median(ours) / statistics.median(theirs)
     rates = f"wire {statistics.median(ours):.0f}/s, FastHttpUser {statistics.median(theirs):.0f}/s"

@@ -142,14 +142,14 @@ def alike(seconds: float, rate: float) -> bool:
                 *("--operation", "GET /state", "--rate", f"{rate:g}", "--duration", f"{seconds:g}"),
                 *("--processes", workers, "--expect-workers", workers),
             )
-            told, series = found["generator"], found["series"][0]
+            told, series = found["counts"], found["series"][0]
             reported = sum(worker["requests"] for worker in found["workers"])
-            balanced = balanced and told["scheduled"] == told["completed"] and len(found["workers"]) == workers
+            balanced = balanced and told["asked"] == told["answered"] and len(found["workers"]) == workers
             medians.append(series["ci95_ms"]["p50"])
             print(
-                f"alike: {workers} workers, {told['scheduled']:,} due, {told['completed']:,} answered, {reported:,} "
+                f"alike: {workers} workers, {told['asked']:,} due, {told['answered']:,} answered, {reported:,} "
                 f"reported; median {series['service_ms']['p50']:.3f} ms (95 % {medians[-1][0]:.3f} to "
-                f"{medians[-1][1]:.3f}), lag {told['lag_ms']['p50']:.3f} ms"
+                f"{medians[-1][1]:.3f}), lag {found['generator']['lag_ms']['p50']:.3f} ms"
             )
     overlap = max(low for low, _ in medians) <= min(high for _, high in medians)
     print(f"alike: the medians' intervals {'overlap' if overlap else 'do NOT overlap'}")
@@ -158,16 +158,17 @@ def alike(seconds: float, rate: float) -> bool:
 
 def balance(found: dict[str, Any], reached: int) -> bool:
     """Return whether the counts agree: what was due, what workers reported, and what the server received."""
-    told = found["generator"]
-    due, answered, failed, dropped = (told[name] for name in ("scheduled", "completed", "errors", "dropped"))
+    told = found["counts"]
+    due, answered, failed, dropped = told["asked"], told["answered"], sum(told["failed"].values()), told["not_sent"]
     reported = sum(worker["requests"] for worker in found["workers"])
     other = 1 + sum(map(_after_pauses, found["series"]))  # one call looked whether the robot answers
+    lag_ms = found["generator"]["lag_ms"]["p50"]
     good = due == answered + failed + dropped and reported == answered + failed
     good = good and answered <= reached - other <= answered + failed  # of those that failed some may have reached it
     print(
         f"run: {due:,} due; {answered:,} answered, {failed:,} failed, {dropped:,} never started; {reported:,} in the "
         f"reports of {len(found['workers'])} workers; {reached:,} seen by the server, {other:,} of them before and "
-        f"after the run; lag {told['lag_ms']['p50']:.2f} ms median: the books {'balance' if good else 'do NOT balance'}"
+        f"after the run; lag {lag_ms:.2f} ms median: the books {'balance' if good else 'do NOT balance'}"
     )
     return good
 

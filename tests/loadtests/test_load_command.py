@@ -256,7 +256,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
         ("--operation delivery", "--allow-motion"),
         ("--thresholds none.toml", "No such file"),
         ("none.toml", "No such file"),
-        ("--step-rates 1,x", "not a list of rates"),
+        ("--stages 1,x", "not a list of stages"),
     ],
 )
 def test_usage_errors_touch_no_robot(load, options, message):
