@@ -3,6 +3,8 @@
 #
 # Everything comes from the environment, so that no job ever pastes a value into a script:
 #   ROAAS_STATEMENT         the robot's implementation conformance statement (a file)
+#   ROAAS_URL               address of the device's own description, or of its WSDL: no statement is needed then
+#   ROAAS_CALL              what may be called beside what reads, as --call has it: a pattern in each line
 #   ROAAS_REST, ROAAS_PUBLISHERS_WSDL, ROAAS_SUBSCRIBERS_WSDL    its addresses, where the statement does not name them
 #   ROAAS_PROFILE           paper or full
 #   ROAAS_CLASSES           conformance classes, with blanks in between
@@ -41,7 +43,11 @@ case ${ROAAS_ALLOW_MOTION:-false} in
         exit 2
         ;;
 esac
-if [[ -n ${ROAAS_STATEMENT:-} ]]; then options+=(-- "$ROAAS_STATEMENT"); fi
+while IFS= read -r pattern; do add call "$pattern"; done <<<"${ROAAS_CALL:-}"
+options+=(--)
+for target in "${ROAAS_STATEMENT:-}" "${ROAAS_URL:-}"; do
+    if [[ -n $target ]]; then options+=("$target"); fi
+done
 
 # What an earlier run left is not taken for this one's.
 mkdir -p -- "$out"

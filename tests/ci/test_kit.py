@@ -132,6 +132,17 @@ def test_a_good_robot_is_green_and_a_broken_one_red(programs, good, broken, tmp_
     assert "Not conformant" in (tmp_path / "summary").read_text(encoding="utf-8")
 
 
+def test_a_device_is_judged_by_its_description_without_a_statement(programs, good, tmp_path):
+    url = f"{good.rest}/openapi.json"
+    called = "PUT /robot/velocity/\nDELETE /robot/navigation/action/goal/"
+    given = {"url": url, "call": called, "classes": "description", "effort": "quick", "allow-motion": "true"}
+    done = on_github(programs, tmp_path, **given)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((tmp_path / "roaas-results" / "result.json").read_text(encoding="utf-8"))
+    for pattern in called.splitlines():
+        assert pattern in str(result["command"])
+
+
 def test_a_robot_that_is_absent_or_hangs_or_could_not_be_judged_is_red(programs, good, absent, hanging, tmp_path):
     folders = {name: tmp_path / name for name in ("absent", "hanging", "unjudged")}
     for folder in folders.values():
