@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from conformance.contract.described import MOTION
 from conformance.measures.samples import SEVERAL, Sample, slope
-from conformance.rules.motion.judging import measured
 from conformance.scenarios.motion.attempts import attempts_at_rest
+from conformance.scenarios.motion.measuring import measured
 from conformance.scenarios.motion.moves import stops, targets
 from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
 from conformance.scenarios.motion.vanishing import WAYS, vanishing
@@ -88,7 +88,7 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     worst: tuple[float, str, str] | None = None
     count = 0
     for drive in _drives(recordings, velocities):
-        begun = drive.commands[0].answered + (motion.velocity.settle_s if motion.velocity else 0.0)
+        begun = drive.settled(motion.velocity.settle_s if motion.velocity else 0.0)
         seen = [one for one in drive.under_way if one.sent >= begun]
         for name, wanted in drive.wanted.items():
             found = measured(seen, name, motion) if wanted else None

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
-from conformance.measures.samples import LATE, SEVERAL, longest_s, usual_s
+from conformance.measures.samples import SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, Resting, middle_of
+from conformance.scenarios.motion.measuring import measured
+from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.case import Case
 
-# A reading is late if it takes longer than usual, and more than this share of the drive.
-_SHARE = 0.1
-# A velocity is measured over so long at least, s.
-_LAPSE_S = 0.1
-# And where it is seen to be renewed, s.
+# A velocity is seen to be renewed over so long, s.
 _RENEWED_S = 0.35
 # A velocity that is renewed does not fall to this part of it in between.
 _LULL = 0.5
@@ -73,10 +70,17 @@ def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
     yield Case(not apart, goal.exchange, expected, observed=found)
 
 
+def tries_of(drives: Sequence[Drive]) -> Iterable[list[Drive]]:
+    """Return all tries of each drive: one that a slow link spoilt is made again, later."""
+    found: dict[str, list[Drive]] = {}
+    for drive in drives:
+        found.setdefault(drive.what, []).append(drive)
+    return found.values()
+
+
 def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drove as drives want it; one that a slow link broke off is made again."""
-    for _, group in itertools.groupby(drives, key=lambda drive: drive.what):
-        tries = list(group)
+    for tries in tries_of(drives):
         # What was refused counts each time.
         shown = [
             one
@@ -99,7 +103,7 @@ def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.named}")
         return
     first = drive.commands[0]
-    seen = [one for one in drive.under_way if one.sent >= first.answered + motion.velocity.settle_s]
+    seen = [one for one in drive.under_way if one.sent >= drive.settled(motion.velocity.settle_s)]
     for name, wanted in drive.wanted.items():
         found = measured(seen, name, motion)
         if found is None:
@@ -139,41 +143,6 @@ def _slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | N
     """Return the least of the medians of several readings in a row, in the direction that is wanted."""
     seen = [math.copysign(1, wanted) * one.speeds[name] for one in readings if name in one.speeds]
     return min((median(seen[index : index + SEVERAL]) for index in range(len(seen) - SEVERAL + 1)), default=None)
-
-
-def measured(readings: list[Reading], name: str, motion: MotionMap) -> float | None:
-    """Return a velocity by some readings, in units per second; None if they do not show it."""
-    speed = motion.velocity.axes[name] if motion.velocity else None
-    if speed is None or not speed.of:
-        speeds = [one.speeds[name] for one in readings if one.speeds]
-        return median(speeds) if len(speeds) >= SEVERAL else None
-    # When a position was read of which the response came late, nobody knows.
-    late_s = max(LATE * usual_s(readings), _SHARE * (readings[-1].sent - readings[0].sent)) if readings else 0.0
-    seen = [
-        ((one.sent + one.received) / 2, one.values[speed.of])
-        for one in readings
-        if one.values and one.received - one.sent <= late_s
-    ]
-    if len(seen) < 2 * SEVERAL or seen[-1][0] - seen[0][0] < _LAPSE_S:
-        return None
-    # The median of the slopes between readings (Theil and Sen), of which no single reading decides anything.
-    half_s = (seen[-1][0] - seen[0][0]) / 2
-    slopes = [
-        (there - here) / (later - first)
-        for (first, here), (later, there) in itertools.combinations(seen, 2)
-        if later - first >= half_s
-    ]
-    return median(slopes) / speed.scale
-
-
-def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting: Resting) -> float:
-    """Return how far off a velocity may be for the noise of some readings alone, in units per second."""
-    speed = motion.velocity.axes[name] if motion.velocity else None
-    if speed is not None and speed.of in resting.axes:
-        places = [(one.sent, one.values[speed.of]) for one in readings if one.values]
-        return resting.axes[speed.of].slope_room(places) / speed.scale
-    found = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
-    return resting.speeds[name].room(found) if name in resting.speeds else 0.0
 
 
 def named(position: dict[str, float]) -> str:

@@ -7,18 +7,8 @@ import math
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL
-from conformance.rules.motion.judging import (
-    ALL,
-    at,
-    legs_of,
-    measured,
-    moved_axis,
-    named,
-    off,
-    reached,
-    stopped,
-    usable,
-)
+from conformance.rules.motion.judging import ALL, at, legs_of, moved_axis, named, off, reached, stopped, usable
+from conformance.scenarios.motion.measuring import measured
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.several import several_clients, several_drivers

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
-from conformance.rules.motion.judging import at, driven, is_each_late, measured, must_rest_from, noise_of, off, went_on
+from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, tries_of, went_on
+from conformance.scenarios.motion.measuring import measured, noise_of
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, velocities
@@ -44,8 +44,8 @@ def stopped(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether velocity 0 brings the device to rest in time."""
     if motion.velocity is None:
         return
-    for _, group in itertools.groupby(trace, key=lambda drive: drive.what):
-        ended = [(drive, drive.end) for drive in group if drive.end is not None]
+    for tries in tries_of(trace):
+        ended = [(drive, drive.end) for drive in tries if drive.end is not None]
         excused = not is_each_late([(end, drive.readings) for drive, end in ended])
         for drive, end in ended:
             yield from _ended(drive, end, motion.velocity.settle_s, motion, excused=excused)
@@ -80,7 +80,8 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
         due = last.answered + within_s + longest_s(drive.readings)
-        moved = _at_rest([one for one in drive.after if one.sent >= due], drive, motion)
+        seen_from = due if drive.rested is None else min(due, drive.rested)
+        moved = _at_rest([one for one in drive.after if one.sent >= seen_from], drive, motion)
         moved = moved or _still_driven(drive, due, motion.velocity.hold_s, motion) or moved
         yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.named})")
 

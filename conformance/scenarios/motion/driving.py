@@ -18,13 +18,16 @@ _BACK_S: Final = 20.0
 _LEARNED_S: Final = 0.5
 
 
-def with_room(mapped: MappedDevice, choices: Sequence[Mapping[str, float]], lasts_s: float) -> list[Position]:
+def with_room(
+    mapped: MappedDevice, choices: Sequence[Mapping[str, float]], lasts_s: float, *, slower: float = 1.0
+) -> list[Position]:
     """Bring the device to rest where it can be driven at any of several velocities.
 
     Args:
         mapped: the device.
         choices: velocities by name; one of them will be commanded.
         lasts_s: from the first command until the device rests again, if every response comes at once, s.
+        slower: by how much they may be multiplied rather than that the device is moved.
 
     Returns:
         The same velocities, lower where the limits leave no room for such a drive.
@@ -39,6 +42,9 @@ def with_room(mapped: MappedDevice, choices: Sequence[Mapping[str, float]], last
     if not mapped.rests:
         mapped.come_to_rest()
     here = mapped.where()
+    from_here = mapped.room.share_from(here, choices, lasts_s)
+    if from_here and from_here >= slower * share:
+        return [{name: from_here * speed for name, speed in one.items()} for one in choices]
     away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
     if away and mapped.motion.goto is not None:
         # A drive that a slow link let run on may have taken another axis beyond its limits, where no move may lead.
@@ -63,6 +69,7 @@ def _learn(mapped: MappedDevice, name: str) -> None:
     room.unknown.discard(name)
     speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}
     mapped.bring_home()
+    mapped.come_to_rest()  # a device that has nearly arrived may take no velocity yet
     command, seen = mapped.drive(speeds), list[Reading]()
     until = command.answered + drives.settle_s + _LEARNED_S
     while command.accepted and (mapped.clock.now() < until or len(seen) < SEVERAL):

@@ -86,6 +86,7 @@ class MappedDevice:
         self.home = {name: motion.state.axes[name].well_inside(value) for name, value in here.items()}
         if looks:
             self.resting = at_rest(self.watch(self.clock.now() + STAYS_S), motion)
+            self.room.noise = self.resting.axes
         api.stop_device = self.leave_at_rest
 
     @property
@@ -226,6 +227,7 @@ class MappedDevice:
         """
         axes, wanted = self.motion.state.axes, {**self.home, **(ends or targets)}
         wanted = {name: axes[name].near(one, self._last.get(name, one)) for name, one in wanted.items()}
+        self.room.commanded({"a move"})
         command = self._sent(self.request_of(self.moves, targets), wanted)
         if command.accepted:
             self.note(command.exchange)
@@ -258,6 +260,7 @@ class MappedDevice:
         if integers:
             written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
         made = self.request_of(way or self.drives, written, authorized=authorized)
+        self.room.commanded({name for name, one in wanted.items() if one})
         return self._sent(made, wanted, authorized=authorized, fresh=fresh)
 
     def has_failed(self, exchange: Exchange) -> bool:

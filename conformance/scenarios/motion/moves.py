@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from conformance.scenarios.motion.driving import with_room
-from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -32,6 +33,10 @@ _LONGER_S: Final = 0.5
 _COMMANDS: Final = 100
 # A velocity with a longer hold time is not commanded only to be let go, s.
 _SHORT_HOLD_S: Final = 2.0
+# The first move surely takes no longer than so many times what it takes by the part that is done.
+_SURELY: Final = 1.5
+# A way of at least so many tolerances is long enough to be stopped under way.
+_LONG: Final = 12
 # Of the range of an axis: so far beyond its limits are targets that the device must not take.
 _BEYOND: Final = (0.05, 0.5)
 
@@ -52,7 +57,7 @@ def recorded(made: Iterable[_Part]) -> tuple[_Part, ...]:
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
-    """Send the device to the limits of each axis and back; at standard also to positions of all axes at random."""
+    """Send the device to the limits of its axes and back; at quick all axes at once, at standard also at random."""
     return recorded(_to_targets(mapped, effort, run.seed))
 
 
@@ -60,11 +65,18 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
     axes = mapped.motion.state.axes
     chance = random.Random(f"{seed}/targets")  # noqa: S311 - no secret
     yield mapped.go("where the suite begins", {})
+    if effort.name == "quick":
+        # One axis at its least and the next at its greatest, so that two that were taken for each other show.
+        for side in (0, 1):
+            ends = {name: axis.limits[(number + side) % 2] for number, (name, axis) in enumerate(axes.items())}
+            yield mapped.go("a limit of each axis" if side else "the other limit of each axis", ends)
+        yield mapped.go("all axes back", {})
+        return
     for name, axis in axes.items():
         for limit in axis.limits:
             yield mapped.go(f"a limit of {name}", {name: limit})
         yield mapped.go(f"{name} back", {})
-    for _ in range(0 if effort.name == "quick" else effort.cases(3)):
+    for _ in range(effort.cases(3)):
         yield mapped.go(
             "all axes", {name: axis.within(round(chance.uniform(*axis.limits), 3)) for name, axis in axes.items()}
         )
@@ -95,11 +107,19 @@ def beyond(axes: Mapping[str, Axis | Speed]) -> Iterator[tuple[str, float, float
 
 @dataclass(frozen=True)
 class _Way:
-    """A move under way: where it began, its command, and the readings since."""
+    """A move under way: where it began, its command, the readings since, and a target behind where it began."""
 
     start: Position
     command: Command
     readings: list[Reading]
+    behind: Position
+
+    def lasts_s(self, name: str) -> float:
+        """Return how long the way along an axis may take, by the part that is done, s."""
+        seen = [one for one in self.readings if one.values]
+        done = abs(seen[-1].values[name] - self.start[name]) if seen else 0.0
+        way = abs(self.command.targets[name] - self.start[name])
+        return _SURELY * way / done * (seen[-1].received - self.command.sent) if done else math.inf
 
 
 def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
@@ -109,17 +129,25 @@ def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
 
 
 def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
-    """Set out from one end of an axis to the other; return when a share of the move is done."""
-    begin, end = mapped.motion.state.axes[name].limits
-    mapped.go("one end", {name: begin})
-    start = mapped.where()
-    command = mapped.goto({name: end})
-    part = abs(end - begin) * share
+    """Set out to the farther end of an axis, from the other one if need be; return when a share of the move is done."""
+    if not mapped.rests:
+        mapped.saw_rest(mapped.watch(mapped.clock.now() + STAYS_S))
+    axes = mapped.motion.state.axes
+    start, (begin, end) = mapped.where(), axes[name].limits
+    if abs(start[name] - begin) > abs(start[name] - end):
+        begin, end = end, begin
+    if not mapped.rests or abs(end - start[name]) < _LONG * mapped.motion.tolerance(name):
+        mapped.go("one end", {name: begin})
+        start = mapped.where()
+    # The other axes stay where they are.
+    beside = {other: start[other] if axis.angle else axis.within(start[other]) for other, axis in axes.items()}
+    command = mapped.goto({**beside, name: end})
+    part = abs(end - start[name]) * share
     seen = mapped.watch(
         command.answered + mapped.takes_s,
-        lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - begin) > part,
+        lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - start[name]) > part,
     )
-    return _Way(start, command, seen)
+    return _Way(start, command, seen, {**beside, name: begin})
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
@@ -190,10 +218,11 @@ def need_positions(mapped: MappedDevice) -> None:
 def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
     for name in _axes(mapped, effort):
         way = _way(mapped, name)
-        second = mapped.goto({name: mapped.motion.state.axes[name].limits[0]})
+        second = mapped.goto(way.behind)
         last = second if second.accepted else way.command
+        first_s = min(mapped.takes_s, way.lasts_s(name))
         seen = way.readings + mapped.follow(last)
-        seen += mapped.watch(max(mapped.clock.now(), way.command.answered + mapped.takes_s) + _LONGER_S)
+        seen += mapped.watch(max(mapped.clock.now(), way.command.answered + first_s) + _LONGER_S)
         yield Leg(f"back, with {name} under way", way.start, (way.command, second), tuple(seen), mapped.due(last))
 
 
@@ -202,7 +231,9 @@ def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
     """Send many targets in a row, without waiting for any of them."""
     need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
-    ends = [axis.limits[turn % 2] for turn in range(effort.cases(_COMMANDS))]
+    # The last one is far away, so that the device is seen to take it.
+    far = int(abs(axis.limits[1] - mapped.where()[name]) > abs(axis.limits[0] - mapped.where()[name]))
+    ends = [axis.limits[(far + turn) % 2] for turn in reversed(range(effort.cases(_COMMANDS)))]
     return _in_a_row(mapped, f"{len(ends)} targets in a row", [{name: end} for end in ends])
 
 

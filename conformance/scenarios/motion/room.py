@@ -6,10 +6,11 @@ A drive begins where there is room for it and ends before a limit, by the fastes
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from conformance.measures.samples import LATE, SEVERAL, usual_s
+from conformance.measures.samples import FARTHEST, LATE, SEVERAL, Noise, usual_s
 from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
@@ -21,6 +22,8 @@ _BLIND: Final = 3
 _APART_S: Final = 0.3
 # A drive is planned for a device that is so much faster than declared or seen: the fastest is seen under way only.
 _FASTER: Final = 1.25
+# Of the tolerance of an axis: two readings at rest may be so far apart, beside their noise.
+_UNSURE: Final = 0.2
 #: A velocity is not lowered to less than this many times the tolerance of its measurement.
 MEASURABLE: Final = 2.0
 
@@ -36,6 +39,7 @@ class Room:
 
     Attributes:
         slowest_s: the slowest response so far, s.
+        noise: what the positions show at rest, by axis.
         unknown: velocities of which nobody knows yet which axes they change.
     """
 
@@ -48,7 +52,13 @@ class Room:
         self._rates: dict[str, dict[str, Span]] = {
             name: {speed.of: (speed.scale, speed.scale)} if speed.of else {} for name, speed in speeds.items()
         }
+        self.noise: Mapping[str, Noise] = {}
         self.unknown = {name for name, speed in speeds.items() if not speed.of}
+        self._declared = {name for name, speed in speeds.items() if speed.of}
+        self._turns = any(axis.angle for axis in motion.state.axes.values())
+        # The same while nothing but this velocity was commanded: a device that did not turn drives the same way.
+        self._heading: dict[str, dict[str, Span]] = {}
+        self._driven = set[str]()
 
     def plan(self, choices: Sequence[Speeds], lasts_s: float) -> tuple[float, dict[str, Span]]:
         """Plan a drive at any of several velocities, until the device rests again.
@@ -61,8 +71,10 @@ class Room:
             NotPossibleError: the limits leave no room for a velocity that can be measured.
         """
         share, ways = 1.0, dict[str, Span]()
+        # A move to where the drive begins may turn the device.
+        turned = self._motion.goto is not None
         for name, axis in self._axes.items():
-            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
+            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s), turned=turned)
             if down + up > 0:
                 ways[name] = down, up
                 # A device is brought to where the drive begins within its tolerance.
@@ -80,6 +92,26 @@ class Room:
         }
         return share, begin
 
+    def commanded(self, names: set[str]) -> None:
+        """Take note that velocities, or a move, may have turned the device; no names: it was stopped."""
+        if names and names != self._driven:
+            self._driven, self._heading = names, {}
+
+    def share_from(self, here: Speeds, choices: Sequence[Speeds], lasts_s: float) -> float:
+        """Return by how much velocities must be multiplied, at most 1, for a drive that begins here; 0: no room."""
+        share = 1.0
+        for name, axis in self._axes.items():
+            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
+            for way, free in ((down, here[name] - axis.limits[0]), (up, axis.limits[1] - here[name])):
+                share = min(share, max(0.0, free) / way) if way > 0 else share
+        slow = any(
+            share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name)
+            for one in choices
+            for name, speed in one.items()
+            if speed
+        )
+        return 0.0 if share < 1 and slow else share
+
     def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
         """Learn from the readings of a drive how fast one velocity changes each axis; of several nobody knows."""
         driven = [(name, speed) for name, speed in speeds.items() if speed]
@@ -91,10 +123,24 @@ class Room:
             for first, last in itertools.combinations(seen, 2):
                 lapse_s = (last.sent + last.received - first.sent - first.received) / 2
                 way = last.values[axis] - first.values[axis]
-                if lapse_s >= _APART_S and abs(way) > self._motion.tolerance(axis):
+                if lapse_s >= _APART_S and abs(way) > self._unsure(axis):
                     rate = way / lapse_s / speed
                     least, greatest = self._rates[name].get(axis, (rate, rate))
                     self._rates[name][axis] = min(least, rate), max(greatest, rate)
+
+    def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
+        """Learn from readings at a steady velocity which way it takes the device until another one is commanded."""
+        driven = {name: speed for name, speed in speeds.items() if speed}
+        seen = [one for one in readings if one.values]
+        lapse_s = seen[-1].sent - seen[0].sent if seen else 0.0
+        if driven.keys() != self._driven or len(driven) != 1 or lapse_s < _APART_S:
+            return
+        ((name, speed),) = driven.items()
+        self._heading[name] = {}
+        for axis in self._axes:
+            way = (middle_of(seen[-SEVERAL:], axis) - middle_of(seen[:SEVERAL], axis)) / lapse_s / speed
+            room = self._unsure(axis) / lapse_s / abs(speed)
+            self._heading[name][axis] = way - room, way + room
 
     def is_over(self, choices: Sequence[Speeds], readings: Sequence[Reading], rests_s: float) -> bool:
         """Return whether a drive has to end, as the device would pass a limit if it rested ``rests_s`` later."""
@@ -107,11 +153,29 @@ class Room:
                 return True
         return False
 
-    def _way(self, axis: str, choices: Sequence[Speeds], lasts_s: float) -> Span:
+    def leads_on(self, speeds: Speeds, readings: Sequence[Reading], lasts_s: float) -> bool:
+        """Return whether a device that is under way has room for another velocity, for so long, s."""
+        return not self.is_over([speeds], readings, _FASTER * lasts_s + _BLIND * self.slowest_s)
+
+    def _unsure(self, axis: str) -> float:
+        """Return how far apart two readings of a device at rest may be along an axis."""
+        sigma = self.noise[axis].sigma if axis in self.noise else self._motion.state.axes[axis].noise
+        return _UNSURE * self._motion.tolerance(axis) + 2 * FARTHEST * sigma
+
+    def _rates_of(self, name: str, *, turned: bool) -> dict[str, Span]:
+        if not turned and {name} == self._driven and name in self._heading:
+            return self._heading[name]
+        if not self._turns or name in self._declared:
+            return self._rates[name]
+        # Wherever the device looks by then, it goes no faster.
+        most = math.hypot(*(max(map(abs, span)) for span in self._rates[name].values()))
+        return dict.fromkeys(self._axes, (-most, most))
+
+    def _way(self, axis: str, choices: Sequence[Speeds], lasts_s: float, *, turned: bool = False) -> Span:
         """Return how far an axis may go down and up."""
         ends = [
             sum(
-                edge([speed * rate * lasts_s for rate in self._rates[name].get(axis, (0.0,))])
+                edge([speed * rate * lasts_s for rate in self._rates_of(name, turned=turned).get(axis, (0.0,))])
                 for name, speed in one.items()
             )
             for one in choices

@@ -129,11 +129,13 @@ class Drive:
         wanted: velocities by name, as the device must take them.
         commands: in order; all of them command the same.
         under_way: the readings until the last of them.
-        end: the command of velocity zero; None: nothing was sent any more.
+        end: the command of velocity zero; None: nothing was sent any more, or another velocity.
         after: the readings after that.
         refused: a command after the last one that the device must refuse; None: none was sent.
         slowed: that it was slower than planned, as the limits leave no room; empty: it was not.
         resting: what the device shows at rest.
+        since: when it had reached the velocity, or else had to, s; None: the time to settle after the first response.
+        rested: since when it was seen at rest, where nobody looked for longer, s; None: until after it had to rest.
     """
 
     what: str
@@ -145,6 +147,8 @@ class Drive:
     refused: Command | None = None
     slowed: str = ""
     resting: Resting = Resting()
+    since: float | None = None
+    rested: float | None = None
 
     @property
     def named(self) -> str:
@@ -155,6 +159,10 @@ class Drive:
     def readings(self) -> tuple[Reading, ...]:
         """All readings."""
         return self.under_way + self.after
+
+    def settled(self, settle_s: float) -> float:
+        """Return when it had reached its velocity, or else had to, s; ``settle_s``: the device's time to do so."""
+        return self.commands[0].answered + settle_s if self.since is None else self.since
 
     def was_kept(self, hold_s: float | None) -> bool:
         """Return whether each command met the device within its hold time after the one before; no hold time: always.

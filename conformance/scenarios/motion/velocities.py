@@ -5,16 +5,17 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from conformance.measures.samples import SEVERAL, longest_s
+from conformance.measures.samples import SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion.driving import with_room
-from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
+from conformance.scenarios.motion.measuring import STEADY_S, steady_since
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.resting import creeping
+from conformance.scenarios.motion.resting import creeping, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -24,13 +25,15 @@ from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
 _By = tuple[Way | None, ...]
-# For so long a velocity is measured once it must be reached, s.
+# For so long a velocity that is not steady is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
 # Of the limit: a slow velocity, and the slowest.
 _SLOW: Final = 0.4
 _SLOWEST: Final = 0.1
 # So many times its tolerance a velocity is at least, to be told from rest.
 _TOLD: Final = 1.5
+# So many velocities turn into each other before the device is stopped; at quick all do.
+_PAIR: Final = 2
 # A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
 _LONGEST_HOLD_S: Final = 2.0
 # After these parts of the hold time commands that must be refused follow the last one: after the first the device is
@@ -39,6 +42,8 @@ _REFUSED_AT: Final = (0.1, 0.9)
 # A device is told its velocity that often within its hold time, at least every so many s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
+# Rather than that it is moved for room, a device that is let go may begin this part of the velocity slower.
+_SLOWER: Final = 0.7
 # After the time to rest it is watched for so long, s.
 _REST_S: Final = 0.5
 # So long one is watched that still moves a little: one that creeps does so on and on, s.
@@ -56,20 +61,16 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
     At quick each axis at its limits, and slowly two at once, or the only one back; the seed says in which of several
     ways. At standard each way drives each axis there and back, and beside another axis that it must leave alone.
     """
-    chosen = _chosen(mapped, run.seed, quick=effort.name == "quick")
-    return recorded(
-        drive
-        for speeds, longer, by in chosen
-        for drive in _drives(mapped, _named(speeds, by), speeds, longer=longer, by=by)
-    )
-
-
-def _chosen(mapped: MappedDevice, seed: int, *, quick: bool) -> Iterator[tuple[Position, bool, _By]]:
-    """Yield velocities, whether they are to outlast the hold time, and the ways in which they are commanded in turn."""
-    for number, (speeds, longer) in enumerate(_planned(mapped, quick=quick), seed):
-        yield speeds, longer, _in_turn(mapped, speeds, number) if quick else ()
-    if not quick:
-        yield from ((speeds, False, by) for speeds, by in _by_each_way(mapped))
+    if effort.name == "quick":
+        parts = [
+            _Part(_named(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
+            for number, (speeds, longer) in enumerate(_planned(mapped, quick=True), run.seed)
+        ]
+        return recorded(_in_a_row(mapped, parts))
+    parts = [_Part(_named(speeds), speeds, longer=longer) for speeds, longer in _planned(mapped, quick=False)]
+    parts += [_Part(_named(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
+    pairs = (parts[index : index + _PAIR] for index in range(0, len(parts), _PAIR))
+    return recorded(drive for pair in pairs for drive in _in_a_row(mapped, pair))
 
 
 def _by(way: Way, speeds: Position) -> _By:
@@ -131,12 +132,12 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
     """Command velocities beyond the limits, where the map says that the device drives as fast as it can."""
     if mapped.drives.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that velocities beyond the limits are clamped")
-    return recorded(
-        drive
+    parts = [
+        _Part(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
         for name, limit, value in beyond(mapped.drives.axes)
         if limit
-        for drive in _drives(mapped, f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
-    )
+    ]
+    return recorded(drive for part in parts for drive in _in_a_row(mapped, [part]))
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -160,7 +161,7 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
     others = list(_at_once(mapped))
     chance.shuffle(others)
     slowest = [_slowest(mapped, name, chance.choice(ends[name])) for name in ends]
-    others = [*others[:2], *slowest[:2]] if quick else [*limits, *others, *slowest]
+    others = [*others[:1], chance.choice(slowest)] if quick else [*limits, *others, *slowest]
     refusals = list(_refusals(mapped))
     chance.shuffle(refusals)
     number = chance.randrange(1 + len(mapped.drives.ways))
@@ -169,12 +170,13 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
         # An odd number of commands and an even one; and with readings and without.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
         what = f"{_named(speeds, by)}, let go" + (", and nothing is read until it must rest" if silent else "")
-        yield from _drives(mapped, what, speeds, let_go_s=hold_s, more=made % 2, silent=silent, by=by)
+        part = _Part(what, speeds, by=by)
+        yield from _left_alone(mapped, part, hold_s, more=made % 2, silent=silent, brief=made > 0)
     name = axes[0][0]
     for kind, refused in refusals[: 1 if quick else None]:
         limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
         what = f"{name} {limit:g}, let go, with {kind} after it, which must be refused"
-        yield from _drives(mapped, what, {name: limit}, let_go_s=hold_s, refused=refused)
+        yield from _left_alone(mapped, _Part(what, {name: limit}), hold_s, refused=refused, brief=True)
 
 
 def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
@@ -202,123 +204,266 @@ def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) 
     yield from filter(None, (greatest, least) if ahead else (least, greatest))
 
 
-def _drives(
+@dataclass(frozen=True)
+class _Part:
+    """A velocity to drive at.
+
+    Attributes:
+        what: as a noun phrase.
+        speeds: what is commanded.
+        ends: what the device must take instead; None: the same.
+        longer: whether it is to outlast the hold time.
+        by: in which ways it is commanded in turn; empty: as usual.
+    """
+
+    what: str
+    speeds: Position
+    ends: Position | None = None
+    longer: bool = False
+    by: _By = ()
+
+
+def _in_a_row(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[Drive]:
+    """Drive at velocities one after the other, and end the last by velocity 0; try again what a slow link spoilt."""
+    left = list(parts)
+    for _ in range(TRIES):
+        again: list[_Part] = []
+        for part, drive, whole in _at_each(mapped, left):
+            yield drive
+            in_time = drive.end is None or not drive.end.was_late(drive.readings)
+            if not (whole and in_time and drive.was_kept(mapped.drives.hold_s)):
+                again.append(part)
+        left = again
+        if not left:
+            return
+
+
+def _at_each(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[tuple[_Part, Drive, bool]]:
+    """Yield each part with its drive, and whether there was room for the whole of it.
+
+    A velocity turns into the next one while the limits leave room for both.
+    """
+    drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
+    before: tuple[_Part, Drive, bool] | None = None
+    for part in parts:
+        outlasts_s = hold_s if part.longer and hold_s <= _LONGEST_HOLD_S else 0.0
+        settle_s = drives.settle_s * _times(mapped, before[1].wanted if before else {}, part.speeds)
+        lasts_s = max(settle_s + STEADY_S, outlasts_s + MEASURED_S)
+        made = part.speeds
+        if before is not None and not _goes_on(mapped, before[1], made, lasts_s + drives.settle_s):
+            yield before[0], _ended(mapped, before[1], before[0].by), before[2]
+            before, settle_s = None, drives.settle_s
+        if before is None:
+            made = with_room(mapped, [part.speeds], lasts_s + drives.settle_s)[0]
+            if part.ends and made != part.speeds:
+                raise NotPossibleError(f"the limits leave no room for {part.what}")
+        drive, whole = _kept_up(
+            mapped, part, made, settle_s, drives.settle_s, before=before[1] if before else None, outlasts_s=outlasts_s
+        )
+        if before is not None:
+            yield before
+        before = part, drive, whole
+    if before is not None:
+        yield before[0], _ended(mapped, before[1], before[0].by), before[2]
+
+
+def _times(mapped: MappedDevice, before: Position, after: Position) -> float:
+    """Return how many times its time to settle a device may need: one that turns round changes by more than a limit."""
+    names = before.keys() | after.keys()
+    changes = [
+        abs(after.get(name, 0.0) - before.get(name, 0.0)) / max(map(abs, mapped.drives.axes[name].limits))
+        for name in names
+    ]
+    return max(1.0, *changes)
+
+
+def _goes_on(mapped: MappedDevice, before: Drive, speeds: Position, lasts_s: float) -> bool:
+    """Return whether the limits leave room for another velocity without a stop before it."""
+    room, seen = mapped.room, before.under_way
+    # Over a slow link nobody sees in time where it gets to.
+    if usual_s(seen) > _KEPT_S:
+        return False
+    return room.leads_on(before.wanted, seen, mapped.drives.settle_s) and room.leads_on(speeds, seen, lasts_s)
+
+
+def _left_alone(
     mapped: MappedDevice,
-    what: str,
-    speeds: Position,
-    ends: Position | None = None,
+    part: _Part,
+    hold_s: float,
     *,
-    let_go_s: float | None = None,
     more: int = 0,
-    longer: bool = False,
     refused: Callable[[], Command] | None = None,
     silent: bool = False,
-    by: _By = (),
+    brief: bool,
 ) -> Iterator[Drive]:
-    """Drive at a velocity; again, if a slow link let the hold time pass, or velocity 0 was answered late.
-
-    Each drive is judged for what it shows.
+    """Drive at a velocity, then send nothing any more, and watch; again where a slow link or the limits spoilt it.
 
     Args:
         mapped: the device.
-        what: the drive, as a noun phrase.
-        speeds: what is commanded.
-        ends: what the device must take instead.
-        let_go_s: its hold time, if nothing is sent after the drive; None: velocity 0 is.
+        part: the velocity.
+        hold_s: its hold time, s.
         more: how often the velocity is sent once more at the end, on a connection of its own.
-        longer: whether the drive outlasts the hold time.
         refused: sends what the device must refuse after the last command; None: nothing is sent.
         silent: whether nothing is read until the device must rest.
-        by: in which ways the velocity is commanded in turn; empty: as usual.
+        brief: whether to look no longer than until it rests.
     """
-    drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
-    # One that is let go is measured in its hold time.
-    measured_s = MEASURED_S if let_go_s is None else 0.0
-    lasts_s = max(drives.settle_s, hold_s if longer and hold_s <= _LONGEST_HOLD_S else 0.0) + measured_s
+    settle_s, whole = mapped.drives.settle_s, False
     for _ in range(TRIES):
-        # What follows the last reading: velocity 0 or the hold time, and until the device rests.
-        rests_s = (let_go_s or 0.0) + more * mapped.room.slowest_s + drives.settle_s
-        made = with_room(mapped, [speeds], lasts_s + rests_s)[0]
-        if ends and made != speeds:
-            raise NotPossibleError(f"the limits leave no room for {what}")
-        slowed = "".join(f", slowed to {made[name]:.2g} for room" for name in made if made[name] != speeds[name])
-        commands, readings, whole = _kept_up(mapped, made, lasts_s, rests_s, by or (None,))
-        last = by[-1] if by else None
-        commands += [mapped.drive(made, way=last, fresh=True) for _ in range(more if whole else 0)]
-        wanted = {**dict.fromkeys(drives.axes, 0.0), **made, **(ends or {})}
-        drive = Drive(what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed, resting=mapped.resting)
-        if let_go_s is not None and not whole:
+        rests_s = hold_s + more * mapped.room.slowest_s + settle_s
+        made = with_room(mapped, [part.speeds], settle_s + rests_s, slower=_SLOWER)[0]
+        drive, whole = _kept_up(mapped, part, made, settle_s, rests_s, measured_s=0.0)
+        if not whole:
             # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
             mapped.come_to_rest()
             continue
-        drive = _ended(mapped, drive, let_go_s, refused, silent=silent, way=by[0] if by else None)
+        way = part.by[-1] if part.by else None
+        again = [mapped.drive(made, way=way, fresh=True) for _ in range(more)]
+        drive = replace(drive, commands=(*drive.commands, *again))
+        drive = _let_go_of(mapped, drive, hold_s, refused, silent=silent, brief=brief)
         if drive.refused is None or not drive.refused.accepted:
             yield drive
-        in_time = drive.end is None or not drive.end.was_late(drive.readings)
-        if whole and in_time and drive.was_kept(drives.hold_s):
+        if drive.was_kept(hold_s):
             return
-    if let_go_s is not None and not whole:
-        raise NotPossibleError(f"the limits leave no room for {what}")
+    if not whole:
+        raise NotPossibleError(f"the limits leave no room for {part.what}")
 
 
-def _kept_up(
-    mapped: MappedDevice, speeds: Position, lasts_s: float, rests_s: float, by: _By
-) -> tuple[list[Command], list[Reading], bool]:
-    """Command velocities again and again for as long as they are measured; return whether there was room for that."""
-    given = mapped.drives
-    every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
-    ways = itertools.cycle(by)
-    commands, readings = [mapped.drive(speeds, way=next(ways))], list[Reading]()
-    while mapped.clock.now() < commands[0].answered + lasts_s and commands[-1].accepted:
-        mapped.room.note(speeds, readings[-_NOTED:])
-        if mapped.room.is_over([speeds], readings, rests_s):
-            return commands, readings, False
-        if mapped.clock.now() >= commands[-1].sent + every_s:
-            commands.append(mapped.drive(speeds, way=next(ways)))
-        readings.append(mapped.read())
-    return commands, readings, True
-
-
-def _ended(
+def _let_go_of(
     mapped: MappedDevice,
     drive: Drive,
-    let_go_s: float | None,
+    hold_s: float,
     refused: Callable[[], Command] | None,
     *,
     silent: bool,
-    way: Way | None,
+    brief: bool,
 ) -> Drive:
-    """End a drive by velocity 0, sent in a way, or let the device go; return it with what came after."""
-    end = mapped.drive({}, way=way, integers=True) if let_go_s is None else None
-    last = end or drive.commands[-1]
-    rests_at = last.answered + (let_go_s or 0.0) + mapped.drives.settle_s
+    last, after = drive.commands[-1], list[Reading]()
+    rests_at = last.answered + hold_s + mapped.drives.settle_s
     answer: Command | None = None
-    after: list[Reading] = []
-    if refused is not None and let_go_s is not None:
-        for part in _REFUSED_AT:
-            after += mapped.watch(last.answered + part * let_go_s)
-            one = refused()
-            answer = one if answer is None or one.accepted else answer
+    for part in _REFUSED_AT if refused is not None else ():
+        after += mapped.watch(last.answered + part * hold_s)
+        one = refused() if refused is not None else None
+        answer = one if answer is None or (one and one.accepted) else answer
     if silent:
         mapped.clock.sleep(rests_at - mapped.clock.now())
+    drive = _watched(mapped, drive, after, rests_at, brief_from=last.answered + hold_s if brief else None)
+    if not mapped.rests:
+        mapped.stop()
+    return replace(drive, refused=answer)
+
+
+def _kept_up(
+    mapped: MappedDevice,
+    part: _Part,
+    made: Position,
+    settle_s: float,
+    rests_s: float,
+    *,
+    before: Drive | None = None,
+    outlasts_s: float = 0.0,
+    measured_s: float = MEASURED_S,
+) -> tuple[Drive, bool]:
+    """Command a velocity again and again until it is seen, or must be; return the drive, and whether it had room.
+
+    Args:
+        mapped: the device.
+        part: what is commanded, and how.
+        made: the velocity, with room for it.
+        settle_s: time to reach it, s.
+        rests_s: time to rest afterwards, s.
+        before: the drive that turns into this one; None: it begins at rest.
+        outlasts_s: for so long it is commanded at least, and measured after that, s; 0: as long as it takes to see it.
+        measured_s: for so long one is measured that is not steady by then, s.
+    """
+    given, motion = mapped.drives, mapped.motion
+    every_s = min(_KEPT_S, given.hold_s / _KEPT) if given.hold_s else _KEPT_S
+    wanted = {**dict.fromkeys(given.axes, 0.0), **made, **(part.ends or {})}
+    slowed = "".join(f", slowed to {made[name]:.2g} for room" for name in made if made[name] != part.speeds[name])
+    ways = itertools.cycle(part.by or (None,))
+    commands, readings = [mapped.drive(made, way=next(ways))], list[Reading]()
+    begun = commands[0].answered
+    until, since, whole = max(begun + settle_s, begun + outlasts_s) + measured_s, None, True
+    while mapped.clock.now() < until and commands[-1].accepted:
+        # Before it has settled, one that turns round still drives at the velocity before.
+        settled = before is None or mapped.clock.now() >= begun + settle_s
+        mapped.room.note(made, [one for one in readings[-_NOTED:] if before is None or one.sent >= begun + settle_s])
+        choices, seen = (
+            ([made], readings) if before is None else ([made, before.wanted], [*before.under_way, *readings])
+        )
+        if mapped.room.is_over(choices[:1] if settled else choices, seen, rests_s):
+            whole = False
+            break
+        if mapped.clock.now() >= commands[-1].sent + every_s:
+            commands.append(mapped.drive(made, way=next(ways)))
+        readings.append(mapped.read())
+        if since is None:
+            since = steady_since(readings, wanted, motion, mapped.resting)
+        if since is not None and not outlasts_s:
+            break
+    if since is not None:
+        steady = [one for one in readings if one.sent >= since]
+        mapped.room.note(made, steady)
+        mapped.room.note_heading(made, steady)
+    since = begun + settle_s if since is None else min(since, begun + settle_s)
+    drive = Drive(part.what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed)
+    return replace(drive, resting=mapped.resting, since=since), whole
+
+
+def _ended(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
+    """End a drive by velocity 0; return it with what came after."""
+    end = mapped.drive({}, way=by[0] if by else None, integers=True)
+    return _watched(mapped, replace(drive, end=end), [], end.answered + mapped.drives.settle_s)
+
+
+def _watched(
+    mapped: MappedDevice, drive: Drive, after: list[Reading], rests_at: float, *, brief_from: float | None = None
+) -> Drive:
+    """Watch a device that must rest from some time on, s of the clock; return the drive with what came after.
+
+    Args:
+        mapped: the device.
+        drive: until then.
+        after: the readings so far.
+        rests_at: when it must rest.
+        brief_from: when it may be left, s of the clock, if it rests already; None: not before it must rest.
+    """
     due, speeds = rests_at + mapped.room.slowest_s, drive.wanted
 
-    def seen_enough(readings: list[Reading]) -> bool:
+    def drives_on(readings: list[Reading]) -> bool:
         """Whether readings show that the device drives on, towards a limit."""
         late = [one for one in readings if one.sent >= due]
         return len(late) > 2 * SEVERAL and mapped.room.is_over([speeds], late, 0.0)
 
-    after += mapped.watch(rests_at + _REST_S, seen_enough)
+    def rested(readings: list[Reading]) -> float | None:
+        return None if brief_from is None else _resting_since(mapped, readings, brief_from)
+
+    after += mapped.watch(rests_at + _REST_S, lambda seen: drives_on(seen) or rested(seen) is not None)
+    since = rested(after)
     # Where a reading took long, only those count that come as much later: several of them show whether it rests.
-    for _ in range(_MORE):
+    for _ in range(_MORE if since is None else 0):
         counted = [one for one in after if one.sent >= rests_at + longest_s([*drive.readings, *after])]
-        if len(counted) >= 2 * SEVERAL or seen_enough(after):
+        if len(counted) >= 2 * SEVERAL or drives_on(after):
             break
         after.append(mapped.read())
-    if creeping([one for one in after if one.sent >= rests_at], mapped.motion, mapped.resting):
+    still = [one for one in after if one.sent >= (rests_at if since is None else since)]
+    if creeping(still, mapped.motion, mapped.resting):
         # It may come to rest yet.
-        after += mapped.watch(after[-1].sent + _SLOWS_S, seen_enough)
-    if end is None:
-        mapped.stop()
+        after += mapped.watch(after[-1].sent + _SLOWS_S, drives_on)
+        since = None
     mapped.saw_rest(after)
-    return replace(drive, end=end, after=tuple(after), refused=answer)
+    return replace(drive, after=tuple(after), rested=since)
+
+
+def _resting_since(mapped: MappedDevice, readings: Sequence[Reading], begin: float) -> float | None:
+    """Return since when, not before a time, the last readings show the device at rest, s; None if they do not."""
+    last = [one for one in readings if one.sent >= readings[-1].sent - STAYS_S]
+    seen = [one for one in last if one.values or one.speeds]
+    if len(last) in {len(readings), 0} or len(seen) < max(len(last), 2 * SEVERAL) or last[0].sent < begin:
+        return None
+    axes = mapped.motion.state.axes
+    stays = all(
+        abs(one.values[name] - last[0].values[name]) <= mapped.motion.tolerance(name) / 2
+        for one in last
+        for name in axes
+    )
+    return None if fastest(last, mapped.motion) or not stays else last[0].sent

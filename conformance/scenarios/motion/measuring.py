@@ -1,0 +1,78 @@
+"""Measure velocities by several readings, of which no single one decides anything."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Final
+
+from conformance.measures.samples import LATE, SEVERAL, usual_s
+from conformance.scenarios.motion.trace import Reading, Resting
+from conformance.statement.motion_map import MotionMap
+
+# A reading is late if it takes longer than usual, and more than this share of the drive.
+_SHARE: Final = 0.1
+# A velocity is measured over so long at least, s.
+_LAPSE_S: Final = 0.1
+#: A velocity is steady if each half of so long shows it, s. One that only passes it on its way to another does not.
+STEADY_S: Final = 0.36
+
+
+def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float | None:
+    """Return a velocity by some readings, in units per second; None if they do not show it."""
+    speed = motion.velocity.axes[name] if motion.velocity else None
+    if speed is None or not speed.of:
+        speeds = [one.speeds[name] for one in readings if one.speeds]
+        return median(speeds) if len(speeds) >= SEVERAL else None
+    # When a position was read of which the response came late, nobody knows.
+    late_s = max(LATE * usual_s(readings), _SHARE * (readings[-1].sent - readings[0].sent)) if readings else 0.0
+    seen = [
+        ((one.sent + one.received) / 2, one.values[speed.of])
+        for one in readings
+        if one.values and one.received - one.sent <= late_s
+    ]
+    if len(seen) < 2 * SEVERAL or seen[-1][0] - seen[0][0] < _LAPSE_S:
+        return None
+    # The median of the slopes between readings (Theil and Sen), of which no single reading decides anything.
+    half_s = (seen[-1][0] - seen[0][0]) / 2
+    slopes = [
+        (there - here) / (later - first)
+        for (first, here), (later, there) in itertools.combinations(seen, 2)
+        if later - first >= half_s
+    ]
+    return median(slopes) / speed.scale
+
+
+def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting: Resting) -> float:
+    """Return how far off a velocity may be for the noise of some readings alone, in units per second."""
+    speed = motion.velocity.axes[name] if motion.velocity else None
+    if speed is not None and speed.of in resting.axes:
+        places = [(one.sent, one.values[speed.of]) for one in readings if one.values]
+        return resting.axes[speed.of].slope_room(places) / speed.scale
+    found = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
+    return resting.speeds[name].room(found) if name in resting.speeds else 0.0
+
+
+def steady_since(
+    readings: Sequence[Reading], wanted: Mapping[str, float], motion: MotionMap, resting: Resting
+) -> float | None:
+    """Return since when the last readings show some velocities and no change, s; None if they do not."""
+    if not readings:
+        return None
+    begin = readings[-1].sent - STEADY_S
+    last = [one for one in readings if one.sent >= begin]
+    if len(last) == len(readings):
+        return None
+    for half in (last[: len(last) // 2], last[len(last) // 2 :]):
+        for name, speed in wanted.items():
+            found = measured(half, name, motion)
+            if found is None:
+                return None
+            if abs(found - speed) > motion.speed_tolerance(name) + noise_of(half, name, motion, resting):
+                return None
+    for name, speed in wanted.items():
+        found = measured(last, name, motion)
+        if found is None or abs(found - speed) > motion.speed_tolerance(name):
+            return None
+    return last[0].sent
