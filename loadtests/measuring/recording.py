@@ -53,7 +53,9 @@ class Recording:
         self.segments.update({plan.first_segment + index: segment for index, segment in enumerate(plan.segments)})
         self.origin_ns, self.offset_ns = origin_ns, int(plan.offset_s * NS)
         since_s, until_s = plan.measured_s
-        self.recorder.window = (plan.first_segment, origin_ns + int(since_s * NS), origin_ns + int(until_s * NS))
+        measured = plan.first_segment + sum(segment.phase == "warmup" for segment in plan.segments)
+        window = plan.first_segment, origin_ns + int(since_s * NS), origin_ns + int(until_s * NS), measured
+        self.recorder.window = window
         self._cpu, self._block = [], None
         gc.collect()
         gc.freeze()  # what exists now lives on: a collection in mid-run would look like a stall of the robot

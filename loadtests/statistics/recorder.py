@@ -114,9 +114,11 @@ class Recorder:
         listener: receives each buffer's response times, by series and operation.
 
     Attributes:
-        window: the plan under way: its first segment, and when its measured part begins and ends (monotonic ns).
+        window: the plan under way: its first segment, when its measured part begins and ends (monotonic ns), and the
+            first segment of that part.
         live: all response times so far.
-        in_time, afterwards: successful responses that came within that part and after it, by the plan's first segment.
+        in_time, afterwards: successful responses that came within that part, and those to its requests that came
+            after it, by the plan's first segment.
     """
 
     def __init__(
@@ -124,7 +126,7 @@ class Recorder:
     ) -> None:
         self.series_of = series_of if series_of is not None else {}
         self.listener = listener
-        self.window = (0, 0, 0)
+        self.window = (0, 0, 0, 0)
         self._buffer = array("q")
         self._begin()
 
@@ -211,10 +213,10 @@ class Recorder:
             return
         rows = np.frombuffer(self._buffer, dtype=np.int64).reshape(-1, _FIELDS).copy()
         self._buffer = array("q")
-        plan, since, until = self.window
+        plan, since, until, measured = self.window
         done = rows[:, 6]
         self.in_time[plan] += int(((done >= since) & (done <= until)).sum())
-        self.afterwards[plan] += int((done > until).sum())
+        self.afterwards[plan] += int(((done > until) & (rows[:, 0] >= measured)).sum())
         keys = rows[:, 0] * MOST_OPERATIONS + rows[:, 1]
         for key in np.unique(keys).tolist():
             chosen = keys == key
