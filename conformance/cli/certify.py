@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.api.call_rules import CallRules, told
-from conformance.cli.certify_drive import checked, drive_options, with_map
+from conformance.cli.certify_drive import NotShownError, checked, drive_options, with_map
 from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_options import CertifyOptions
 from conformance.cli.summary import print_summary
@@ -196,6 +196,9 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     except UnreachableError as unreachable:
         click.echo(f"the device cannot be reached: {inert(str(unreachable))}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
+    except NotShownError as reason:
+        click.echo(f"inconclusive: {inert(str(reason))}", err=True)
+        return CommandResult(ExitCode.INCONCLUSIVE)
     except (StatementError, ContractError, DescriptionError) as error:
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:

@@ -45,6 +45,10 @@ _OPTIONS = (
 )
 
 
+class NotShownError(Exception):
+    """Raised when nothing shows that the robot moves as it is commanded; the message says what was tried."""
+
+
 def drive_options(command: _Command) -> _Command:
     """Add the options of a run that finds the motion map by itself."""
     for option in reversed(_OPTIONS):
@@ -87,7 +91,8 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     """Show what would be driven, ask, drive the robot a little, and return what is judged with the map of that.
 
     Raises:
-        StatementError: the statement has a map, or no map could be found; the message says why.
+        StatementError: the statement has a map, or the description says too little.
+        NotShownError: no map could be found.
         KeyboardInterrupt: nobody wants it to move.
     """
     # What talks to a device is imported late: --help need not pay for it.
@@ -114,18 +119,20 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
             click.echo(inert(line), err=True)
         if not options.yes and not click.confirm("May the robot move?", err=True):
             raise KeyboardInterrupt
-        calls = Calls((*statement.calls.allow, plan.drive.label), statement.calls.never)
+        named = plan.named or plan.drive
+        calls = Calls((*statement.calls.allow, named.label), statement.calls.never)
         run.statement = msgspec.structs.replace(statement, calls=calls)
         connection = connection_of(statement.endpoints)
         connection.permit = Permission(run).refusal
         api = RestInterface(run, HttpClient(statement.endpoints.rest or "", connection))
+    except NotPossibleError as reason:
+        raise StatementError(f"--drive: {reason}") from reason
+    try:
         finder = VelocityFinder if plan.is_velocity else PositionFinder
         found = finder(api, binding_of(api), plan).found()
         api.client.close()
-    except NoAnswerError as none:
-        raise StatementError(f"--drive: {none}") from none
-    except NotPossibleError as reason:
-        raise StatementError(f"--drive: {reason}") from reason
+    except (NoAnswerError, NotPossibleError) as reason:
+        raise NotShownError(str(reason)) from reason
     text = "\n".join(found.lines)
     for line in ("", "# The motion map that was found:", *found.lines, ""):
         click.echo(inert(line), err=True)

@@ -18,9 +18,10 @@ _TURNS: Final = re.compile(
 # What a moment, a count or an id says is no axis.
 NO_AXIS: Final = re.compile(
     r"^(?:n?anosec|nsec|sec|secs|stamp|timestamp|time|seq|sequence|id|uid|number|count|index|version|covariance"
-    r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$",
+    r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$|uuid$|number$|index$",
     re.IGNORECASE,
 )
+_ID: Final = re.compile(r"[a-z0-9]I[dD]$")
 _DEPTH: Final = 6
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
 # Of the declared limit a robot is driven at that part; without limits, in rad and in m.
@@ -80,7 +81,7 @@ def commanded_by(operation: Operation) -> list[Commanded]:
     found = [
         (f"{{{one.name}}}", one.name, one.schema)
         for one in operation.parameters
-        if one.where == "path" and is_numeric(one.schema) and is_axis(one.name)
+        if f"{{{one.name}}}" in operation.template and is_numeric(one.schema) and is_axis(one.name)
     ]
     schema = body_schema(operation)
     found += [(at, at, part) for at, part in numbers_in(schema or {}) if is_axis(at.rpartition("/")[2])]
@@ -93,7 +94,7 @@ def commanded_by(operation: Operation) -> list[Commanded]:
 
 def is_axis(name: str) -> bool:
     """Return whether a number of this name may be an axis or a velocity."""
-    return not (NO_AXIS.search(name) or _LASTS.search(name))
+    return not (NO_AXIS.search(name) or _LASTS.search(name) or _ID.search(name))
 
 
 def unique_names(places: Sequence[str]) -> dict[str, str]:

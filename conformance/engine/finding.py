@@ -10,19 +10,20 @@ import posixpath
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from conformance.api.call_rules import CallRules, harmful_words
+from conformance.api.call_rules import CallRules, harmful_words, matches
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import Operation, is_json
-from conformance.engine.commanded import Commanded, body_schema, commanded_by, template_of
+from conformance.engine.commanded import Commanded, body_schema, commanded_by, numbers_in, template_of
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import NoValueError, filled
 from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_calls import named_by, names_operation
 from conformance.transport.exchange import Exchange
 
 _PACE_S: Final = 0.02
@@ -50,6 +51,7 @@ class Plan:
         reads: operations that may show it, the likeliest first.
         is_velocity: whether it commands velocities; else positions.
         stop: the operation beside it that stops the device, by its name; or None.
+        named: the operation that commands as the description has it, without values in its path; None: the same.
     """
 
     drive: Operation
@@ -57,6 +59,7 @@ class Plan:
     reads: tuple[Operation, ...]
     is_velocity: bool
     stop: Operation | None = None
+    named: Operation | None = None
 
     def told(self) -> Iterator[str]:
         """Yield what will be done, in lines."""
@@ -94,9 +97,10 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
     Raises:
         NotPossibleError: it says too little; the message says what.
     """
-    chosen = _named(operations, drive, "--drive")
-    if chosen.never or any(pattern == chosen.label for pattern in rules.never):
-        raise NotPossibleError(f"{chosen.label} must never be called: the description or --never says so")
+    named = _named(operations, drive, "--drive")
+    if named.never or any(matches(pattern, named) for pattern in rules.never):
+        raise NotPossibleError(f"{named.label} must never be called: the description or --never says so")
+    chosen, values = _with_values(named, drive)
     numbers = commanded_by(chosen)[:_MOST_NUMBERS]
     if not numbers:
         bodies = ", ".join(chosen.bodies) or "none"
@@ -104,14 +108,26 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
     if missing := [
         one.name
         for one in chosen.parameters
-        if one.where == "path" and f"{{{one.name}}}" not in {number.place for number in numbers}
+        if f"{{{one.name}}}" in chosen.template and f"{{{one.name}}}" not in {number.place for number in numbers}
     ]:
         raise NotPossibleError(f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}")
-    reads = [_named(operations, read, "--read")] if read else list(_reads(operations, rules))[:_MOST_READS]
+    reads = [_with_values(_named(operations, read, "--read"), read)[0]] if read else []
+    names = frozenset(one.place.strip("{}").rpartition("/")[2].lower() for one in numbers)
+    reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
     is_velocity = bool(_DRIVES.search(f"{chosen.template} {chosen.id}"))
-    return Plan(chosen, tuple(numbers), tuple(reads), is_velocity, _stop(operations, chosen))
+    return Plan(chosen, tuple(numbers), tuple(reads), is_velocity, _stop(operations, chosen), named)
+
+
+def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, str]]:
+    """Return an operation with the values that a call has in its path, and these by parameter."""
+    if names_operation(operation.label, call) or " " not in call:
+        return operation, {}
+    path = call.strip().partition(" ")[2]
+    pairs = zip(operation.template.split("/"), path.split("/"), strict=True)
+    values = {name.strip("{}"): value for name, value in pairs if name != value and "{" not in value}
+    return replace(operation, template=path), values
 
 
 def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
@@ -125,7 +141,8 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
 
 
 def _named(operations: Sequence[Operation], label: str, option: str) -> Operation:
-    found = next((one for one in operations if one.label == label.strip() or one.id == label.strip()), None)
+    labels = named_by([label.strip()], [one.label for one in operations])
+    found = next((one for one in operations if one.label in labels or one.id == label.strip()), None)
     if found is None:
         import difflib  # noqa: PLC0415 - of an error alone
 
@@ -135,8 +152,18 @@ def _named(operations: Sequence[Operation], label: str, option: str) -> Operatio
     return found
 
 
-def _reads(operations: Sequence[Operation], rules: CallRules) -> Iterator[Operation]:
-    """Yield what may be read and has JSON, first what its name says to be a state."""
+def _reads(
+    operations: Sequence[Operation], rules: CallRules, values: Mapping[str, str], drive: str, names: frozenset[str]
+) -> Iterator[Operation]:
+    """Yield what may be read and has JSON: first what tells numbers of these names, is beside, or is called a state.
+
+    Args:
+        operations: of the description.
+        rules: what may be called.
+        values: of parameters in paths.
+        drive: the path of the operation that commands.
+        names: of the numbers that it commands, in lower case.
+    """
     found = [
         one
         for one in operations
@@ -144,9 +171,20 @@ def _reads(operations: Sequence[Operation], rules: CallRules) -> Iterator[Operat
         and rules.decide(one).may
         and not harmful_words(one)
         and any(map(is_json, one.formats))
-        and not any(item.required for item in one.parameters)
+        and not any(item.required and item.name not in values for item in one.parameters)
     ]
-    yield from sorted(found, key=lambda one: not _STATE.search(f"{one.template} {one.id}"))
+    filled_in = [
+        replace(one, template=re.sub(r"\{([^{}]+)\}", lambda name: values[name[1]], one.template)) for one in found
+    ]
+    beside = posixpath.dirname(drive)
+    yield from sorted(
+        filled_in,
+        key=lambda one: (
+            -len(names & {at.rpartition("/")[2].lower() for at, _ in numbers_in(one.shape or {})}),
+            not one.template.startswith(f"{beside.rstrip('/')}/"),
+            not _STATE.search(f"{one.template.removeprefix(beside)} {one.id}"),
+        ),
+    )
 
 
 class Finder(ABC):
@@ -157,7 +195,12 @@ class Finder(ABC):
         binding: how calls become requests.
         plan: what can be commanded and read.
         clock: by which it is watched.
+
+    Attributes:
+        seconds: the duration that is asked for, where the operation takes one.
     """
+
+    seconds = 1.0
 
     def __init__(self, api: RestInterface, binding: Binding, plan: Plan, clock: Clock = WALL_CLOCK) -> None:
         self._api, self._binding, self._plan, self._clock = api, binding, plan, clock
@@ -208,7 +251,7 @@ class Finder(ABC):
     def _command(self, values: Mapping[str, float]) -> Exchange:
         """Command some numbers; the others are 0, or as near as their limits allow."""
         zero = {one.name: min(max(0.0, one.limits[0]), one.limits[1]) for one in self._plan.numbers}
-        written = {**zero, **values, "seconds": 1.0}
+        written = {**zero, **values, "seconds": self.seconds}
         for one in self._plan.numbers:
             if one.schema.get("type") == "integer":
                 written[one.name] = round(written[one.name])

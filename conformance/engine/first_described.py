@@ -14,9 +14,11 @@ from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
 from conformance.documents.json_schema import UnresolvedError, kinds_of
 from conformance.documents.openapi import Operation, read_operations
-from conformance.engine.first_motion import proposed_map
+from conformance.engine.first_motion import proposed_map, why_no_map
 from conformance.statement.statement import Api, Calls
 
+# So many operations are told of for which no map is proposed.
+_MOST_REASONS = 20
 _TEMPLATE = """\
 # Statement on a device that is judged by its own description, and by what binds every web API.
 # Written from the description; look over every line, then: roaas certify {file}
@@ -92,7 +94,10 @@ def _motion(operations: Sequence[Operation]) -> list[str]:
     """Return the lines of a motion map that the names suggest."""
     found = list(proposed_map(operations))
     lead = "Names in the description suggest this map. Complete it, and take the # away:"
-    return [lead, *found] if found else []
+    if found:
+        return [lead, *found]
+    reasons = list(why_no_map(operations))[:_MOST_REASONS]
+    return ["No map is proposed.", *map(_one_line, reasons)] if reasons else []
 
 
 def _api(folder: Path, found: Description, api: Api) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import Any, Final
 from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.openapi import Operation, is_json
+from conformance.engine.commanded import commanded_by, is_axis
 
 _GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
 _DRIVES: Final = re.compile(r"velocity|cmd_?vel|twist|drive|jog", re.IGNORECASE)
@@ -54,8 +55,21 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
         yield from _velocity(*drives)
 
 
+def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
+    """Yield a sentence on each operation that may move the device, where no map is proposed."""
+    for one in operations:
+        if one.safe or not (_GOES.search(one.label) or _DRIVES.search(one.label)):
+            continue
+        numbers = commanded_by(one)
+        if one.never or not numbers:
+            yield f"{one.label}: {'it must never be called' if one.never else 'it takes no numbers'}."
+            continue
+        named = ", ".join(number.name for number in numbers)
+        yield f"{one.label}: no GET tells numbers called {named}; --drive '{one.label}' finds what shows them."
+
+
 def _velocity(drive: Operation, body: Schema) -> Iterator[str]:
-    names = {at.rpartition("/")[2] for at, _ in _numbers(body)}
+    names = {name for at, _ in _numbers(body) if is_axis(name := at.rpartition("/")[2])}
     yield ""
     yield "[motion.velocity]"
     yield f"send = {basic_string(drive.label)}"
@@ -99,7 +113,7 @@ def _best(
         names = {at.rpartition("/")[2] for at, _ in _numbers(state.shape or {})}
         for one in sending:
             sent = dict.fromkeys(at.rpartition("/")[2] for at, _ in _numbers(one[1]))
-            found.append((state, one, [name for name in sent if name in names and not _LASTS.search(name)]))
+            found.append((state, one, [name for name in sent if name in names and is_axis(name)]))
     best = max(found, key=lambda one: len(one[2]), default=None)
     return best if best and best[2] else None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from statistics import median
-from typing import Any
+from typing import Any, Final
 
 from conformance.engine.commanded import Commanded, body_schema, parts_of, template_of
 from conformance.engine.driven_numbers import ANGLE
@@ -17,8 +17,10 @@ from conformance.scenarios.scenario import NotPossibleError
 
 # How long the device is watched before and after a little move, and how long it has for that, s.
 _BEFORE_S, _MOVES_S = 0.25, 3.0
+# No further axis is tried after so long, s.
+_BUDGET_S: Final = 16.0
 # Of a little: so much is tried, and so far off an axis may end, or another one may go with it.
-_PARTS, _FOLLOWS = (1.0, 0.2), 0.15
+_PARTS, _FOLLOWS = (0.2, 1.0), 0.15
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,8 @@ class Moved:
         took_s: time until it was there, s.
         off: how far from its target it rested.
         sigma: the standard deviation of its noise.
-        way: how far it was sent to each side.
+        way: how far it was sent.
+        ways: the ways on which it followed, with signs.
     """
 
     place: str
@@ -38,17 +41,20 @@ class Moved:
     off: float
     sigma: float
     way: float
+    ways: tuple[float, ...] = ()
 
 
 class PositionFinder(Finder):
     """Finds the map of a device that is sent to positions."""
+
+    seconds = 0.5
 
     def found(self) -> Found:
         """Return the map; see Finder.found()."""
         self._refused: list[str] = []
         self._watch(_BEFORE_S)
         counts = {one.label: self._named_places(one.label) for one in self._reads}
-        read = max(counts, key=lambda label: len(counts[label]))
+        read = max(counts, key=lambda label: (len(counts[label]), self._is_called_alike(label)))
         if not counts[read]:
             wanted = ", ".join(one.name for one in self._plan.numbers)
             raise NotPossibleError(
@@ -66,9 +72,12 @@ class PositionFinder(Finder):
             for name, place in counts[read].items()
         }
         moved: dict[str, Moved] = {}
+        until = self._clock.now() + _BUDGET_S
         try:
             for number in self._plan.numbers:
-                if number.name in start:
+                if number.name in start and self._clock.now() > until:
+                    self._found.notes.append(f"{number.name} stays where it is: {_BUDGET_S:g} s were over.")
+                elif number.name in start:
                     found = self._followed(number, counts[read], start)
                     if found is not None:
                         moved[number.name] = found
@@ -77,9 +86,15 @@ class PositionFinder(Finder):
         if not moved and self._refused:
             raise NotPossibleError(self._refused[0])
         if not moved:
-            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} did not follow any target")
+            said = " ".join(self._found.notes)
+            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} followed no target: {said}")
         self._found.lines = list(self._goto_lines(read, start, moved))
         return self._found
+
+    def _is_called_alike(self, operation: str) -> bool:
+        """Return whether an operation is called as something that is commanded."""
+        called = operation.rpartition("/")[2].lower()
+        return any(one.place.strip("{}").rpartition("/")[2].lower() == called for one in self._plan.numbers)
 
     def _named_places(self, operation: str) -> dict[str, str]:
         """Return the places of an operation's numbers by the name of what is commanded under the same name."""
@@ -88,7 +103,7 @@ class PositionFinder(Finder):
             words = number.place.strip("{}").split("/")
             own = words[-1].lower()
             same = [one for one in places if one.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
-            if own in operation.rpartition("/")[2].lower():
+            if own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
                 same += [one for one in places if one.lower() in {"", "/value", f"/{own}/value"}]
             # Of several, the one whose path has most in common with that of what is commanded.
             same.sort(key=lambda one: (bool(ECHO.search(one)), -len(set(words) & set(one.split("/")))))
@@ -98,26 +113,33 @@ class PositionFinder(Finder):
 
     def _followed(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
         """Send one axis a little to each side, less far if it does not get there; return how it followed, or None."""
-        why = ""
-        for part in _PARTS:
+        found, why = None, "its limits leave no room"
+        # Of what is declared, a part is safe; of what is not, nobody knows how far it may go.
+        for part in _PARTS[1:] if number.declared else _PARTS:
             little = part * number.little
-            tries = [
-                self._moved(number, places, start, way)
-                for way in (little, -little)
-                if not number.declared or number.declared[0] <= start[number.name] + way <= number.declared[1]
-            ]
-            if tries and all(isinstance(one, Moved) for one in tries):
-                found = [one for one in tries if isinstance(one, Moved)]
-                return Moved(
-                    found[0].place,
-                    max(one.took_s for one in found),
-                    max(one.off for one in found),
-                    max(one.sigma for one in found),
-                    little,
-                )
-            why = next((one for one in tries if isinstance(one, str)), "its limits leave no room")
-        self._found.notes.append(f"{number.name} stays where it is: {why}.")
-        return None
+            tries: list[Moved] = []
+            for way in (little, -little) if part == _PARTS[-1] else (little,):
+                if number.declared and not number.declared[0] <= start[number.name] + way <= number.declared[1]:
+                    continue
+                one = self._moved(number, places, start, way)
+                if isinstance(one, str):
+                    why = one
+                    tries.clear()
+                    break
+                tries.append(one)
+            if not tries:
+                break
+            found = Moved(
+                tries[0].place,
+                max(one.took_s for one in tries),
+                max(one.off for one in tries),
+                max(one.sigma for one in tries),
+                little,
+                tuple(one.ways[0] for one in tries),
+            )
+        if found is None:
+            self._found.notes.append(f"{number.name} stays where it is: {why}.")
+        return found
 
     def _moved(
         self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float], way: float
@@ -156,7 +178,7 @@ class PositionFinder(Finder):
             own = next(one.little for one in self._plan.numbers if one.name == name)
             if name != number.name and abs(end - start[name]) > max(_FOLLOWS * own, _FOLLOWS * abs(way)):
                 return f"with it {name} went from {start[name]:.4g} to {end:.4g}"
-        return Moved(place, took_s, abs(ends[number.name] - goal), sigma, abs(way))
+        return Moved(place, took_s, abs(ends[number.name] - goal), sigma, abs(way), (way,))
 
     def _goto_lines(self, read: str, start: Mapping[str, float], moved: Mapping[str, Moved]) -> Iterator[str]:
         numbers = {one.name: one for one in self._plan.numbers if one.name in moved}
@@ -169,13 +191,13 @@ class PositionFinder(Finder):
         widest = 0.0
         for name, found in moved.items():
             number, here = numbers[name], start[name]
-            near = (here - found.way, here + found.way)
+            near = (here + min(0.0, *found.ways), here + max(0.0, *found.ways))
             limits = [round(one, 4) for one in number.declared or near]
             widest = max(widest, (limits[1] - limits[0]) / found.way)
             pointer, _, angle = found.place.partition(ANGLE)
             given: dict[str, Any] = {"at": pointer, "unit": "rad" if number.turns else "", "limits": limits}
             given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
-            given |= {"angle": angle} if angle else {}
+            given |= ({"angle": angle} if angle else {}) | ({} if number.declared else {"bound": False})
             source = "as declared" if number.declared else "none are declared; so far it was seen to go"
             yield f"{key(name)} = {inline(given)}  # limits: {source}"
         yield ""
@@ -189,8 +211,9 @@ class PositionFinder(Finder):
             yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}'}))}"
         slowest = max(one.took_s for one in moved.values())
         if lasts:
-            yield "seconds = 1.0  # the suite's: the duration that it asks for"
-            yield f"settle_s = {max(0.5, slowest - 1.0 + 0.3):.2f}  # seen: a move of 1 s took {slowest:.2f} s"
+            settle_s = max(0.5, slowest - self.seconds + 0.3)
+            yield f"seconds = {self.seconds}  # the suite's: the duration that it asks for"
+            yield f"settle_s = {settle_s:.2f}  # seen: a move of {self.seconds} s took {slowest:.2f} s"
         else:
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
         off = max(max(2 * one.off, 8 * one.sigma) for one in moved.values())

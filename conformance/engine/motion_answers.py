@@ -9,10 +9,10 @@ from conformance.contract.described import MOTION
 from conformance.measures.samples import SEVERAL, Sample, slope
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.measuring import measured
-from conformance.scenarios.motion.moves import stops, targets
+from conformance.scenarios.motion.moves import clamped_targets, stops, targets
 from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
 from conformance.scenarios.motion.vanishing import WAYS, vanishing
-from conformance.scenarios.motion.velocities import let_go, velocities
+from conformance.scenarios.motion.velocities import clamped_velocities, let_go, velocities
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import counted
@@ -28,7 +28,8 @@ QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
 _BROKEN: Final = frozenset({"fail", "warn"})
 # Of its velocity: a device that was let go, and moves at that part of it, drives on.
 _DRIVES_ON: Final = 0.5
-_LONG: Final = 160
+_LONG: Final = 240
+_NO_LIMITS: Final = "no limits are declared that are refused"
 
 
 def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: Recordings) -> list[dict[str, str]]:
@@ -47,11 +48,13 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
         own = [judged[id_] for id_ in ids if id_ in judged]
         value = _answer(own)
         said, picture = figure(motion, recordings)
+        if value == "yes" and said == _NO_LIMITS:
+            value = "not seen"
         if value == "no":
             said, picture = _fault(own, picture)
         elif value == "not seen" and said.startswith("no: "):
             value, said = "no", said.removeprefix("no: ")
-        elif value == "not seen":
+        elif value == "not seen" and said != _NO_LIMITS:
             said = next((one.reason for one in own if one.reason), "") or said or "nothing was tried"
         found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
     return found
@@ -190,6 +193,7 @@ def _refuses(_motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
         if one.kind == "beyond" and one.exchange is not None
     ]
     if not tried:
-        return "the map declares no limits that are refused", ""
+        clamped = next(_parts(recordings, clamped_targets, clamped_velocities), None)
+        return ("they are clamped" if clamped else _NO_LIMITS), ""
     refused = sum(not one.exchange.response.ok for one in tried if one.exchange)
     return f"{refused} of {len(tried)} beyond the limits were refused, the first {tried[0].what}", ""

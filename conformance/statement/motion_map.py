@@ -39,6 +39,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         angle: it turns freely, in rad: the angle of this name, of a quaternion or as a number; empty: it does not. Its
             limits say which targets are tried.
         read: the operation that says where it is; empty: that of the state.
+        bound: whether it must stay within its limits on its ways; else they only say which targets are tried.
     """
 
     at: Pointer
@@ -50,6 +51,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rest: Positive | None = None
     angle: Angle | Literal[""] = ""
     read: Call | Literal[""] = ""
+    bound: bool = True
 
     def __post_init__(self) -> None:
         """Check the limits.

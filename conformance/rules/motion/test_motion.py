@@ -64,7 +64,7 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in legs_of(trace):
         seen = usable(leg)
         for name, axis in motion.state.axes.items():
-            if axis.angle:
+            if axis.angle or not axis.bound:
                 continue
             room = motion.tolerance(name)
             least, greatest = axis.limits[0] - room, axis.limits[1] + room

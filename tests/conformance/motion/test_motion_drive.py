@@ -110,7 +110,7 @@ def test_what_a_rover_cannot_actuate_stays_0(tmp_path):
 def test_a_rover_that_refuses_every_velocity_is_told_with_its_words(tmp_path):
     with serving_rover(Refusing("ahead", "left")) as url:
         done, _, given = _driven(url, tmp_path)
-    assert (done.returncode, given) == (2, [])
+    assert (done.returncode, given) == (4, [])
     assert "ahead and left cannot be actuated" in done.stderr
 
 
@@ -146,5 +146,5 @@ class Stuck(Body):
 def test_a_rover_that_never_moves_is_told_so_at_once(tmp_path):
     with serving_rover(Rover(Stuck(rover.LIMITS))) as url:
         done, _, given = _driven(url, tmp_path)
-    assert (done.returncode, given) == (2, [])
+    assert (done.returncode, given) == (4, [])
     assert "was accepted (ahead at 0.05, left at 0.05), and no number" in done.stderr
