@@ -104,13 +104,13 @@ class Definition:
         return shape
 
 
-def value_at(message: Any, pointer: str) -> Any:
-    """Return the value at a JSON pointer; None if there is none."""
+def value_at(message: Any, pointer: str, missing: Any = None) -> Any:
+    """Return the value at a JSON pointer; ``missing`` if there is none."""
     for step in pointer.split("/")[1:]:
         try:
             message = message[int(step)] if isinstance(message, list) else message[step]
         except (LookupError, TypeError, ValueError):
-            return None
+            return missing
     return message
 
 

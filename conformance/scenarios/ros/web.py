@@ -82,7 +82,14 @@ def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosM
         for web, own in body.fields.items():
             mapped = put_at(mapped, web, value_at(message, own))
         message = mapped
-    return put_at(body.body, body.at, message)
+    return _merged(body.body, put_at({}, body.at, message))
+
+
+def _merged(one: Any, other: Any) -> Any:
+    """Return an object with the members of two, those of the second first; of what is no object the second."""
+    if isinstance(one, dict) and isinstance(other, dict) and one:
+        return {name: _merged(one.get(name), other.get(name, one.get(name))) for name in (*one, *other)}
+    return other
 
 
 def _web(value: Any, shape: Shape, definition: Definition, ros: RosMap) -> Any:
@@ -123,8 +130,7 @@ def differences(
     for web, own in body.fields.items():
         shape = definition.at(own)
         if shape is not None:
-            there = message if not web else _MISSING if value_at(message, web) is None else value_at(message, web)
-            found += judge.compared(there, value_at(value, own), shape, own)
+            found += judge.compared(value_at(message, web, _MISSING), value_at(value, own), shape, own)
     return found
 
 

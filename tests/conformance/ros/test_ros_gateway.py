@@ -1,9 +1,11 @@
 """A right gateway is never blamed, and a wrong one is by the requirement that it breaks: without a robot."""
 
+import itertools
 import json
 import os
 import re
 import sys
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 from subprocess import PIPE, Popen
@@ -11,6 +13,8 @@ from subprocess import PIPE, Popen
 import pytest
 import web_gateway
 from processes import ended
+
+from ros_probe.process import RosProcess
 
 ROOT = Path(__file__).parents[3]
 
@@ -96,3 +100,43 @@ def test_what_is_missing_is_named(tmp_path, domain_id):
         assert judged["ros-gateway/once"] == "skip"
         result = (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
         assert "give --ros-play (the suite is the robot) or --allow-motion" in result
+
+
+class _Moving(threading.Thread):
+    """A robot that moves: it publishes another odometry ten times a second, until it is told to end."""
+
+    def __init__(self, domain_id):
+        super().__init__(daemon=True)
+        self.process, self.ends = RosProcess("play", "--name", "robot", domain_id=domain_id), threading.Event()
+        self.process.await_ready()
+
+    def run(self):
+        for number in itertools.count(1):
+            value = {"child_frame_id": f"Zürich {number}", "pose": {"pose": {"position": {"x": number / 3}}}}
+            command = {"do": "publish", "topic": "/odom", "type": "nav_msgs/msg/Odometry", "values": [value]}
+            self.process.ask(json.dumps(command))
+            if self.ends.wait(0.1):
+                return
+
+    def end(self):
+        self.ends.set()
+        self.join()
+        self.process.close()
+
+
+@pytest.mark.parametrize(
+    ("faults", "broken"),
+    [("", set()), ("rounded", {"read-exact"}), ("back", {"read-newest"}), ("frozen", {"read-fresh"})],
+)
+def test_a_gateway_is_judged_beside_a_robot(tmp_path, domain_id, faults, broken):
+    robot = _Moving(domain_id)
+    ros = "\n".join(line for line in SMALL.splitlines() if "/basic" not in line)
+    with _served(domain_id, faults) as url:
+        robot.start()
+        try:
+            done, judged = _judged(tmp_path, domain_id, url, "--ros", "--allow-motion", ros=ros)
+        finally:
+            robot.end()
+    failed = {id_.removeprefix("ros-gateway/") for id_, verdict in judged.items() if verdict == "fail"}
+    assert failed == broken, done.stdout
+    assert "skip" not in judged.values(), done.stdout

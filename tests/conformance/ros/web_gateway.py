@@ -130,11 +130,16 @@ class Gateway(Node):
         if "swapped" in fault and hasattr(message, "linear"):
             message.linear.x, message.angular.z = message.angular.z, message.linear.x
         if "reordered" in fault and self.count % 4 == 1:
+            # It comes after the next one, or after a moment without one.
             self.held.append((path, message))
+            threading.Timer(0.2, self.release).start()
             return
         self.senders[path].publish(message)
         if "doubled" in fault and self.count % 4 == 0:
             self.senders[path].publish(message)
+        self.release()
+
+    def release(self):
         while self.held:
             path, message = self.held.pop()
             self.senders[path].publish(message)

@@ -1,0 +1,81 @@
+"""Whether what a gateway returns of a real robot's topics is what the suite hears of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any, Final
+
+from conformance.rules.ros_gateway.test_topics import SLACK_S, reads_of, rows
+from conformance.scenarios.ros.watching import Look, Watched, topic_watches
+from conformance.scenarios.ros.web import Difference, differences, document_of
+from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.statement.ros_map import RosMap
+from conformance.verdict.case import Case
+
+# Of a topic of best effort, the suite may miss messages that the gateway has; not most of them.
+_MISSED: Final = 0.5
+
+
+def _places(one: Watched, ros: RosMap) -> list[tuple[Look, list[int]]]:
+    """Return the looks that show a message, each with the indexes of the heard messages that it may be."""
+    values = [each.content for each in one.heard]
+    return [
+        (look, [index for index, value in enumerate(values) if not _differences(one, look, value, ros)])
+        for look in one.looks
+        if look.exchange.response.ok
+    ]
+
+
+def _differences(one: Watched, look: Look, value: dict[str, Any], ros: RosMap) -> list[Difference]:
+    document = document_of(look.exchange.response.body)
+    return differences(document, value, one.definition, reads_of(ros, one.operation), ros)
+
+
+@rule("ros-gateway/read-exact", on=(topic_watches,))
+def watched_exact(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each message that is returned is one that was published."""
+    for one in trace:
+        places = _places(one, ros)
+        missed = sum(not found for _, found in places)
+        if not one.reliable and missed <= _MISSED * len(places):
+            if missed:
+                yield Note(f"{missed} of {len(places)} messages of {one.topic}, which has best effort, were not heard.")
+            places = [(look, found) for look, found in places if found]
+        for look, found in places:
+            if found:
+                yield Case(True, look.exchange, f"a message that was published on {one.topic}")
+                continue
+            near = [each for each in one.heard if each.at < look.sent + SLACK_S] or list(one.heard)
+            every = [_differences(one, look, json.loads(each.value), ros) for each in near]
+            own, web = rows(min(every, key=len))
+            expected = f"a message that was published on {one.topic}; the most similar one has {own}"
+            yield Case(False, look.exchange, expected, web, one.operation)
+
+
+@rule("ros-gateway/read-fresh", on=(topic_watches,))
+def watched_fresh(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether a message is returned no later than declared after the next one came."""
+    for one in trace:
+        reads = reads_of(ros, one.operation)
+        within_s = (reads.max_age_s or reads.timeout_s) + SLACK_S
+        for look, found in _places(one, ros):
+            if not found:
+                continue
+            next_at = one.heard[found[-1] + 1].at if found[-1] + 1 < len(one.heard) else look.sent
+            expected = f"a message on {one.topic} that was the last one {within_s:g} s before, or a newer one"
+            late_s = look.sent - next_at
+            yield Case(late_s <= within_s, look.exchange, expected, f"one {late_s:.1f} s after the next", one.operation)
+
+
+@rule("ros-gateway/read-newest", on=(topic_watches,))
+def watched_newest(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether no message is returned after a newer one."""
+    for one in trace:
+        last = -1
+        for look, found in _places(one, ros):
+            later = [index for index in found if index >= last]
+            if found:
+                expected = f"a message on {one.topic} that is no older than the one before"
+                yield Case(bool(later), look.exchange, expected, "an older one", one.operation)
+            last = later[0] if later else last
