@@ -255,7 +255,7 @@ def test_the_closed_model_and_the_histograms_while_they_grow(toy, load, wait_for
     [
         ("--operation delivery", "--allow-motion"),
         ("--thresholds none.toml", "No such file"),
-        ("none.toml", "No such file"),
+        ("none.toml", "there is no file none.toml"),
         ("--stages 1,x", "not a list of stages"),
     ],
 )
