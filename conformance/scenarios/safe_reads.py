@@ -19,7 +19,7 @@ from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import collection_of, is_devices, is_shared
+from conformance.api.rest.things import another, collection_of, is_devices, is_shared
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import shown
 from conformance.documents.openapi import Operation, is_json, operations_of
@@ -37,6 +37,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError, NotPermitted
 _ROUNDS, _WATCHED = 3, 12
 # What is left alone meanwhile is left alone for at least so long, s, and at most.
 _LEAST_S, _MOST_S = 0.3, 5.0
+# The turn of the values that are written before them.
+_TURN: Final = 41
 # So many safe requests are sent one by one, to find the one that acts.
 _SINGLE: Final = 150
 
@@ -68,6 +70,7 @@ class _Resource:
         write: writes it; None: it can only be created.
         names: its members that clients write.
         delete: deletes it, if this run has created it; None otherwise.
+        first: these members as they were before this run's own write, if it has written them.
         was: these members as they should be.
         last: the last read.
     """
@@ -77,6 +80,7 @@ class _Resource:
     write: Operation | None
     names: frozenset[str]
     delete: Operation | None = None
+    first: dict[str, Any] = field(default_factory=dict)
     was: dict[str, Any] = field(default_factory=dict)
     last: Exchange | None = None
 
@@ -139,6 +143,9 @@ class _Watch:
         """Return what became of each resource."""
         try:
             self.resources = [one for one in self.resources if self._settled(one)]
+            # What a safe request undoes it may have undone long ago: something is written just before them.
+            for one in self.resources:
+                self._changed(one)
             found = dict[str, Watched]()
             # What GET toggles, HEAD may toggle back.
             for methods in (("GET",), ("HEAD", "OPTIONS")):
@@ -151,6 +158,9 @@ class _Watch:
             return list(found.values())
         finally:
             for one in self.resources:
+                if one.first:
+                    one.was = one.first
+                    self._restored(one)
                 if one.delete is not None:
                     self.writer.conditional(one.delete, one.read, one.path)
 
@@ -164,6 +174,23 @@ class _Watch:
             was = members(before, one.names) if before is not None else now
             one.was = {name: value for name, value in now.items() if same(was.get(name), value)}
         return bool(one.was)
+
+    def _changed(self, one: _Resource) -> None:
+        """Write other values to what is always there; where it does not read so, it is watched as it is."""
+        if one.write is None or one.path or one.last is None:
+            return
+        schema = one.write.bodies[next(iter(one.write.bodies))].schema
+        parts = flat(schema).get("properties", {})
+        whole = {name: value for name, value in members(one.last, parts).items() if name in parts}
+        other = another(schema, {**whole, **one.was}, _TURN, self.writer.values.collections)
+        first, now = one.was, {name: other[name] for name in one.was}
+        if now == first:
+            return
+        one.first, one.was = first, now
+        if not self._restored(one):
+            one.was = first
+            self._restored(one)
+            self._settled(one)
 
     def _read(self, one: _Resource) -> Exchange:
         return self.writer.send(one.read, one.path)

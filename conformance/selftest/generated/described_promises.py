@@ -20,7 +20,8 @@ _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 _NOT_ACCEPTABLE, _FAILED, _REQUIRED, _PART, _CURRENT = 406, 412, 428, 206, 304
 _WRITING = frozenset({"PUT", "PATCH", "DELETE"})
 _OCTETS, _CSV, _KEY = "application/octet-stream", "text/csv", "Idempotency-Key"
-_DECIMALS = 2
+# As many resources are tried, and so many decimals are kept.
+_TRIED, _DECIMALS = 3, 2
 
 
 @dataclass
@@ -29,7 +30,7 @@ class _Past:
 
     Attributes:
         tags: the entity tags that each path has had.
-        writes: the last bodies that were written, by path.
+        writes: the first and the last request that wrote, by path.
         keyed: the first request and response of each idempotency key.
     """
 
@@ -128,7 +129,7 @@ def _changing(exchange: Exchange, act: _Act) -> Callable[[Tally], Change]:
                 if request.method == "GET" and tag and tag not in past.tags.setdefault(request.path, []):
                     past.tags[request.path].append(tag)
                 if request.method == "PUT" and is_json(request.media_type):
-                    past.writes[request.path] = [*past.writes.get(request.path, [])[-1:], request]
+                    past.writes[request.path] = [*past.writes.pop(request.path, [])[:1], request]
             return response
 
         return change
@@ -178,16 +179,18 @@ def _without(name: str) -> _Act:
 
 
 def _reverting(method: str) -> _Act:
-    """Return an act that writes the body before the last one of some resource again."""
+    """Return an act that writes what some resource had first again."""
 
     def act(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
         response = forward(request)
         twice = [one for path, one in past.writes.items() if len(one) > 1 and path != request.path]
         if request.method != method or not twice:
             return response, False
-        first, last = twice[-1]
-        done = forward(_with_current(first, forward))
-        return response, done.status in _SUCCESS and first.body != last.body
+        # The last ones may be gone.
+        for first, last in twice[-_TRIED:][::-1]:
+            if first.body != last.body and forward(_with_current(first, forward)).status in _SUCCESS:
+                return response, True
+        return response, False
 
     return act
 
