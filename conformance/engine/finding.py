@@ -112,11 +112,13 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
     ]:
         raise NotPossibleError(f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}")
     reads = [_with_values(_named(operations, read, "--read"), read)[0]] if read else []
-    names = frozenset(one.place.strip("{}").rpartition("/")[2].lower() for one in numbers)
+    is_velocity = bool(_DRIVES.search(f"{chosen.template} {chosen.id}"))
+    # A position is read by its name; a number called as a velocity may only repeat what was commanded.
+    named_alike = () if is_velocity else numbers
+    names = frozenset(one.place.strip("{}").rpartition("/")[2].lower() for one in named_alike)
     reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    is_velocity = bool(_DRIVES.search(f"{chosen.template} {chosen.id}"))
     return Plan(chosen, tuple(numbers), tuple(reads), is_velocity, _stop(operations, chosen), named)
 
 
