@@ -120,7 +120,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     is_drive = "wanted" in move
     wanted = [(x_of(one["sent"]), one["targets"]) for one in commands if _ok(one)]
     lines = []
-    for name in _axes(readings, "speeds" if is_drive else "values") or _axes(readings, "values"):
+    for name in _shown(readings, move.get("wanted")):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
         seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
         # A velocity is no position, even where both go by one name.
@@ -134,6 +134,14 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
         seconds=end - start,
         failed=any(move["what"] in text for text in named),
     )
+
+
+def _shown(readings: Sequence[Mapping[str, Any]], velocities: Mapping[str, float] | None) -> list[str]:
+    """Return what is drawn: of a drive its velocities, and positions too where one of them is told by its axis."""
+    told = _axes(readings, "speeds") if velocities is not None else []
+    others = [one for one in _axes(readings, "values") if one not in told]
+    driven = {name for name, value in (velocities or {}).items() if value}
+    return told if told and driven <= set(told) else [*others, *told]
 
 
 def _axes(readings: Sequence[Mapping[str, Any]], key: str) -> list[str]:
@@ -162,7 +170,7 @@ def _line(
         return f"{x:g},{HEIGHT - _MARGIN - (value - base) / span * (HEIGHT - 2 * _MARGIN):.1f}"
 
     thin = max(1, len(seen) // _POINTS)
-    ends = [*(x for x, _ in aims[1:]), float(WIDTH)]
+    ends = [*(x for x, _ in aims[1:]), float(WIDTH)] if aims else []
     return Line(
         name=name,
         points=" ".join(at(x, value) for x, value in [*seen[::thin], seen[-1]]),
