@@ -184,7 +184,7 @@ class Certificate:
         classes = f"{judged} {claimed}{'class' if judged == 1 else 'classes'}"
         verdict = self.result["verdict"]
         if verdict == "conformant":
-            return f"{'Each of the ' if judged > 1 else 'The '}{classes} passed."
+            return f"Each of the {classes} passed." if judged > 1 else f"The {claimed}class passed."
         failed = sum(c.verdict == "fail" for c in self.classes)
         open_classes = sum(c.verdict == "inconclusive" for c in self.classes)
         if verdict == "not-conformant":

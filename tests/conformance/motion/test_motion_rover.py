@@ -12,6 +12,7 @@ def test_a_right_rover_that_clamps_and_takes_one_move_at_a_time_is_not_blamed(tm
         undeclared, lambda: judged_by_map(serving_rover(Rover(Body(rover.LIMITS, noise=0.004))), rover.MAP, tmp_path)
     )
     calls = (
-        "Calls 4, because the map in the statement names it: PUT /goal/{x}/{y}, DELETE /goal, PUT /velocity, PUT /gripper/{state}"
+        "Calls 4, because the map in the statement names it: "
+        "PUT /goal/{x}/{y}, DELETE /goal, PUT /velocity, PUT /gripper/{state}"
     )
     assert calls in done.stderr
