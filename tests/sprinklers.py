@@ -119,6 +119,8 @@ class Sprinklers:
             return error(428, "If-Match is missing") if asks else None
         tags = re.findall(r'(?:W/)?"[^"]*"', wanted)
         holds = wanted.strip() == "*" or (tag in tags and not tag.startswith("W/"))
+        if self.has("If-Match takes a weak tag"):
+            holds |= f"W/{tag}" in tags
         if self.has("a stale If-Match is taken"):
             holds |= not self.issued.isdisjoint(tags)
         return None if holds else error(412, "another version")
@@ -638,4 +640,5 @@ FAULTS = [
     ),
     ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
     ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
+    ("as described", {"If-Match takes a weak tag": "description/if-match"}),
 ]

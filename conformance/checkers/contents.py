@@ -29,12 +29,19 @@ _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS: Final = "application/octet-stream"
 # So many contents of so many octets are remembered.
 _MOST, _LARGEST = 200, 1 << 20
+_FILES: Final = frozenset({_OCTETS, "application/pdf", "application/zip"})
 _RANGE, _DIGESTS, _READ, _TAGS = (
     "http/range",
     "description/digest",
     "description/written-is-read",
     "description/entity-tag",
 )
+_ASKED: Final = re.compile(r"bytes=(\d*)-(\d*)")
+
+
+def keeps_octets(media_type: str) -> bool:
+    """Return whether what is sent in a media type is a file, whose octets say something each."""
+    return media_type in _FILES or media_type.partition("/")[0] in {"image", "audio", "video"}
 
 
 class _Key(NamedTuple):
@@ -76,7 +83,7 @@ class Contents:
         self._whole.clear()
         self._parts.clear()
         self._sent.clear()
-        is_file = request.media_type == _OCTETS and 0 < len(request.body) <= _LARGEST
+        is_file = keeps_octets(request.media_type) and 0 < len(request.body) <= _LARGEST
         if is_file and answer.ok and answer.status != HTTPStatus.ACCEPTED:
             if request.method == "PUT":
                 self._sent[request.url] = occasion
@@ -100,8 +107,9 @@ class Contents:
                 yield from _part(part, before)
         if len(self._whole) < _MOST and len(answer.body) <= _LARGEST:
             self._whole[key] = answer.body
-        if answer.media_type == _OCTETS:
-            yield from self._file(occasion, self._sent.pop(request.url, None))
+        sent = self._sent.pop(request.url, None)
+        if answer.media_type == (sent.request.media_type if sent is not None else _OCTETS):
+            yield from self._file(occasion, sent)
 
     def _file(self, occasion: Occasion, sent: Occasion | None) -> Iterator[Case]:
         """Judge a read by the file that was sent just before; one that was there before may be there for a while."""
@@ -140,6 +148,13 @@ def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:
         wrong = f"Content-Range: {found[0]}, and the whole has {len(whole)} octets"
     elif answer.body != whole[first : last + 1]:
         wrong = f"{len(answer.body)} octets that are not those of Content-Range: {found[0]}"
+    asked = [value.strip() for name, value in occasion.request.headers if name.lower() == "range"]
+    if len(asked) == 1 and (bounds := _ASKED.fullmatch(asked[0])) and any(bounds.groups()):
+        # A part of what is asked for may be sent, and more than that, but nothing that is all outside it.
+        length = int(bounds[2] or 0)
+        start, end = (int(bounds[1]), length if bounds[2] else last) if bounds[1] else (len(whole) - length, len(whole))
+        if not wrong and (last < start or first > end):
+            wrong = f"Content-Range: {found[0]}, which has nothing of Range: {asked[0]}"
     expected = f"octets {first} to {last} of the {len(whole)}, as a GET of the whole before and after shows them"
     yield occasion.case(_RANGE, not wrong, expected, wrong, cause=f"{label_of(occasion.operation)} octets")
 

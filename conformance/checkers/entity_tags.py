@@ -176,7 +176,10 @@ class EntityTags:
         if not _OTHERS.isdisjoint(asked):
             return
         tag = now.header("etag") or ""
-        matches = tag.removeprefix("W/") in {one.removeprefix("W/") for one in _TAG.findall(wanted)}
+        named = _TAG.findall(wanted)
+        # Strong tags are compared strongly; a device that has weak ones alone may take them back.
+        weakly = tag.startswith("W/") and tag[2:] in {one.removeprefix("W/") for one in named}
+        matches = tag in named or weakly
         if is_refused:
             if answer.status == HTTPStatus.PRECONDITION_FAILED and not matches:
                 self._has_412 |= not tag.startswith("W/")

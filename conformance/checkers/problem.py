@@ -32,6 +32,18 @@ def inside(occasion: Occasion) -> Iterator[Case]:
         yield occasion.case("robustness/no-internals", not (inside or path), expected, found, cause=cause)
 
 
+def stated(occasion: Occasion) -> Iterator[Case]:
+    """Judge that a problem, where it states a status, states that of its response (RFC 9457 3.1.2)."""
+    answer = occasion.response
+    if answer.status < _ERROR or answer.media_type not in {JSON, XML} or not answer.body or answer.cut:
+        return
+    number = (members_of(answer) or {}).get("status")
+    if isinstance(number, int) and not isinstance(number, bool):
+        expected, found = f"a problem whose status is that of the response, {answer.status}", f"the status {number}"
+        cause = f"{answer.status} {number}"
+        yield occasion.case("description/problem-status", number == answer.status, expected, found, cause=cause)
+
+
 def form(occasion: Occasion) -> Iterator[Case]:
     """Judge one response of 400 and above."""
     status, context = occasion.response.status, occasion.context

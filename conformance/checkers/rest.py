@@ -22,7 +22,7 @@ from conformance.verdict.case import Case
 # Those that judge any response; those that judge what the description may say of it.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
 _DOCUMENTS: Final = (
-    fields.json, fields.charset, problem.inside, problem.form, fields.allow, fields.challenge,
+    fields.json, fields.charset, problem.inside, problem.stated, problem.form, fields.allow, fields.challenge,
     declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
 )  # fmt: skip
 

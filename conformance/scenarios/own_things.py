@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
@@ -20,6 +21,7 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
+from conformance.checkers.contents import keeps_octets
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, operations_of
@@ -43,9 +45,15 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _MEMBERS: Final = 6
 # So many filters of a list are tried; a device may list for so long what was deleted, s, and is asked so often.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
+_PARTS: Final = ((("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
+_GONE_PLACE: Final = "path of what was deleted"
 _OCTETS: Final = "application/octet-stream"
 # Files with what programs take for the end of a line, of a text or of a file.
-_FILES: Final = (b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n", bytes(range(256)) + b"\r\n\n \0end")
+_FILES: Final = (
+    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
+    bytes(range(256)) * 17 + b"\r\n\n \0end",
+    bytes(range(255, -1, -1)) * 18,
+)
 # The turn of an identifier that no other check chooses.
 _TURN: Final = 98
 # So many are written one by one after all together, which shows whether the others stay.
@@ -187,8 +195,9 @@ class _Thing:
         is_behind = False
         for change in changes:
             bodies = self._bodies(change, members(first.exchange, ()))
-            if bodies:
-                self._refused(change, bodies)
+            # A JSON patch has no members: the first one that changes something.
+            if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
+                self._refused(change, refusable)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
             for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
@@ -216,6 +225,9 @@ class _Thing:
         """
         names = {one.name.lower() for one in change.parameter("header")}
         tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] if self.tag else []
+        if self._current() and "if-match" in names:
+            # Strong comparison: a weak tag matches none (RFC 9110 13.1.1).
+            tried.append((("If-Match", f"W/{self.tag}"),))
         if self.tag and "428" in change.responses:
             tried.append(())
         if self.tag and "if-none-match" in names:
@@ -237,7 +249,8 @@ class _Thing:
     def _other(self, bodies: Sequence[Any]) -> Any:
         """Return a body that would change it; None without any."""
         now = self._members()
-        others = (one for one in bodies if any(not same(now.get(name), one[name]) for name in one))
+        objects = (one for one in bodies if isinstance(one, dict))
+        others = (one for one in objects if any(not same(now.get(name), one[name]) for name in one))
         return next(others, bodies[0] if bodies else None)
 
     def _behind(self, change: Operation, body: Any, old: str) -> None:
@@ -255,18 +268,40 @@ class _Thing:
             put = operations.get(("PUT", template))
             if method != "GET" or put is None or not template.startswith(above) or "{" in template[len(above) :]:
                 continue
-            if next(iter(put.bodies), "") != _OCTETS or not (allowed(self.api, put) and allowed(self.api, read)):
+            media_type = next((one for one in put.bodies if keeps_octets(one)), "")
+            if not media_type or not (allowed(self.api, put) and allowed(self.api, read)):
                 continue
             path = self.target.rstrip("/") + template[len(above) - 1 :]
             for octets in _FILES:
-                inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=_OCTETS)
+                inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=media_type)
                 request = replace(written(put, inputs), target=path)
-                if not self.surveyor.send(put, Variation(Kind.AGAIN, "", "", inputs), request).ok:
+                # A device may look into an image, and refuse what is none.
+                kind = Kind.AGAIN if media_type == _OCTETS else Kind.ODD
+                if not self.surveyor.send(put, Variation(kind, "", "", inputs), request).ok:
                     break
                 whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
-                for fields in ((), (("Range", "bytes=2-5"),), ()):
+                more = _PARTS if "206" in read.responses and octets is _FILES[-1] else ()
+                for fields in ((), (("Range", "bytes=2-5"),), *more, ()):
                     part = replace(whole, headers=(*whole.headers, *fields))
                     self.surveyor.send(read, Variation(Kind.ODD if fields else Kind.AGAIN, "", "", Inputs()), part)
+            else:
+                self._ended(put, read, operations.get(("DELETE", template)), replace(request, body=_FILES[0]), whole)
+
+    def _ended(
+        self, put: Operation, read: Operation, delete: Operation | None, request: Outgoing, whole: Outgoing
+    ) -> None:
+        """Write to a file that is there as if it were not, and delete it; read it after each."""
+        steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = []
+        if any(one.name.lower() == "if-none-match" for one in put.parameter("header")):
+            steps.append((put, request, (("If-None-Match", "*"),)))
+        if delete is not None and allowed(self.api, delete):
+            own = written(delete, usual_inputs(delete, self.surveyor.values)[0])
+            steps.append((delete, replace(own, target=whole.target), ()))
+        for operation, outgoing, fields in steps:
+            headers = (*(one for one in outgoing.headers if one[0].lower() != "if-none-match"), *fields)
+            odd, again = Variation(Kind.ODD, "", "", Inputs()), Variation(Kind.ODD, "", _GONE_PLACE, Inputs())
+            self.surveyor.send(operation, odd, replace(outgoing, headers=headers))
+            self.surveyor.send(read, again if operation is delete else odd, whole)
 
     def _members(self) -> dict[str, Any]:
         return members(self.last, ()) if self.last is not None else {}
@@ -324,11 +359,11 @@ class _Thing:
         if not self.get().ok:
             return
         self.sent(delete, None, *self._current())
-        self.get(place="path of what was deleted")
+        self.get(place=_GONE_PLACE)
         head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
-        variation = Variation(Kind.ODD, "", "path of what was deleted", Inputs())
+        variation = Variation(Kind.ODD, "", _GONE_PLACE, Inputs())
         self.surveyor.send(self.read, variation, replace(head, target=self.target), fresh=False)
-        is_gone = self.get(place="path of what was deleted").status in ABSENT
+        is_gone = self.get(place=_GONE_PLACE).status in ABSENT
         listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
         if is_gone and listing is not None and identifier_of(was, self.read):
             for query in _filters(listing, was):

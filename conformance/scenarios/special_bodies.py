@@ -155,7 +155,8 @@ def _nulls(
     for name, value in changed.items():
         inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
         if inner and len(value) > 1:
-            yield from ({name: usable[name]}, {name: {inner[0]: value[inner[0]]}})
+            # Each alone: what the patch before has changed stays.
+            yield from ({name: usable[name]}, *({name: {one: value[one]}} for one in inner[:2]))
             break
 
 

@@ -40,7 +40,7 @@ def _broken(tmp_path, exchanges):
     document = {"openapi": "3.1.0", "info": {"title": "d", "version": "1"}, "paths": _PATHS}
     judges = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), _BASE)
     ids = ("http/range", "description/digest", "description/written-is-read", "description/entity-tag")
-    named = {*ids, "description/if-match", "description/required"}
+    named = {*ids, "description/problem-status", "description/if-match", "description/required"}
     return {case.requirement for exchange in exchanges for case in judges(exchange) if not case.holds} & named
 
 
@@ -64,6 +64,9 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
     "exchanges",
     [
         [_GET, _PART, _GET],
+        # A part of what is asked for, and more than that.
+        [_GET, _one("GET /map 206", b"89", range="bytes=-4", _content_range="bytes 8-9/10"), _GET],
+        [_GET, _one("GET /map 206", b"6789", range="bytes=8-", _content_range="bytes 6-9/10"), _GET],
         # The content has changed in between, by another client or by itself.
         [_GET, _SHIFTED, _OTHER, _GET],
         [_GET, _SHIFTED, _PUT, _GET],
@@ -94,6 +97,9 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
         [_STATE, _one("PUT /state 428"), _one("PUT /state 412", if_none_match="*"), _STATE],
         [_STATE, _one("PUT /state 412", if_match='"s"', if_none_match='"s"'), _STATE],
         [_one("GET /free 200", b"{}", _etag='"s"'), _one("PUT /free 200"), _one("PUT /free 200", if_none_match="*")],
+        # A problem need not state a status.
+        [_one("GET /state 404", b"{}", kind="application/problem+json")],
+        [_one("GET /state 404", b'{"status": 404}', kind="application/problem+json")],
         # Nobody knows whether something was there.
         [_one("PUT /state 200", if_none_match="*"), _one("PUT /state 200")],
         [_STATE, _one("PUT /state 200", if_match='"s"'), _one("PUT /state 200")],
@@ -107,6 +113,7 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
     ("requirement", "exchanges"),
     [
         ("http/range", [_GET, _SHIFTED, _GET]),
+        ("http/range", [_GET, _one("GET /map 206", b"0123", range="bytes=-4", _content_range="bytes 0-3/10"), _GET]),
         ("http/range", [_GET, _one("GET /map 206", b"23", range="bytes=2-3", _content_range="bytes 2-3/2"), _GET]),
         ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **_IF_RANGE)]),
         ("description/entity-tag", [_STATE, _STALE, _STATE]),
@@ -118,6 +125,8 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
         ),
         ("description/written-is-read", [_PUT, _OTHER, _PUT_NEXT, _one("GET /map 200", b"nex")]),
         ("description/if-match", [_STATE, _one("PUT /state 200", if_none_match="*")]),
+        ("description/if-match", [_STATE, _one("PUT /state 200", if_match='W/"s"')]),
+        ("description/problem-status", [_one("GET /state 404", b'{"status": 400}', kind="application/problem+json")]),
         ("description/required", [_STATE, _one("PUT /state 200")]),
     ],
 )
