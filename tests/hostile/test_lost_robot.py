@@ -25,6 +25,7 @@ from soap_devices import serving
 
 from conformance.api.rest.stops import UNDELIVERED
 from conformance.commandline.exit_codes import ExitCode
+from conformance.contract.described import MOTION
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.fleet.fleet_file import Member
 from conformance.fleet.member_run import MemberResult, Outcome
@@ -92,9 +93,11 @@ def robot_at(url: str, folder: Path, motion: str, wsdl: str = "") -> RobotUnderT
     """Return a device with a motion map, connected, as a run that may move it has it."""
     where, connection = Endpoints(), Connection(timeout_s=1.0)
     if wsdl:
-        contract, where, _ = soap_contract(f"{url}/{wsdl}", None, where, connection, folder, moves=True)
+        contract, where, _ = soap_contract(f"{url}/{wsdl}", None, where, connection, folder, mapped={MOTION})
     else:
-        contract, where, _ = described_contract(f"{url}/openapi.json", (), None, where, connection, folder, moves=True)
+        contract, where, _ = described_contract(
+            f"{url}/openapi.json", (), None, where, connection, folder, mapped={MOTION}
+        )
     (folder / "robot.toml").write_text(motion, encoding="utf-8")
     statement = msgspec.structs.replace(load_statement(folder / "robot.toml", contract), endpoints=where)
     robot = RobotUnderTest(Run(statement, contract, allow_motion=True, stop_s=3.0), connection)

@@ -10,6 +10,7 @@ from aiohttp import web
 from small_device import REFUSED, answers, described, error, reading, small_device
 
 from conformance.api.rest.stops import UNDELIVERED
+from conformance.contract.described import MOTION
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, empty_statement
@@ -92,7 +93,7 @@ def test_a_refused_stop_is_told_if_the_run_has_moved_the_device(belt, tmp_path):
     connection = Connection()
     with small_device(_DESCRIPTION, {"/state": {"GET": state}, "/go": {"POST": go}, "/stop": {"POST": stop}}) as url:
         contract, where, _ = described_contract(
-            f"{url}/openapi.json", (), None, Endpoints(), connection, tmp_path, moves=True
+            f"{url}/openapi.json", (), None, Endpoints(), connection, tmp_path, mapped={MOTION}
         )
         statement = msgspec.structs.replace(empty_statement(contract), endpoints=where, calls=Calls(("*",)))
         run = Run(statement, contract, allow_motion=True, stop_s=0.5)

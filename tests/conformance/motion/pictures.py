@@ -1,6 +1,6 @@
 """Draw a right and a wrong move for the requirements of motion, from recorded moves of the simulated devices.
 
-python tests/conformance/motion/pictures.py docs/motion
+PYTHONPATH=tests python tests/conformance/motion/pictures.py docs/motion
 """
 
 import sys
