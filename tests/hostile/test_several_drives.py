@@ -10,6 +10,7 @@ import pytest
 from aiohttp import web
 from small_device import REFUSED, answers, described, error, small_device
 
+from conformance.contract.described import MOTION
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, empty_statement
@@ -133,7 +134,7 @@ def test_a_drive_that_moves_although_the_device_refused_it_is_stopped(status, at
     routes = {"/arms/{arm}/speed": {"POST": drive}, "/arms/{arm}/stop": {"POST": stop}}
     with small_device(_Arms.description, routes) as url:
         contract, where, _ = described_contract(
-            f"{url}/openapi.json", (), None, Endpoints(), Connection(), tmp_path, moves=True
+            f"{url}/openapi.json", (), None, Endpoints(), Connection(), tmp_path, mapped={MOTION}
         )
         statement = msgspec.structs.replace(empty_statement(contract), endpoints=where, calls=Calls(("*",)))
         run = Run(statement, contract, allow_motion=True, stop_s=0.5)

@@ -241,7 +241,7 @@ def test_a_rotation_spreads_the_calls_of_each_operation():
         ("http://127.0.0.1:9/a.json http://127.0.0.1:9/b.json", "are several descriptions: name one"),
         ("http://127.0.0.1:9/a.json --interface rosbridge", "measured over REST or SOAP, with the client wire"),
         ("http://127.0.0.1:9/a?wsdl --wsdl http://127.0.0.1:9/b?wsdl", "are several WSDLs: name one"),
-        ("{0}.json", "cannot be read"),
+        ("{0}.json", "there is no file"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(tmp_path, words, message):
