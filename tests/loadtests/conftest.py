@@ -110,6 +110,12 @@ class Loaded:
 COMMAND = [sys.executable, "-c", "from loadtests.cli import load; load(prog_name='roaas load')"]
 
 
+@pytest.fixture(scope="session")
+def load_command():
+    """The words that begin `roaas load` in a process of its own."""
+    return COMMAND
+
+
 @pytest.fixture
 def load(tmp_path):
     """Run `roaas load`; `begin` gives the process and a function that waits for it. A string may hold several words, as

@@ -8,7 +8,6 @@ import shlex
 import subprocess
 
 import pytest
-from conftest import COMMAND
 
 
 @pytest.fixture
@@ -31,9 +30,9 @@ def test_elsewhere_than_on_a_terminal_there_are_few_lines(robot, load):
     assert re.search(r"/s, 0 failed; p50 \S+, p90 \S+, p95 \S+, p99 \S+, max \S+ ms", told[0])
 
 
-def test_a_terminal_has_one_line_that_is_renewed(robot, tmp_path):
+def test_a_terminal_has_one_line_that_is_renewed(robot, tmp_path, load_command):
     ours, theirs = pty.openpty()
-    command = [*COMMAND, *shlex.split(robot), "--duration", "3", "--out", tmp_path / "out"]
+    command = [*load_command, *shlex.split(robot), "--duration", "3", "--out", tmp_path / "out"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=theirs, env=os.environ | {"TERM": "xterm"}) as run:
         os.close(theirs)
         shown = b""
