@@ -14,6 +14,7 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
 - `act` (action, type, script): the same for goals: `{"reject": true}`, or `{"feedback": [values], "gap_s": s, "end":
   "succeed" | "abort" | "never", "result": value, "refuse_cancel": true, "cancel_s": s}`. Events: `goal`, `rejected`,
   `feedback`, `cancel`, `end`.
+- `script` (name, script): what the served service or action does from now on.
 - `forget` (name): leave a topic, service or action.
 - `graph`: topics with types and counts, services, actions and nodes.
 """
@@ -70,6 +71,7 @@ class Player:
         self._executors: list[Executor] = []
         self._spin(SingleThreadedExecutor(context=self._context), self._node)
         self._entities: dict[str, Any] = {}
+        self._steps: dict[str, _Steps] = {}
         self._timers: dict[str, Any] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
         self._news, self._ends = threading.Condition(), threading.Event()
@@ -81,6 +83,7 @@ class Player:
             "heard": self._heard,
             "serve": self._serve,
             "act": self._act,
+            "script": self._script,
             "forget": self._forget,
             "graph": self._graph,
         }
@@ -184,26 +187,28 @@ class Player:
             return {"events": [events.popleft() for _ in range(len(events))]}
 
     def _serve(self, service: str, type: str, script: list[dict[str, Any]]) -> dict[str, Any]:  # noqa: A002 - as above
-        steps = _Steps(script)
-        answers = {id(step): message_of(f"{type}#Response", step.get("answer", {})) for step in script}
+        self._forget(service)
+        # Made from each step before it is taken, so that a value of another type is the command's problem.
+        steps = self._steps[service] = _Steps(
+            script, lambda step: step | {"made": message_of(f"{type}#Response", step.get("answer", {}))}
+        )
 
         def called(request: Any, _: Any) -> Any:
             step = steps.next()
             self._note(service, "request", plain(request))
             self._ends.wait(None if step.get("never") else step.get("delay_s", 0.0))
-            response = answers[id(step)]
-            self._note(service, "response", plain(response))
-            return response
+            self._note(service, "response", plain(step["made"]))
+            return step["made"]
 
-        self._forget(service)
         self._entities[service] = self._server().create_service(
             type_of(type), service, called, callback_group=ReentrantCallbackGroup()
         )
         return {}
 
     def _act(self, action: str, type: str, script: list[dict[str, Any]]) -> dict[str, Any]:  # noqa: A002 - as above
-        played = _Goals(partial(self._note, action), type, script, self._ends)
         self._forget(action)
+        steps = self._steps[action] = _Steps(script)
+        played = _Goals(partial(self._note, action), type, steps, self._ends)
         self._entities[action] = ActionServer(
             self._server(),
             type_of(type),
@@ -220,6 +225,10 @@ class Player:
             timer = self._timers.pop(topic)
             timer.cancel()
             self._node.destroy_timer(timer)
+
+    def _script(self, name: str, script: list[dict[str, Any]]) -> dict[str, Any]:
+        self._steps[name].replace(script)
+        return {}
 
     def _forget(self, name: str) -> dict[str, Any]:
         self._stop_repeating(name)
@@ -255,10 +264,24 @@ class Player:
 
 
 class _Steps:
-    """A script: each call takes the next step, and the last one goes on."""
+    """A script: each call takes the next step, and the last one goes on.
 
-    def __init__(self, script: list[dict[str, Any]]) -> None:
-        self._left, self._lock = deque(script or [{}]), threading.Lock()
+    Args:
+        script: the steps.
+        prepare: makes a step what `next` returns.
+    """
+
+    def __init__(
+        self, script: list[dict[str, Any]], prepare: Callable[[dict[str, Any]], dict[str, Any]] = dict
+    ) -> None:
+        self._lock, self._prepare = threading.Lock(), prepare
+        self.replace(script)
+
+    def replace(self, script: list[dict[str, Any]]) -> None:
+        """Replace the steps that are left."""
+        left = deque(map(self._prepare, script or [{}]))
+        with self._lock:
+            self._left = left
 
     def next(self) -> dict[str, Any]:
         """Return the next step."""
@@ -272,14 +295,12 @@ class _Goals:
     Args:
         note: keeps an event.
         kind: the action's type.
-        script: a step for each goal.
+        steps: a step for each goal.
         ends: is set when the node ends.
     """
 
-    def __init__(
-        self, note: Callable[[str, Any], None], kind: str, script: list[dict[str, Any]], ends: threading.Event
-    ) -> None:
-        self._note, self._kind, self._steps, self._ends = note, kind, _Steps(script), ends
+    def __init__(self, note: Callable[[str, Any], None], kind: str, steps: _Steps, ends: threading.Event) -> None:
+        self._note, self._kind, self._steps, self._ends = note, kind, steps, ends
         self._accepted: deque[dict[str, Any]] = deque()
         self._by_goal: dict[bytes, dict[str, Any]] = {}
         self._lock = threading.Lock()

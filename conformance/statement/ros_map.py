@@ -99,7 +99,7 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         read: the operation, a template: "{id}" is the goal's id.
         at: where the word for its state is in the response.
-        running, succeeded, aborted, canceled: these words; an empty list: not judged.
+        running, succeeded, aborted, canceled, rejected: these words; an empty list: not judged.
     """
 
     read: Call
@@ -108,6 +108,7 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     succeeded: tuple[str, ...] = ()
     aborted: tuple[str, ...] = ()
     canceled: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
 
 
 class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -121,7 +122,7 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         feedback: where the last feedback is in the response of ``state.read``; None: nowhere.
         result: where the result is in the response of ``state.read``; None: nowhere.
         cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
-        rejected: the statuses when the action server rejects a goal; empty: any that is no success.
+        rejected: the statuses when the action server rejects a goal; empty: any error, or a state that says so.
     """
 
     action: Topic

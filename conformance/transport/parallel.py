@@ -1,8 +1,10 @@
 """Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
 import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from http import HTTPStatus
 from typing import Final
 
@@ -65,6 +67,39 @@ def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
         for client in clients:
             client.close()
     return attempts
+
+
+@contextmanager
+def meanwhile(to: HttpClient, request: Outgoing, timeout_s: float) -> Iterator["Future[tuple[Attempt, float]]"]:
+    """Send a request from a client of its own while the block runs; yield what comes and when (time.monotonic, s).
+
+    It is awaited at the end of the block. No listener gets it, as its time is the point.
+
+    Args:
+        to: where it is sent.
+        request: the request.
+        timeout_s: its deadline, s.
+    """
+    to.connection.take_slot((request.method, to.url(request.target)))
+    own = HttpClient(to.base_url, to.connection.unheard(request_rate=None, resent=0))
+
+    def send() -> tuple[Attempt, float]:
+        attempt: Attempt
+        try:
+            attempt = own.send(
+                request.method, request.target, headers=request.headers, body=request.body, timeout_s=timeout_s
+            )
+        except NoAnswerError as none:
+            attempt = none.unanswered
+        return attempt, time.monotonic()
+
+    with ThreadPoolExecutor(1) as pool:
+        try:
+            yield pool.submit(send)
+        finally:
+            pool.shutdown()
+            own.close()
+    to.connection.note(request.method)
 
 
 class _Client:

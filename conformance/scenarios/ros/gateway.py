@@ -70,6 +70,12 @@ class Gateway:
                 raise NotPossibleError(self._problem) from error
         return self._robot
 
+    def kill(self) -> None:
+        """Kill the robot's end, so that its nodes leave the graph without a word; another one starts when needed."""
+        if self._robot is not None:
+            self._robot.kill()
+            self._robot = None
+
     def close(self) -> None:
         """End the robot's end."""
         if self._robot is not None:

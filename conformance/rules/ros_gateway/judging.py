@@ -1,0 +1,34 @@
+"""What the rules of gateways share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+import msgspec
+
+from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.web import differences, document_of
+from conformance.statement.ros_map import Body, RosMap
+from conformance.transport.exchange import Exchange
+
+
+def differing(exchange: Exchange, value: str, definition: Definition, body: Body, at: str, ros: RosMap) -> str:
+    """Return how a part of a response is not a ROS message; empty: it is.
+
+    Args:
+        exchange: with the response.
+        value: JSON of the message.
+        definition: of its type.
+        body: how the operation writes messages.
+        at: where the part is.
+        ros: how the gateway writes values.
+    """
+    part = msgspec.structs.replace(body, at=at, fields={})
+    found = differences(document_of(exchange.response.body), json.loads(value), definition, part, ros)
+    return f"{found[0].at} is {found[0].web} in place of {found[0].ros}" if found else ""
+
+
+def statuses(declared: Sequence[int]) -> str:
+    """Return which statuses a gateway may respond, as a noun phrase."""
+    return f"status {' or '.join(map(str, declared))}" if declared else "an error status"

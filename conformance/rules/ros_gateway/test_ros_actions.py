@@ -1,0 +1,234 @@
+"""Whether a gateway sends and cancels goals as it is told, and says what becomes of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Final
+
+from conformance.rules.ros_gateway.judging import differing, statuses
+from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
+from conformance.scenarios.ros.web import changed
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
+from conformance.statement.ros_map import RosMap, State
+from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
+
+_ACCEPTED: Final = (
+    Course.SUCCEEDS, Course.ABORTS, Course.CANCELED, Course.GOES_ON, Course.FIRST, Course.SECOND,
+)  # fmt: skip
+_ENDS: Final = {
+    Course.SUCCEEDS: "succeeded", Course.GOES_ON: "succeeded", Course.ABORTS: "aborted", Course.CANCELED: "canceled",
+    Course.FIRST: "canceled",
+}  # fmt: skip
+# What a server gives is shown so long after, at the latest, by several looks, s.
+_SHOWN_S: Final = 0.3
+_SEVERAL: Final = 2
+_NO_STATE: Final = NotClaimed("the map has no state of goals")
+
+
+@rule("ros-gateway/goal-once", on=(action_goals,))
+def once(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether an accepted goal has reached the server once, as it was sent; two sent together are two."""
+    for one in trace.probes:
+        if one.course not in _ACCEPTED or one.course is Course.SECOND:
+            continue
+        if not one.exchange.response.ok:
+            yield Case(holds=False, exchange=one.exchange, expected=f"2xx for a goal {one.course}", cause="refused")
+            continue
+        wanted = 2 if one.course is Course.FIRST else 1
+        goals = [heard for heard in one.heard if heard.what == "goal"]
+        yield Case(
+            len(goals) == wanted,
+            one.exchange,
+            f"{wanted} goal{'s' * (wanted > 1)} at {one.body.action} for {wanted} accepted",
+            observed=f"{len(goals)} goals",
+            cause="lost" if len(goals) < wanted else "doubled",
+        )
+        wrong = next(changed(goals[0].content, json.loads(one.value)), None) if goals else None
+        found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
+        yield Case(not wrong, one.exchange, "the goal's fields at its server", observed=found, cause="changed")
+
+
+@rule("ros-gateway/goal-rejected", on=(action_goals,))
+def rejected(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether a goal that its server rejects is reported as that."""
+    for one in trace.probes:
+        if one.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in one.heard):
+            continue
+        body, ok = one.body, one.exchange.response.ok
+        if not ok:
+            declared = body.rejected
+            status = one.exchange.response.status
+            holds = not declared or status in declared
+            yield Case(holds, one.exchange, f"{statuses(declared)} for a goal {one.course}", cause="status")
+            continue
+        last = one.looks[-1] if one.looks else None
+        state = body.state
+        if body.rejected or last is None or state is None:
+            expected = f"{statuses(body.rejected)} for a goal {one.course}"
+            yield Case(holds=False, exchange=one.exchange, expected=expected, cause="accepted")
+            continue
+        others = {*state.running, *state.succeeded, *state.canceled}
+        holds = last.word in state.rejected if state.rejected else last.word not in others
+        expected = f"the state {' or '.join(state.rejected)}" if state.rejected else "no state of an accepted goal"
+        yield Case(holds, last.exchange, f"{expected} for a goal {one.course}", observed=last.word, cause="state")
+
+
+@rule("ros-gateway/goal-outcome", on=(action_goals,))
+def outcomes(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether a goal's state is that of its server: running until the end, then how it ended, for good."""
+    for one in trace.probes:
+        state, name = one.body.state, _ENDS.get(one.course, "")
+        if state is None:
+            yield _NO_STATE
+            continue
+        if not name or not one.looks or (one.course is not Course.ABORTS and _end_of(one) is None):
+            continue
+        words = _words(state, name)
+        if not words:
+            continue
+        last = one.looks[-1]
+        expected = (
+            f"the state {' or '.join(words)} within {one.body.timeout_s:g} s after the end of a goal {one.course}"
+        )
+        yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=one.course)
+        yield from _steady(one)
+
+
+def _words(state: State, name: str) -> tuple[str, ...]:
+    found: tuple[str, ...] = getattr(state, name)
+    return found
+
+
+def _end_of(one: Goal) -> float | None:
+    """Return when the first of the server's goals ended, or None."""
+    return next((heard.at for heard in one.heard if heard.what == "end"), None)
+
+
+def _steady(one: Goal) -> Iterator[Outcome]:
+    end = _end_of(one)
+    early = [look for look in one.looks if end is not None and look.received < end and is_end(one.body, look.word)]
+    if early:
+        yield Case(
+            holds=False, exchange=early[0].exchange, expected=f"no end before that of a goal {one.course}",
+            observed=f"{early[0].word!r} {(end or 0.0) - early[0].received:.2f} s before it", cause="early",
+        )  # fmt: skip
+    ended = [look for look in one.looks if is_end(one.body, look.word)]
+    left = next((late for first, late in pairwise(ended) if late.word != first.word), None)
+    if ended:
+        found = f"{ended[0].word!r}, then {left.word!r}" if left else ""
+        yield Case(not left, (left or ended[0]).exchange, "the same state after the end", found, cause="changes")
+
+
+@rule("ros-gateway/goal-result", on=(action_goals,))
+def results(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether the result of a goal that succeeded is exact, and that of another one is not another's."""
+    for one in trace.probes:
+        body = one.body
+        if body.result is None:
+            yield NotClaimed("the map has no result of goals")
+            continue
+        ended = [look for look in one.looks if is_end(body, look.word)]
+        if not one.result or not ended or one.course not in _ENDS:
+            continue
+        for look in (ended[-1],):
+            if not look.result and _ENDS[one.course] != "succeeded":
+                continue
+            found = differing(
+                look.exchange, one.result, trace.definitions[f"{one.operation}#Result"], body, body.result, ros
+            )
+            expected = f"the result of a goal {one.course}"
+            yield Case(not found, look.exchange, expected, observed=found, cause=f"{one.course} {found.split(' ')[0]}")
+
+
+@rule("ros-gateway/goal-feedback", on=(action_goals,))
+def feedback(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether feedback is the server's, exact, in order, and the last one."""
+    for one in trace.probes:
+        if one.body.feedback is None:
+            yield NotClaimed("the map has no feedback of goals")
+            continue
+        if one.course is Course.SUCCEEDS and one.exchange.response.ok and one.looks:
+            yield from _feedback(one, trace, ros)
+
+
+def _feedback(one: Goal, trace: Goals, ros: RosMap) -> Iterator[Outcome]:
+    given = [heard.at for heard in one.heard if heard.what == "feedback"]
+    numbered = [(look, _number_of(look, one, trace, ros)) for look in one.looks if look.feedback]
+    if not given:
+        yield NotTested("the server gave no feedback")
+        return
+    if not numbered:
+        yield Case(holds=False, exchange=one.looks[-1].exchange, expected="feedback of the server", cause="none")
+        return
+    strange = next((look for look, number in numbered if number is None), None)
+    yield Case(strange is None, (strange or numbered[0][0]).exchange, "feedback as the server gave it", cause="strange")
+    known = [(look, number) for look, number in numbered if number is not None]
+    back = next((late for first, late in pairwise(known) if late[1] < first[1]), None)
+    yield Case(back is None, (back or known[0])[0].exchange if known else None, "feedback in order", cause="order")
+    late = [look for look, number in known if _is_late(look, number, given, _end_of(one))]
+    expected = f"the last feedback {_SHOWN_S:g} s after the server gave it"
+    yield Case(len(late) < _SEVERAL, (late or one.looks)[-1].exchange, expected, "an earlier one", cause="late")
+
+
+def _is_late(look: Look, number: int, given: list[float], end: float | None) -> bool:
+    """Return whether a later feedback than the shown one had been given long before a reading."""
+    due = sum(at + _SHOWN_S < look.sent for at in given)
+    return number + 1 < due and (end is None or look.received < end)
+
+
+def _number_of(look: Look, one: Goal, trace: Goals, ros: RosMap) -> int | None:
+    """Return which of the server's feedback a reading shows; None: none of it."""
+    definition = trace.definitions[f"{one.operation}#Feedback"]
+    pointer = one.body.feedback or ""
+    for number, value in enumerate(one.feedback):
+        if not differing(look.exchange, value, definition, one.body, pointer, ros):
+            return number
+    return None
+
+
+@rule("ros-gateway/goal-cancel", on=(action_goals,))
+def cancels(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether a request to cancel reaches the server, for this goal alone, and is reported as it went."""
+    for one in trace.probes:
+        if not one.body.cancel:
+            yield NotClaimed("the map has no operation that cancels")
+            continue
+        if one.course in {Course.CANCELED, Course.GOES_ON, Course.FIRST} and isinstance(one.cancel, Exchange):
+            yield from _canceled(one, one.cancel)
+        if one.course is Course.SECOND and one.body.state is not None and one.looks:
+            last = one.looks[-1]
+            holds = last.word not in one.body.state.canceled
+            yield Case(holds, last.exchange, f"no cancellation of a goal {one.course}", last.word, cause="another")
+
+
+def _canceled(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
+    asked = [heard for heard in one.heard if heard.what == "cancel"]
+    ok = cancel.response.ok
+    if one.course is Course.GOES_ON:
+        words = one.body.state.canceled if one.body.state else ()
+        said = next((look for look in one.looks if look.word in words), None)
+        found = said.word if said else ""
+        yield Case(
+            said is None, (said or one).exchange, f"no cancellation of a goal {one.course}", found, cause="refused"
+        )
+        return
+    yield Case(
+        ok and len(asked) == 1,
+        cancel,
+        f"2xx, and one request to cancel at {one.body.action}",
+        observed=f"{cancel.came}, and {len(asked)} requests to cancel",
+        cause="lost" if not asked else "refused" if not ok else "doubled",
+    )
+
+
+@rule("ros-gateway/recovers", on=(action_goals,))
+def recovers(trace: Goals) -> Iterator[Outcome]:
+    """Judge whether goals reach a server that is back."""
+    for one in trace.probes:
+        if one.course in {Course.REACHED, Course.BACK}:
+            holds = one.exchange.response.ok and bool(one.heard)
+            expected = f"2xx, and a goal at {one.body.action}, {one.course}"
+            yield Case(holds, one.exchange, expected, "none" if not one.heard else "", cause=one.course)

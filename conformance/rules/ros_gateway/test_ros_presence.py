@@ -1,0 +1,105 @@
+"""Whether a gateway says what is not there, finds what comes, and lists what is on the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from conformance.rules.ros_gateway.judging import statuses
+from conformance.scenarios.ros.presence import (
+    Absence,
+    Growth,
+    Listed,
+    Presence,
+    Publishers,
+    graph_lists,
+    many_reads,
+    publishers_end,
+    publishers_of_each_quality,
+    topics_at_first,
+)
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
+from conformance.verdict.case import Case
+
+# Subscriptions that a gateway may make for clients that read.
+_FEW: Final = 2
+_ALL: Final = "all topics at once"
+
+
+@rule("ros-gateway/absent", on=(topics_at_first,))
+def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
+    """Judge whether an operation says that there was no message yet."""
+    for one in trace:
+        if not one.body.absent:
+            yield NotClaimed("the map does not say what a topic without a message returns: `absent`")
+        elif one.exchange.response.ok and one.body.max_age_s is None:
+            yield NotTested("the gateway may have a message from before this run, and keeps it as long as it likes")
+        else:
+            yield _absence(one)
+
+
+@rule("ros-gateway/stale", on=(publishers_end,))
+def stale(trace: Publishers) -> Iterator[Outcome]:
+    """Judge whether an operation says that its last message is too old."""
+    if not trace.absences:
+        yield NotClaimed("the map says of no topic how old a message may be: `max_age_s`")
+    for one in trace.absences:
+        if one.first is not None and not one.first.response.ok:
+            yield NotTested("there was no message that could become too old")
+        else:
+            yield _absence(one)
+
+
+def _absence(one: Absence) -> Case:
+    holds = one.exchange.response.status in one.body.absent if one.body.absent else not one.exchange.response.ok
+    expected = f"{statuses(one.body.absent)} for {one.body.topic}, {one.when}"
+    if one.first is not None:
+        expected += f" over {one.body.max_age_s:g} s ago"
+    status = one.exchange.response.status
+    return Case(holds, one.exchange, expected, cause=f"{one.when} {'2xx' if one.exchange.response.ok else status}")
+
+
+@rule("ros-gateway/own-topic", on=(publishers_end,))
+def own(trace: Publishers) -> Iterator[Outcome]:
+    """Judge whether an operation returns the messages of its topic while others have as new ones."""
+    for one in trace.presences:
+        if one.publisher == _ALL:
+            found = f"the message of {one.instead}" if one.instead else ""
+            expected = "the message of its own topic, while all topics have one"
+            yield Case(one.shown, one.exchange, expected, observed=found, cause="another" if found else "")
+
+
+@rule("ros-gateway/recovers", on=(publishers_end,))
+def recovers(trace: Publishers) -> Iterator[Outcome]:
+    """Judge whether messages are returned again after their publisher was away."""
+    for one in trace.presences:
+        if one.publisher != _ALL:
+            yield Case(one.shown, one.exchange, f"the message of {one.publisher}", cause=one.publisher)
+
+
+@rule("ros-gateway/qualities", on=(publishers_of_each_quality,))
+def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
+    """Judge whether publishers of each reliability and durability are heard."""
+    for one in trace:
+        yield Case(one.shown, one.exchange, f"the message of {one.publisher}", cause=one.publisher)
+
+
+@rule("ros-gateway/lists", on=(graph_lists,))
+def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
+    """Judge whether lists have what is on the graph, with its type, and nothing that is not."""
+    for one in trace:
+        wanted = f"{one.name} ({one.kind})" if one.there else f"no {one.name}"
+        when = "it came to" if one.there else "it left"
+        expected = f"{wanted} within {one.body.timeout_s:g} s after {when} the graph"
+        yield Case(
+            one.right, one.exchange, expected, one.found or "no such name", cause=f"{one.there} {bool(one.found)}"
+        )
+
+
+@rule("ros-gateway/subscriptions", on=(many_reads,))
+def subscriptions(trace: tuple[Growth, ...]) -> Iterator[Outcome]:
+    """Judge whether reads leave no subscriptions behind."""
+    for one in trace:
+        more = one.after - one.before
+        expected = f"at most {_FEW} more subscriptions after {one.reads} reads"
+        yield Case(more <= _FEW, one.exchange, expected, observed=f"{more} more", cause="more")

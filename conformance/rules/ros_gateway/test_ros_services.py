@@ -1,0 +1,112 @@
+"""Whether a gateway calls services as it is told, and says what became of each call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from conformance.rules.ros_gateway.judging import differing, statuses
+from conformance.scenarios.ros.robot import Heard
+from conformance.scenarios.ros.services import ROUNDS, Called, Server, Services, is_held, service_calls
+from conformance.scenarios.ros.web import changed
+from conformance.scenarios.rule import NotTested, Outcome, rule
+from conformance.statement.ros_map import RosMap
+from conformance.transport.exchange import Exchange
+from conformance.verdict.case import Case
+
+_RESPONDS: Final = (Server.RESPONDS, Server.SLOW, Server.AFTER)
+_ABSENT: Final = (Server.MISSING, Server.GONE, Server.SILENT)
+
+
+@rule("ros-gateway/service-response", on=(service_calls,))
+def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each call returns what the server responded to it."""
+    for one in trace.probes:
+        if one.server not in _RESPONDS or not one.answer:
+            continue
+        ok = _is_ok(one)
+        if not ok and one.server is not Server.RESPONDS:
+            # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
+            continue
+        found = ""
+        if ok and isinstance(one.attempt, Exchange):
+            found = differing(one.attempt, one.answer, trace.responses[one.operation], one.body, one.body.result, ros)
+        expected = f"2xx with the response of {one.body.service}, {one.server}"
+        yield Case(ok and not found, one.attempt, expected, observed=found, cause=f"{one.server} {found.split(' ')[0]}")
+
+
+@rule("ros-gateway/service-once", on=(service_calls,))
+def once(trace: Services) -> Iterator[Outcome]:
+    """Judge whether a call that succeeds has reached the server once, as it was sent."""
+    for one in trace.probes:
+        if one.server not in _RESPONDS or not one.answer or not _is_ok(one):
+            continue
+        requests = [heard for heard in one.heard if heard.what == "request"]
+        yield Case(
+            len(requests) == 1,
+            one.attempt,
+            f"one call of {one.body.service} for one accepted request",
+            observed=f"{len(requests)} calls",
+            cause="lost" if not requests else "doubled",
+        )
+        if requests:
+            yield from _as_sent(one, requests[0])
+
+
+def _as_sent(one: Called, request: Heard) -> Iterator[Outcome]:
+    wrong = next(changed(request.content, Heard(0.0, "", one.request).content), None)
+    found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
+    yield Case(not wrong, one.attempt, f"the request's fields at {one.body.service}", observed=found, cause="changed")
+
+
+@rule("ros-gateway/service-failure", on=(service_calls,))
+def failures(trace: Services) -> Iterator[Outcome]:
+    """Judge whether a call without a response is reported as a failure in time, by a declared status."""
+    for one in trace.probes:
+        if one.server not in _ABSENT or (one.server is Server.SILENT and not one.heard):
+            continue
+        body = one.body
+        declared = body.too_late if one.server is Server.SILENT else (*body.unavailable, *body.too_late)
+        if one.server is not Server.SILENT and not body.unavailable:
+            declared = ()
+        expected = f"{statuses(declared)} within {body.timeout_s:g} s for {body.service}, {one.server}"
+        if not isinstance(one.attempt, Exchange):
+            yield Case(holds=False, exchange=one.attempt, expected=expected, cause=f"{one.server} silent")
+            continue
+        status = one.attempt.response.status
+        holds = status in declared if declared else not one.attempt.response.ok
+        yield Case(holds, one.attempt, expected, cause=f"{one.server} {status}")
+
+
+@rule("ros-gateway/others-served", on=(service_calls,))
+def others(trace: Services) -> Iterator[Outcome]:
+    """Judge whether other resources respond while a call has no response; each must be held up in all rounds."""
+    rounds: dict[str, list[Called]] = {}
+    for one in trace.probes:
+        if one.server is Server.SILENT and one.heard:
+            rounds.setdefault(one.operation, []).append(one)
+    for calls in rounds.values():
+        held = [next((beside for beside in one.beside if is_held(one, beside)), None) for one in calls]
+        shown = next((beside for beside in (*held, *calls[0].beside) if beside is not None), None)
+        if shown is None:
+            yield NotTested("no other operation was read while a service did not respond")
+            continue
+        yield Case(
+            not all(held) or len(held) < ROUNDS,
+            shown.attempt,
+            f"a response while {calls[0].operation} waits for {calls[0].body.service}",
+            observed=f"a response after {shown.took:.1f} s, when that call had ended; usually {shown.usual:.2f} s",
+            cause=shown.operation,
+        )
+
+
+@rule("ros-gateway/recovers", on=(service_calls,))
+def recovers(trace: Services) -> Iterator[Outcome]:
+    """Judge whether a service is called again that was gone, and whether the gateway goes on after a silent one."""
+    for one in trace.probes:
+        if one.server in {Server.BACK, Server.AFTER}:
+            yield Case(_is_ok(one), one.attempt, f"2xx for {one.body.service}, {one.server}", cause=one.server)
+
+
+def _is_ok(one: Called) -> bool:
+    return isinstance(one.attempt, Exchange) and one.attempt.response.ok

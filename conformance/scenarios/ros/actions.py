@@ -1,0 +1,259 @@
+"""Scenarios on actions: goals that succeed, are aborted, rejected and canceled, and two at once.
+
+Times are s of the monotonic clock, which all processes of a machine share.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Final
+
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.ros.definition import Definition, value_at
+from conformance.scenarios.ros.gateway import Gateway
+from conformance.scenarios.ros.robot import Heard
+from conformance.scenarios.ros.services import NO_PLAY
+from conformance.scenarios.ros.web import document_of
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.ros_map import Acts
+from conformance.transport.exchange import Exchange
+
+_NEEDS: Final = (Need.REST,)
+_PACE_S: Final = 0.06
+# From one feedback to the next, and so long a goal goes on before it is canceled, s.
+_GAP_S, _RUNS_S = 0.6, 0.3
+# A goal that refuses to be canceled, and one beside another, go on for so long, s.
+_GOES_ON_S: Final = 1.5
+_FEEDBACKS: Final = 3
+_PARTS: Final = ("Goal", "Result", "Feedback")
+# After its end, a goal is read so often.
+_AFTERWARDS: Final = 3
+_MORE_S: Final = 0.3
+
+
+class Course(StrEnum):
+    """What the action server does with a goal."""
+
+    REACHED = "whose server is found"
+    SUCCEEDS = "that succeeds"
+    ABORTS = "that is aborted"
+    REJECTED = "that is rejected"
+    CANCELED = "that is canceled"
+    GOES_ON = "that refuses to be canceled, and succeeds"
+    FIRST = "that is canceled while another one goes on"
+    SECOND = "that goes on while another one is canceled"
+    BACK = "whose server is back"
+
+
+@dataclass(frozen=True)
+class Look:
+    """One reading of a goal's state.
+
+    Attributes:
+        sent, received: when.
+        exchange: request and response.
+        word: what it says of its state; empty: nothing.
+        feedback, result: whether the response has one.
+    """
+
+    sent: float
+    received: float
+    exchange: Exchange
+    word: str
+    feedback: bool
+    result: bool
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal, and what came of it at both ends.
+
+    Attributes:
+        operation: the operation.
+        body: its map.
+        course: what the server did with it.
+        value: JSON of the goal.
+        exchange: the request that sent it, and its response.
+        feedback: JSON of the feedback that the server gave, in order.
+        result: JSON of the result that the server gave; empty: none.
+        looks: what it said of itself.
+        cancel: the request to cancel it, and its response; None: there was none.
+        heard: what the server got and did, for this goal or for this and its other.
+    """
+
+    operation: str
+    body: Acts
+    course: Course
+    value: str
+    exchange: Exchange
+    feedback: tuple[str, ...] = ()
+    result: str = ""
+    looks: tuple[Look, ...] = ()
+    cancel: Exchange | None = None
+    heard: tuple[Heard, ...] = ()
+
+
+@dataclass(frozen=True)
+class Goals:
+    """Goals, and the definitions of what an action is made of, by operation and part."""
+
+    probes: tuple[Goal, ...]
+    definitions: dict[str, Definition]
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def action_goals(gateway: Gateway) -> Goals:
+    """Serve actions, send them goals of each course through the gateway, and read what becomes of them."""
+    if not gateway.plays:
+        raise NotPossibleError(NO_PLAY)
+    probes: list[Goal] = []
+    definitions: dict[str, Definition] = {}
+    with partial_trace(lambda: Goals(tuple(probes), definitions)):
+        for call, body in gateway.of(Acts):
+            for part in _PARTS:
+                definitions[f"{call}#{part}"] = gateway.definition(f"{body.type}#{part}")
+            with gateway.robot.publishing(body.action):
+                probes.extend(_Sender(gateway, call, body, definitions).goals())
+    return Goals(tuple(probes), definitions)
+
+
+class _Sender:
+    def __init__(self, gateway: Gateway, call: str, body: Acts, definitions: dict[str, Definition]) -> None:
+        self._gateway, self._call, self._body = gateway, call, body
+        self._makers = {part: gateway.maker(one) for part in _PARTS for one in [definitions[f"{call}#{part}"]]}
+
+    def goals(self) -> Iterator[Goal]:
+        """Yield a goal of each course."""
+        self._serve()
+        yield self._reached(Course.REACHED)
+        feedback, result = [self._new("Feedback") for _ in range(_FEEDBACKS)], self._new("Result")
+        step = {"feedback": feedback, "gap_s": _GAP_S, "result": result}
+        yield self._followed(Course.SUCCEEDS, step)
+        yield self._followed(Course.ABORTS, {"gap_s": _RUNS_S, "end": "abort", "result": self._new("Result")})
+        yield self._followed(Course.REJECTED, {"reject": True})
+        if self._body.cancel:
+            canceled = {"feedback": feedback[:1], "end": "never", "result": self._new("Result")}
+            yield self._followed(Course.CANCELED, canceled)
+            goes_on = {"gap_s": _GOES_ON_S, "refuse_cancel": True, "result": self._new("Result")}
+            yield self._followed(Course.GOES_ON, goes_on)
+            yield from self._two()
+        self._gateway.robot.tell("forget", name=self._body.action)
+        self._serve()
+        yield self._reached(Course.BACK)
+
+    def _serve(self) -> None:
+        self._gateway.robot.tell("act", action=self._body.action, type=self._body.type, script=[{}])
+
+    def _new(self, part: str) -> dict[str, Any]:
+        """Return a message of a part that differs from all others."""
+        kind, value = f"{self._body.type}#{part}", self._makers[part].usual().value
+        found: dict[str, Any] = self._gateway.robot.tell("complete", type=kind, value=value)["value"]
+        return found
+
+    def _send(self) -> tuple[dict[str, Any], Exchange]:
+        value = self._new("Goal")
+        return value, self._gateway.send(self._gateway.request(self._call, self._body, value), self._body.timeout_s)
+
+    def _reached(self, course: Course) -> Goal:
+        """Send goals until one reaches its server, or the gateway's time is over."""
+        robot, until = self._gateway.robot, WALL_CLOCK.now() + 2 * self._body.timeout_s
+        while True:
+            robot.heard(self._body.action)
+            value, exchange = self._send()
+            heard = robot.heard(self._body.action, 1, _MORE_S)
+            if heard or WALL_CLOCK.now() > until:
+                WALL_CLOCK.sleep(_MORE_S)
+                return Goal(self._call, self._body, course, json.dumps(value), exchange, heard=tuple(heard))
+
+    def _begun(self, course: Course, *steps: dict[str, Any]) -> Goal:
+        robot = self._gateway.robot
+        robot.tell("script", name=self._body.action, script=[*steps, {}])
+        robot.heard(self._body.action)
+        value, exchange = self._send()
+        return self._goal(course, value, exchange, steps[0])
+
+    def _goal(self, course: Course, value: dict[str, Any], exchange: Exchange, step: dict[str, Any]) -> Goal:
+        feedback = tuple(json.dumps(one) for one in step.get("feedback", []))
+        result = json.dumps(step["result"]) if "result" in step else ""
+        return Goal(self._call, self._body, course, json.dumps(value), exchange, feedback, result)
+
+    def _followed(self, course: Course, step: dict[str, Any]) -> Goal:
+        """Send a goal, and follow it to its end; cancel it if that is its course."""
+        goal, robot = self._begun(course, step), self._gateway.robot
+        looks: list[Look] = []
+        cancel: Exchange | None = None
+        if goal.exchange.response.ok and course in {Course.CANCELED, Course.GOES_ON}:
+            looks += self._watched(goal, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
+            cancel = self._cancel(goal)
+        if goal.exchange.response.ok:
+            lasts_s = step.get("gap_s", 0.0) * (len(goal.feedback) + 1)
+            looks += self._watched(goal, WALL_CLOCK.now() + lasts_s + self._body.timeout_s, self._has_ended)
+        heard = tuple(robot.heard(self._body.action, 2, _MORE_S))
+        return replace(goal, looks=tuple(looks), cancel=cancel, heard=heard)
+
+    def _two(self) -> Iterator[Goal]:
+        """Send two goals, cancel the first, and follow both; then cancel the second."""
+        robot, body = self._gateway.robot, self._body
+        steps = [{"end": "never", "result": self._new("Result")} for _ in range(2)]
+        first = self._begun(Course.FIRST, *steps)
+        value, exchange = self._send()
+        second = self._goal(Course.SECOND, value, exchange, steps[1])
+        if not (first.exchange.response.ok and exchange.response.ok):
+            # A server, or a gateway, may take one goal at a time.
+            return
+        cancel = self._cancel(first)
+        ended = self._watched(first, WALL_CLOCK.now() + body.timeout_s, self._has_ended)
+        went_on = self._watched(second, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
+        heard = tuple(robot.heard(body.action, 4, _MORE_S))
+        yield replace(first, looks=tuple(ended), cancel=cancel, heard=heard)
+        yield replace(second, looks=tuple(went_on), heard=heard)
+        self._cancel(second)
+        robot.heard(body.action, 2, _MORE_S)
+
+    def _cancel(self, goal: Goal) -> Exchange | None:
+        made = self._of(goal, self._body.cancel)
+        return made and self._gateway.send(made, self._body.timeout_s)
+
+    def _of(self, goal: Goal, template: str) -> Any:
+        """Return the request of an operation on a goal; None: its response does not name it."""
+        name = value_at(document_of(goal.exchange.response.body).value, self._body.id)
+        if name is None:
+            return None
+        return self._gateway.binding.made(filled(template, {**self._body.values, "id": str(name)}), None)
+
+    def _watched(self, goal: Goal, until: float, is_over: Callable[[list[Look]], bool]) -> list[Look]:
+        looks: list[Look] = []
+        state = self._body.state
+        made = self._of(goal, state.read) if state is not None else None
+        while made is not None and state is not None:
+            sent = WALL_CLOCK.now()
+            exchange = self._gateway.send(made, self._body.timeout_s)
+            received = WALL_CLOCK.now()
+            value = document_of(exchange.response.body).value if exchange.response.ok else None
+            word = value_at(value, state.at)
+            has = [pointer is not None and value_at(value, pointer) is not None for pointer in self._parts]
+            looks.append(Look(sent, received, exchange, "" if word is None else str(word), *has))
+            if sent > until or is_over(looks):
+                break
+            WALL_CLOCK.sleep(_PACE_S)
+        return looks
+
+    @property
+    def _parts(self) -> tuple[str | None, str | None]:
+        return self._body.feedback, self._body.result
+
+    def _has_ended(self, looks: list[Look]) -> bool:
+        """Return whether the last looks all show an end."""
+        last = looks[-_AFTERWARDS:]
+        return len(last) == _AFTERWARDS and all(is_end(self._body, one.word) for one in last)
+
+
+def is_end(body: Acts, word: str) -> bool:
+    """Return whether a word of a goal's state says that it has ended."""
+    state = body.state
+    return state is not None and word in {*state.succeeded, *state.aborted, *state.canceled, *state.rejected}

@@ -1,0 +1,334 @@
+"""Scenarios on what comes and goes: publishers that are not there, fall silent, are killed and come back; the graph.
+
+Times are s of the monotonic clock, which all processes of a machine share.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.ros.definition import value_at
+from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.services import NO_PLAY
+from conformance.scenarios.ros.web import differences, document_of
+from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.ros_map import Lists, Publishes, Reads
+from conformance.transport.exchange import Exchange
+from conformance.verdict.effort import Effort
+
+_NEEDS: Final = (Need.REST,)
+_REPEAT_S: Final = 0.1
+# A message on its way, and a gateway that is late: after a message's greatest age so long, and so often again, s.
+_LATE_S: Final = 1.0
+_TRIES: Final = 2
+# Reads by which subscriptions that are never closed show.
+_READS: Final = {"quick": 20, "standard": 40, "deep": 200}
+
+
+@dataclass(frozen=True)
+class Absence:
+    """What an operation returned when there was no message, or none that is young enough.
+
+    Attributes:
+        operation: the operation.
+        body: its map.
+        when: as a noun phrase.
+        exchange: the last read.
+        first: the read that was made when there was a message; None: there never was any.
+    """
+
+    operation: str
+    body: Reads
+    when: str
+    exchange: Exchange
+    first: Exchange | None = None
+
+
+@dataclass(frozen=True)
+class Presence:
+    """What an operation returned of a publisher of some quality of service.
+
+    Attributes:
+        operation: the operation.
+        publisher: as a noun phrase.
+        shown: whether its message was returned in time.
+        exchange: the read that shows it, else the last one.
+        instead: the operation whose topic's message was returned; empty: none.
+    """
+
+    operation: str
+    publisher: str
+    shown: bool
+    exchange: Exchange
+    instead: str = ""
+
+
+@dataclass(frozen=True)
+class Publishers:
+    """What was read while publishers fell silent, were killed and came back."""
+
+    absences: tuple[Absence, ...]
+    presences: tuple[Presence, ...]
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
+def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
+    """Read topics on which nothing was published yet."""
+    if not gateway.plays:
+        raise NotPossibleError(NO_PLAY)
+    also = {one.publishes for one in gateway.ros.operations.values() if isinstance(one, Publishes)}
+    there = gateway.robot.tell("graph")["topics"]
+    found = []
+    for call, body in gateway.of(Reads):
+        if body.topic in also or there.get(body.topic, {}).get("publishers"):
+            continue
+        # An earlier run may have published.
+        until = WALL_CLOCK.now() + (body.max_age_s or 0.0) + _LATE_S
+        exchange = _read(gateway, call, body)
+        while exchange.response.ok and WALL_CLOCK.now() < until:
+            WALL_CLOCK.sleep(PACE_S)
+            exchange = _read(gateway, call, body)
+        found.append(Absence(call, body, "on which nothing was published", exchange))
+    if not found:
+        raise NotPossibleError("each topic has a publisher")
+    return tuple(found)
+
+
+# Late, as a killed publisher is on the graph until its lease is over, and a gateway may count it.
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
+def publishers_end(gateway: Gateway) -> Publishers:
+    """Publish on all topics at once, fall silent, publish again, kill the publisher, and begin anew."""
+    if not gateway.plays:
+        raise NotPossibleError(NO_PLAY)
+    topics = _Topics(gateway)
+    absences: list[Absence] = []
+    presences = list(topics.shown("all topics at once"))
+    absences += topics.aged("whose publisher fell silent", topics.silence)
+    presences += topics.shown("a publisher that fell silent before")
+    absences += topics.aged("whose publisher was killed", gateway.kill)
+    presences += topics.shown("a publisher in place of one that was killed")
+    topics.leave()
+    return Publishers(tuple(absences), tuple(presences))
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def publishers_of_each_quality(gateway: Gateway) -> tuple[Presence, ...]:
+    """Publish with best effort; then once, latched, before the gateway has found the publisher."""
+    if not gateway.plays:
+        raise NotPossibleError(NO_PLAY)
+    topics = _Topics(gateway)
+    found = [*topics.shown("a best-effort publisher", reliability="best_effort")]
+    topics.leave()
+    found += topics.shown("a latched publisher", repeat_s=0.0, durability="transient_local")
+    topics.leave()
+    return tuple(found)
+
+
+class _Topics:
+    """All topics that are read, each with messages of its own."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._reads = dict(gateway.of(Reads))
+        self._definitions = {call: gateway.definition(body.type) for call, body in self._reads.items()}
+        self._makers = {call: gateway.maker(one) for call, one in self._definitions.items()}
+
+    def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
+        """Publish on all topics, and yield what the gateway returns of each."""
+        values = {}
+        for call, body in self._reads.items():
+            value = values[call] = self._message(call)
+            self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, **quality)
+        until = WALL_CLOCK.now() + max(body.timeout_s for body in self._reads.values())
+        left = list(self._reads)
+        while left:
+            # Round after round, so that no message becomes too old while another one is awaited.
+            is_over = WALL_CLOCK.now() > until
+            for call in tuple(left):
+                found = self._presence(call, publisher, values)
+                if found.shown or is_over:
+                    left.remove(call)
+                    yield found
+            WALL_CLOCK.sleep(PACE_S if left else 0.0)
+
+    def _presence(self, call: str, publisher: str, values: Mapping[str, Any]) -> Presence:
+        exchange = _read(self._gateway, call, self._reads[call])
+        shows = [other for other, value in values.items() if self._shows(exchange, call, other, value)]
+        return Presence(call, publisher, call in shows, exchange, next(iter(shows), ""))
+
+    def _shows(self, exchange: Exchange, call: str, other: str, value: dict[str, Any]) -> bool:
+        """Return whether an operation's response shows the message of its own, or of another one's topic."""
+        body = self._reads[call]
+        if not exchange.response.ok or body.type != self._reads[other].type:
+            return False
+        document = document_of(exchange.response.body)
+        return not differences(document, value, self._definitions[call], body, self._gateway.ros)
+
+    def _message(self, call: str) -> dict[str, Any]:
+        """Return a new message, whose stamp is the present: its age may be read from that."""
+        kind, value = self._reads[call].type, self._makers[call].usual().value
+        if "stamp" in value.get("header", {}):
+            now = time.time_ns()
+            value["header"]["stamp"] = {"sec": now // 10**9, "nanosec": now % 10**9}
+        found: dict[str, Any] = self._gateway.robot.tell("complete", type=kind, value=value)["value"]
+        return found
+
+    def silence(self) -> None:
+        """Publish no more, and stay."""
+        for body in self._reads.values():
+            self._gateway.robot.publish(body.topic, body.type)
+
+    def leave(self) -> None:
+        """Leave all topics."""
+        for body in self._reads.values():
+            self._gateway.robot.tell("forget", name=body.topic)
+
+    def aged(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
+        """End publishing, and yield what the gateway returns when the last messages are too old."""
+        judged = {call: body for call, body in self._reads.items() if body.max_age_s is not None}
+        first = {call: _read(self._gateway, call, body) for call, body in judged.items()}
+        end()
+        ended = WALL_CLOCK.now()
+        for call, body in sorted(judged.items(), key=lambda one: one[1].max_age_s or 0.0):
+            WALL_CLOCK.sleep(max(0.0, ended + (body.max_age_s or 0.0) + _LATE_S - WALL_CLOCK.now()))
+            exchange = _read(self._gateway, call, body)
+            for _ in range(_TRIES):
+                if not exchange.response.ok:
+                    break
+                WALL_CLOCK.sleep(_LATE_S)
+                exchange = _read(self._gateway, call, body)
+            yield Absence(call, body, when, exchange, first[call])
+
+
+def _read(gateway: Gateway, call: str, body: Reads) -> Exchange:
+    return gateway.send(gateway.request(call, body), body.timeout_s)
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What a list said of one name.
+
+    Attributes:
+        operation: the operation.
+        body: its map.
+        name: the name, and its type on the graph.
+        kind: its type.
+        there: whether it is on the graph.
+        right: whether the list came to say so in time.
+        found: what the list last had as its type; empty: nothing.
+        exchange: the last read.
+    """
+
+    operation: str
+    body: Lists
+    name: str
+    kind: str
+    there: bool
+    right: bool
+    found: str
+    exchange: Exchange
+
+
+_KINDS: Final = {
+    "topics": "std_msgs/msg/String",
+    "services": "std_srvs/srv/Trigger",
+    "actions": "nav2_msgs/action/NavigateToPose",
+}
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
+    """Put names on the graph and take them off again, and read the lists each time."""
+    found: list[Listed] = []
+    for call, body in gateway.of(Lists):
+        if body.lists not in _KINDS:
+            continue
+        kind, part = _KINDS[body.lists], secrets.token_hex(4)
+        names = [f"/roaas_{part}", f"/roaas_{part}/inner/name"]
+        for name in names:
+            _put(gateway, body.lists, name, kind)
+        found += [_listed(gateway, call, body, name, kind, there=True) for name in names]
+        for name in names:
+            gateway.robot.tell("forget", name=name)
+        found += [_listed(gateway, call, body, name, kind, there=False) for name in names]
+    if not found:
+        raise NotPossibleError("the map has no list of topics, services or actions")
+    return tuple(found)
+
+
+def _put(gateway: Gateway, lists: str, name: str, kind: str) -> None:
+    if lists == "topics":
+        gateway.robot.publish(name, kind)
+    elif lists == "services":
+        gateway.robot.tell("serve", service=name, type=kind, script=[{}])
+    else:
+        gateway.robot.tell("act", action=name, type=kind, script=[{}])
+
+
+def _listed(gateway: Gateway, call: str, body: Lists, name: str, kind: str, *, there: bool) -> Listed:
+    until = WALL_CLOCK.now() + body.timeout_s
+    while True:
+        began = WALL_CLOCK.now()
+        exchange = gateway.send(gateway.binding.made(call, None), body.timeout_s)
+        types = _types_in(exchange, body).get(name)
+        is_right = exchange.response.ok and ((types is not None and kind in types) if there else types is None)
+        if is_right or began > until:
+            return Listed(call, body, name, kind, there, is_right, " ".join(types or ()), exchange)
+        WALL_CLOCK.sleep(PACE_S)
+
+
+def _types_in(exchange: Exchange, body: Lists) -> dict[str, list[str]]:
+    """Return the types of each name that a list has; those of a list without types are any."""
+    items = value_at(document_of(exchange.response.body).value, body.at)
+    found: dict[str, list[str]] = {}
+    for item in items if isinstance(items, list) else []:
+        types = value_at(item, body.type) if body.type is not None else list(_KINDS.values())
+        found[str(value_at(item, body.name))] = [str(one) for one in (types if isinstance(types, list) else [types])]
+    return found
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How many subscriptions a topic had before and after many reads.
+
+    Attributes:
+        operation: the operation.
+        reads: how many.
+        before, after: subscriptions.
+        exchange: the last read.
+    """
+
+    operation: str
+    reads: int
+    before: int
+    after: int
+    exchange: Exchange
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def many_reads(gateway: Gateway, effort: Effort) -> tuple[Growth, ...]:
+    """Read a topic many times, and count its subscriptions."""
+    found = []
+    for call, body in gateway.of(Reads):
+        count = _READS[effort.name]
+        _read(gateway, call, body)
+        before = _subscriptions(gateway, body.topic)
+        for _ in range(count):
+            exchange = _read(gateway, call, body)
+        # What is closed late is closed all the same.
+        until = WALL_CLOCK.now() + body.timeout_s
+        while (after := _subscriptions(gateway, body.topic)) > before + 1 and WALL_CLOCK.now() < until:
+            WALL_CLOCK.sleep(PACE_S)
+        found.append(Growth(call, count, before, after, exchange))
+    return tuple(found)
+
+
+def _subscriptions(gateway: Gateway, topic: str) -> int:
+    found = gateway.robot.tell("graph")["topics"].get(topic, {})
+    return int(found.get("subscribers", 0))

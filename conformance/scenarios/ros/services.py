@@ -1,0 +1,252 @@
+"""Scenarios on services: what a gateway makes of servers that respond, respond late or never, go and come back.
+
+Times are s of the monotonic clock, which all processes of a machine share.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.robot import Heard
+from conformance.scenarios.ros.samples import Kind, Maker, Sample
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.ros_map import Calls, Lists, Reads
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
+from conformance.transport.parallel import meanwhile
+from conformance.verdict.effort import Effort
+
+#: Why a scenario cannot be played where there is a real robot.
+NO_PLAY: Final = "the suite is not the robot, whose servers it would order: --ros-play"
+_NEEDS: Final = (Need.REST,)
+# A slow server takes this part of the gateway's time.
+_SLOW: Final = 0.2
+# What comes on top of what was sent comes so soon, s.
+_MORE_S: Final = 0.15
+# On top of its time, a response has so long, s.
+_LATE_S: Final = 2.0
+#: Where others are held up, that is tried again: once may be a coincidence.
+ROUNDS: Final = 2
+_BESIDE: Final = 4
+# A request is held up if it takes so long, s, and so many times as long as it usually takes.
+_HELD_S, _HELD = 0.8, 5.0
+_CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
+
+
+class Server(StrEnum):
+    """What a server does with a call."""
+
+    MISSING = "which is not there"
+    RESPONDS = "which responds at once"
+    SLOW = "which is slow"
+    SILENT = "which never responds"
+    AFTER = "which responds after a call that it never responded to"
+    GONE = "which is gone"
+    BACK = "which is back"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A request to another resource while a call is without a response.
+
+    Attributes:
+        operation: the operation.
+        attempt: what came.
+        took, usual: how long that took, and what it takes otherwise, s.
+        ended: when it came.
+    """
+
+    operation: str
+    attempt: Attempt
+    took: float
+    usual: float
+    ended: float
+
+
+@dataclass(frozen=True)
+class Called:
+    """A call of a service, and what came of it at both ends.
+
+    Attributes:
+        operation: the operation.
+        body: its map.
+        server: what the server did.
+        request, answer: JSON of what was sent, and of what the server responded; empty: nothing.
+        attempt: what the gateway responded.
+        took: how long that took, s.
+        ended: when it came.
+        heard: what the server got.
+        beside: requests to others at that time.
+    """
+
+    operation: str
+    body: Calls
+    server: Server
+    request: str
+    answer: str
+    attempt: Attempt
+    took: float
+    ended: float
+    heard: tuple[Heard, ...] = ()
+    beside: tuple[Beside, ...] = ()
+
+
+def is_held(call: Called, beside: Beside) -> bool:
+    """Return whether a request was held up until a call had ended."""
+    return beside.ended >= call.ended and beside.took > max(_HELD_S, _HELD * beside.usual)
+
+
+@dataclass(frozen=True)
+class Services:
+    """Calls, and the definitions of what was sent and responded, by operation."""
+
+    probes: tuple[Called, ...]
+    requests: dict[str, Definition]
+    responses: dict[str, Definition]
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
+def service_calls(gateway: Gateway, effort: Effort) -> Services:
+    """Serve services well, late, never and not at all, and call them through the gateway."""
+    if not gateway.plays:
+        raise NotPossibleError(NO_PLAY)
+    probes: list[Called] = []
+    requests: dict[str, Definition] = {}
+    responses: dict[str, Definition] = {}
+    with partial_trace(lambda: Services(tuple(probes), requests, responses)):
+        for call, body in gateway.of(Calls):
+            requests[call] = gateway.definition(f"{body.type}#Request")
+            responses[call] = gateway.definition(f"{body.type}#Response")
+            with gateway.robot.publishing(body.service):
+                probes.extend(_Caller(gateway, call, body, requests[call], responses[call]).calls(effort))
+    return Services(tuple(probes), requests, responses)
+
+
+class _Caller:
+    def __init__(self, gateway: Gateway, call: str, body: Calls, request: Definition, response: Definition) -> None:
+        self._gateway, self._call, self._body = gateway, call, body
+        self._requests, self._responses = gateway.maker(request), gateway.maker(response)
+
+    def calls(self, effort: Effort) -> Iterator[Called]:
+        """Yield calls of a server in each of its states."""
+        pairs = zip(
+            self._finite(self._requests, _CALLS[effort.name]),
+            self._finite(self._responses, _CALLS[effort.name]),
+            strict=False,
+        )
+        yield self._called(Server.MISSING, {})
+        self._serve([{"answer": {}}])
+        yield self._reached(Server.RESPONDS)
+        yield from (self._answered(Server.RESPONDS, *pair) for pair in pairs)
+        yield self._answered(Server.SLOW, *self._usual(), self._body.timeout_s * _SLOW)
+        yield self._answered(Server.AFTER, *self._usual())
+        for _ in range(ROUNDS):
+            silent = self._never_answered()
+            yield silent
+            yield self._answered(Server.AFTER, *self._usual())
+            if not any(is_held(silent, one) for one in silent.beside):
+                break
+        self._gateway.robot.tell("forget", name=self._body.service)
+        yield self._called(Server.GONE, {})
+        self._serve([{"answer": {}}])
+        yield self._reached(Server.BACK)
+
+    def _serve(self, script: list[dict[str, Any]]) -> None:
+        self._gateway.robot.tell("serve", service=self._body.service, type=self._body.type, script=script)
+
+    def _complete(self, part: str, value: dict[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = self._gateway.robot.tell("complete", type=f"{self._body.type}#{part}", value=value)[
+            "value"
+        ]
+        return found
+
+    def _reached(self, server: Server) -> Called:
+        """Call until the gateway has found the server, or its time is over."""
+        until = WALL_CLOCK.now() + 2 * self._body.timeout_s
+        while True:
+            called = self._called(server, {}, self._complete("Response", {}))
+            is_there = isinstance(called.attempt, Exchange) and called.attempt.response.ok
+            if is_there or WALL_CLOCK.now() > until:
+                return called
+            WALL_CLOCK.sleep(PACE_S)
+
+    def _answered(self, server: Server, request: Sample, answer: Sample, delay_s: float = 0.0) -> Called:
+        """Call a server that gives a response of its own to this call."""
+        complete = self._complete("Response", answer.value)
+        script = [{"answer": complete, "delay_s": delay_s}, {"answer": {}}]
+        self._gateway.robot.tell("script", name=self._body.service, script=script)
+        return self._called(server, request.value, complete)
+
+    def _usual(self) -> tuple[Sample, Sample]:
+        return self._requests.usual(), self._responses.usual()
+
+    @staticmethod
+    def _finite(maker: Maker, most: int) -> Iterator[Sample]:
+        """Yield samples without NaN and infinities, which a gateway may refuse."""
+        return (one for one in maker.samples(most, large=False) if one.kind is not Kind.NON_FINITE)
+
+    def _called(self, server: Server, request: dict[str, Any], answer: dict[str, Any] | None = None) -> Called:
+        robot, body = self._gateway.robot, self._body
+        request = self._complete("Request", request)
+        robot.heard(body.service)
+        began = WALL_CLOCK.now()
+        attempt = self._sent(self._gateway.request(self._call, body, request), body.timeout_s + _LATE_S)
+        ended = WALL_CLOCK.now()
+        heard = () if answer is None else tuple(robot.heard(body.service, 3, _MORE_S))
+        text = "" if answer is None else json.dumps(answer)
+        return Called(self._call, body, server, json.dumps(request), text, attempt, ended - began, ended, heard)
+
+    def _sent(self, made: Any, timeout_s: float) -> Attempt:
+        try:
+            return self._gateway.send(made, timeout_s)
+        except NoAnswerError as none:
+            if none.kind not in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
+                raise
+            return none.unanswered
+
+    def _never_answered(self) -> Called:
+        """Call a server that never responds, and read other resources until the gateway gives the call up."""
+        robot, body, clock = self._gateway.robot, self._body, WALL_CLOCK
+        others = self._others()
+        usual = [self._read(call, read, 0.0) for call, read in others]
+        request = self._complete("Request", self._requests.usual().value)
+        robot.tell("script", name=body.service, script=[{"never": True}])
+        robot.heard(body.service)
+        began = clock.now()
+        made = self._gateway.request(self._call, body, request)
+        with meanwhile(self._gateway.api.client, made, body.timeout_s + _LATE_S) as hanging:
+            heard = robot.heard(body.service, 1, body.timeout_s)
+            beside = tuple(
+                self._read(call, read, one.took) for (call, read), one in zip(others, usual, strict=True) if heard
+            )
+        attempt, ended = hanging.result()
+        return Called(
+            self._call,
+            body,
+            Server.SILENT,
+            json.dumps(request),
+            "",
+            attempt,
+            ended - began,
+            ended,
+            tuple(heard),
+            beside,
+        )
+
+    def _others(self) -> list[tuple[str, Reads | Lists]]:
+        found = self._gateway.ros.operations.items()
+        return [(call, one) for call, one in found if isinstance(one, Reads | Lists)][-_BESIDE:]
+
+    def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
+        began = WALL_CLOCK.now()
+        made = self._gateway.binding.made(call, None) if isinstance(read, Lists) else self._gateway.request(call, read)
+        attempt = self._sent(made, self._body.timeout_s + 2 * _LATE_S)
+        ended = WALL_CLOCK.now()
+        return Beside(call, attempt, ended - began, usual, ended)

@@ -1,0 +1,355 @@
+"""The ROS end that the gateways in Python share: the last message of topics, publishers, services, actions, the graph.
+
+Nothing here waits: what takes time returns a future, which each gateway awaits in its own style.
+"""
+
+import argparse
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from messages import Forms, RefusedError, interface
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from surface import ACTION, DEADLINE_S, PUBLISHES, READS, SERVICES, STYLES, End
+
+_LOOK_S = 0.1
+_DEPTH = 100
+_LEAKED = 1
+
+
+@dataclass
+class Goal:
+    """A goal and what has become of it: `status` as GoalStatus has it."""
+
+    fault: str = ""
+    handle: Any = None
+    status: int = GoalStatus.STATUS_EXECUTING
+    feedback: list[Any] = field(default_factory=list)
+    result: Any = None
+
+    def latest(self) -> Any:
+        """Return the last feedback, or None."""
+        if not self.feedback:
+            return None
+        if self.fault == "feedback reordered" and len(self.feedback) > 1:
+            return self.feedback[-1 - len(self.feedback) % 2]
+        return self.feedback[0 if self.fault == "first feedback for ever" else -1]
+
+
+@dataclass
+class _Heard:
+    kind: type
+    callback: Callable[[Any], None]
+    subscription: Any = None
+    quality: tuple[ReliabilityPolicy, DurabilityPolicy] | None = None
+
+
+class RosEnd:
+    """A node with all that a gateway does on the graph.
+
+    Args:
+        domain_id: the ROS domain.
+        forms: how JSON writes messages.
+        fault: what is done wrong.
+    """
+
+    def __init__(self, domain_id: int, forms: Forms, fault: str = "") -> None:
+        self.fault, self.forms = fault, replace(forms, fault=fault)
+        self.deadline_s = 600.0 if fault == "no deadline" else DEADLINE_S
+        self.goals: dict[str, Goal] = {}
+        self._busy = threading.Lock()
+        self._absent: set[str] = set()
+        self._context = Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = Node("gateway", context=self._context, start_parameter_services=False, enable_rosout=False)
+        self._heard: dict[str, list[_Heard]] = {}
+        self._last: dict[str, tuple[Any, float]] = {}
+        self._ends: dict[str, Any] = {}
+        self._held: list[Any] = []
+        self._topics: dict[str, str] = {}
+        self._creating = threading.Lock()
+        self.node.create_timer(_LOOK_S, self._look)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        threading.Thread(target=self._spin, daemon=True).start()
+
+    def prepare(self, *, keep: bool) -> None:
+        """Create all ends early, as ROS takes a moment to find what is at the others; keep the last messages."""
+        for end in PUBLISHES:
+            self.publisher(end)
+        for end in SERVICES:
+            self.client(end)
+        self.action_client(ACTION)
+        for end in READS if keep else ():
+            self.subscribe(end.ros, end.type, partial(self._came, end.ros))
+
+    def read(self, value: Any, kind: type, end: End) -> Any:
+        """Return the message, request or goal that JSON names.
+
+        Raises:
+            RefusedError: it names none.
+        """
+        try:
+            return self.forms.read(value, kind)
+        except RefusedError:
+            if self.fault == "invalid accepted":
+                return kind()
+            if self.fault == "invalid published" and "/msg/" in end.type:
+                self.publish(end, kind())
+            raise
+
+    def subscribe(self, topic: str, kind: str, callback: Callable[[Any], None]) -> Callable[[], None]:
+        """Call `callback` with each message; return what ends that."""
+        heard = _Heard(interface(kind), callback)
+        self._heard.setdefault(topic, []).append(heard)
+        self._connect(topic, heard)
+
+        def end() -> None:
+            self._heard[topic].remove(heard)
+            self.node.destroy_subscription(heard.subscription)
+
+        return end
+
+    def last(self, end: End) -> Any:
+        """Return the last message of a topic; None without one, or if it is too old."""
+        topic, kind, max_age_s = end.ros, end.type, end.max_age_s
+        with self._busy:
+            pass
+        if self.fault == "subscriptions leak":
+            self._held.append(self.node.create_subscription(interface(kind), topic, lambda _: None, _LEAKED))
+        message, at = self._last.get(topic, (None, 0.0))
+        if message is None:
+            if self.fault == "absent crashes":
+                raise KeyError(topic)
+            return interface(kind)() if self.fault == "empty at first" else None
+        if max_age_s is not None and time.monotonic() - at > max_age_s:
+            return {"stale": message, "empty when stale": interface(kind)()}.get(self.fault)
+        if self.fault == "restamped" and hasattr(message, "header"):
+            message.header.stamp = self.node.get_clock().now().to_msg()
+        return message
+
+    def publisher(self, end: End) -> Any:
+        """Return the publisher of a topic."""
+        return self._end(end.ros, lambda: self.node.create_publisher(interface(end.type), end.ros, _DEPTH))
+
+    def publish(self, end: End, message: Any) -> None:
+        """Publish a message."""
+        publisher = self.publisher(end)
+        with self._creating:
+            if self.fault == "message dropped":
+                self._held.append(message)
+                if len(self._held) % 3 == 0:
+                    return
+            if self.fault == "reordered":
+                self._held.append(message)
+                if len(self._held) == 2:
+                    publisher.publish(self._held.pop())
+                    publisher.publish(self._held.pop())
+                elif len(self._held) == 1:
+                    threading.Timer(0.3, self._late, [publisher, message]).start()
+                return
+            publisher.publish(message)
+            if self.fault == "message doubled":
+                publisher.publish(message)
+
+    def client(self, end: End) -> Any:
+        """Return the client of a service."""
+        return self._end(end.ros, lambda: self.node.create_client(interface(end.type), end.ros))
+
+    def action_client(self, end: End) -> Any:
+        """Return the client of an action."""
+        return self._end(end.ros, lambda: ActionClient(self.node, interface(end.type), end.ros))
+
+    def call(self, end: End, request: Any) -> Future | None:
+        """Call a service; return the future of its response, or None if there is none."""
+        client, empty, future = self.client(end), interface(end.type).Response, Future()
+        if not client.service_is_ready() or end.ros in self._absent:
+            if self.fault == "absence remembered":
+                self._absent.add(end.ros)
+            if self.fault != "absent service as success":
+                return None
+            future.set_result(empty())
+            return future
+        if self.fault == "call dropped":
+            future.set_result(empty())
+            return future
+        if self.fault == "call doubled":
+            client.call_async(request)
+        if self.fault == "late as success":
+            threading.Timer(self.deadline_s / 2, lambda: future.done() or future.set_result(empty())).start()
+        if self.fault == "deadlock":
+            self._busy.acquire(timeout=self.deadline_s)
+            future.add_done_callback(lambda _: self._busy.release())
+        _passed_on(client.call_async(request), future, lambda response: self._served(end.ros, response))
+        return future
+
+    def send_goal(self, end: End, request: Any) -> tuple[str, Goal, Future] | None:
+        """Send a goal; return its id, it, and the future of whether it is accepted; None if there is no server."""
+        client = self.action_client(end)
+        if not client.server_is_ready() or end.ros in self._absent:
+            if self.fault == "absence remembered":
+                self._absent.add(end.ros)
+            return None
+        goal, accepted, name = Goal(self.fault), Future(), uuid.uuid4().hex
+        self.goals[name] = goal
+        if self.fault == "goal doubled":
+            client.send_goal_async(request)
+
+        def responded(handle: Any) -> bool:
+            goal.handle = handle
+            if not handle.accepted:
+                goal.status = GoalStatus.STATUS_UNKNOWN
+                if self.fault == "refused goal as accepted":
+                    goal.status = GoalStatus.STATUS_EXECUTING
+                if self.fault == "refused goal as aborted":
+                    goal.status = GoalStatus.STATUS_ABORTED
+                return "refused goal" in self.fault
+            handle.get_result_async().add_done_callback(lambda done: self._finished(goal, done.result()))
+            return True
+
+        sent = client.send_goal_async(request, feedback_callback=lambda came: goal.feedback.append(came.feedback))
+        _passed_on(sent, accepted, responded)
+        return name, goal, accepted
+
+    def goal(self, name: str) -> Goal | None:
+        """Return a goal by its id."""
+        if self.fault == "goals mixed" and self.goals:
+            return list(self.goals.values())[-1]
+        return self.goals.get(name)
+
+    def cancel(self, goal: Goal) -> Future:
+        """Cancel a goal; return the future of whether its server does so."""
+        canceled: Future = Future()
+        if self.fault == "cancel lost":
+            canceled.set_result(result=True)
+            return canceled
+        if self.fault == "cancel of another":
+            goal = list(self.goals.values())[-1]
+        refused = self.fault == "cancel as refused"
+        cancelled = goal.handle.cancel_goal_async()
+        _passed_on(cancelled, canceled, lambda response: bool(response.goals_canceling) and not refused)
+        return canceled
+
+    def topics(self) -> dict[str, str]:
+        """Return the topics of the graph, with their types."""
+        found = {name: kinds[0] for name, kinds in self.node.get_topic_names_and_types()}
+        there = {name: kind for name, kind in found.items() if self._ends_of(name)}
+        if self.fault == "list of the start":
+            self._topics = self._topics or there
+            return self._topics
+        if self.fault == "list keeps what is gone":
+            self._topics |= there
+            return self._topics
+        if self.fault == "list with wrong types":
+            return dict.fromkeys(there, "std_msgs/msg/String")
+        if self.fault == "list without namespaces":
+            return {"/" + name.rsplit("/", 1)[-1]: kind for name, kind in there.items()}
+        return there
+
+    def _late(self, publisher: Any, message: Any) -> None:
+        with self._creating:
+            if self._held == [message]:
+                publisher.publish(self._held.pop())
+
+    def _served(self, service: str, response: Any) -> Any:
+        if self.fault == "last response":
+            response, self._last[service] = self._last.get(service, (response, 0.0))[0], (response, 0.0)
+        if self.fault == "response as success" and hasattr(response, "success"):
+            response.success = True
+        return response
+
+    def _finished(self, goal: Goal, done: Any) -> None:
+        status = done.status
+        wrong = {
+            "aborted as succeeded": (GoalStatus.STATUS_ABORTED, GoalStatus.STATUS_SUCCEEDED),
+            "canceled as aborted": (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED),
+            "canceled as succeeded": (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_SUCCEEDED),
+            "succeeded as aborted": (GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_ABORTED),
+            "never ends": (status, GoalStatus.STATUS_EXECUTING),
+        }.get(self.fault, (0, 0))
+        goal.result = type(done.result)() if self.fault == "result lost" else done.result
+        goal.status = wrong[1] if wrong[0] == status else status
+
+    def _came(self, topic: str, message: Any) -> None:
+        if self.fault == "first message for ever" and topic in self._last:
+            message = self._last[topic][0]
+        if self.fault == "messages mixed":
+            topics = [name for name, heard in self._heard.items() if heard[0].kind is type(message)]
+            for name in topics:
+                self._last[name] = message, time.monotonic()
+        self._last[topic] = message, time.monotonic()
+
+    def _look(self) -> None:
+        for topic, all_heard in list(self._heard.items()):
+            for heard in list(all_heard):
+                self._connect(topic, heard)
+
+    def _connect(self, topic: str, heard: _Heard) -> None:
+        """Subscribe with the reliability and durability of the topic's publishers."""
+        found = [one.qos_profile for one in self.node.get_publishers_info_by_topic(topic)]
+        if self.fault == "deaf after the first publisher" and heard.quality and not found:
+            return
+        reliable = all(one.reliability == ReliabilityPolicy.RELIABLE for one in found)
+        latched = bool(found) and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in found)
+        quality = (
+            ReliabilityPolicy.RELIABLE if reliable or self.fault == "reliable only" else ReliabilityPolicy.BEST_EFFORT,
+            DurabilityPolicy.TRANSIENT_LOCAL
+            if latched and self.fault != "volatile only"
+            else DurabilityPolicy.VOLATILE,
+        )
+        if quality == heard.quality or (heard.quality and not found):
+            return
+        old, heard.quality = heard.subscription, quality
+        profile = QoSProfile(depth=_DEPTH, reliability=quality[0], durability=quality[1])
+        heard.subscription = self.node.create_subscription(heard.kind, topic, heard.callback, profile)
+        if old is not None:
+            self.node.destroy_subscription(old)
+
+    def _ends_of(self, topic: str) -> int:
+        return self.node.count_publishers(topic) + self.node.count_subscribers(topic)
+
+    def _end(self, name: str, create: Callable[[], Any]) -> Any:
+        with self._creating:
+            if name not in self._ends:
+                self._ends[name] = create()
+            return self._ends[name]
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except (ExternalShutdownException, ShutdownException):
+            return
+
+
+def begun(style: str) -> tuple[RosEnd, int]:
+    """Return the ROS end and the port that the command line names: `PORT DOMAIN [FAULT]`."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("port", type=int)
+    parser.add_argument("domain", type=int)
+    parser.add_argument("fault", nargs="?", default="")
+    given = parser.parse_args()
+    end = RosEnd(given.domain, STYLES[style].forms, given.fault)
+    end.prepare(keep=style != "node")
+    return end, given.port
+
+
+def _passed_on(source: Any, target: Future, converted: Callable[[Any], Any]) -> None:
+    """Complete a future with the result of one of rclpy's, unless its time was up before."""
+
+    def done(finished: Any) -> None:
+        if target.set_running_or_notify_cancel():
+            target.set_result(converted(finished.result()))
+
+    source.add_done_callback(done)
