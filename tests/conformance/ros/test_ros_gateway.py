@@ -17,6 +17,8 @@ from processes import ended
 from ros_probe.process import RosProcess
 
 ROOT = Path(__file__).parents[3]
+#: What this gateway, which keeps old messages for ever, is right in.
+CORE = ("read-exact", "read-fresh", "read-newest", "write-exact", "once", "order", "refused-nothing")
 
 
 @contextmanager
@@ -33,7 +35,8 @@ def _served(domain_id, faults=""):
 def _judged(tmp_path, domain_id, url, *options, ros=web_gateway.MAP, code=None):
     statement, out = tmp_path / "gateway.toml", tmp_path / "out"
     statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{ros}', encoding="utf-8")
-    more = ["--ros-domain-id", domain_id, "--class", "ros-gateway", "--out", out, *options]
+    selected = [word for id_ in CORE for word in ("--select", f"ros-gateway/{id_}")]
+    more = ["--ros-domain-id", domain_id, *selected, "--out", out, *options]
     done = ended(sys.executable, "-m", "roaas", "certify", statement, *more)
     assert "Traceback" not in done.stdout + done.stderr, done.stderr
     if code is not None:
@@ -41,17 +44,14 @@ def _judged(tmp_path, domain_id, url, *options, ros=web_gateway.MAP, code=None):
     if not (out / "result.json").exists():
         return done, {}
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("ros-gateway/")}
-
-
-CORE = ("read-exact", "read-fresh", "read-newest", "write-exact", "once", "order", "refused-nothing")
+    verdicts = {one["id"]: one["verdict"] for one in result["requirements"]}
+    return done, {id_: verdicts[id_] for id_ in (f"ros-gateway/{core}" for core in CORE)}
 
 
 def test_a_right_gateway_passes_without_a_robot(tmp_path, domain_id):
     with _served(domain_id) as url:
         done, judged = _judged(tmp_path, domain_id, url, "--ros-play")
-        assert set(judged.values()) <= {"pass", "skip", "not-claimed"}, done.stdout
-        assert all(judged[f"ros-gateway/{id_}"] == "pass" for id_ in CORE), done.stdout
+        assert set(judged.values()) == {"pass"}, done.stdout
         assert done.returncode == 0
         again = ended(sys.executable, "-m", "roaas", "judge", tmp_path / "out")
         assert again.returncode == 0, again.stdout + again.stderr
