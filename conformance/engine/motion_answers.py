@@ -16,7 +16,7 @@ from conformance.scenarios.motion.velocities import clamped_velocities, let_go, 
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import counted
-from conformance.verdict.verdicts import Verdict
+from conformance.verdict.verdicts import Value, Verdict
 
 #: The questions, and the requirements by which each is answered.
 QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
@@ -33,15 +33,15 @@ _NO_LIMITS: Final = "no limits are declared that are refused"
 
 
 def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: Recordings) -> list[dict[str, str]]:
-    """Return question, answer ("yes", "no" or "not seen"), figure and picture of each; empty for no moving device.
+    """Return question, answer ("yes", "no" or "not seen"), figure and picture of each; empty if none was asked.
 
     The picture is what ``reports`` calls the drive or move: its name in the traces.
     """
-    if motion is None:
-        return []
     judged = {
         one.requirement.id.removeprefix(f"{MOTION}/"): one for one in verdicts if one.requirement.class_ == MOTION
     }
+    if motion is None or all(one.value is Value.NOT_CLAIMED for one in judged.values()):
+        return []
     figures = (_moves, _stops, _vanishes, _refuses)
     found = []
     for (question, ids), figure in zip(QUESTIONS.items(), figures, strict=True):

@@ -18,7 +18,7 @@ from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import document_of
-from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
+from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
 from conformance.transport.exchange import Exchange
@@ -110,7 +110,7 @@ class Goals:
 def action_goals(gateway: Gateway) -> Goals:
     """Serve actions, send them goals of each course through the gateway, and read what becomes of them."""
     if not gateway.plays:
-        raise NotPossibleError(NO_PLAY)
+        raise NotDeclaredError(NO_PLAY)
     probes: list[Goal] = []
     definitions: dict[str, Definition] = {}
     with partial_trace(lambda: Goals(tuple(probes), definitions)):

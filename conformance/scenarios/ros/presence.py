@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import value_at
 from conformance.scenarios.ros.gateway import PACE_S, Gateway
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import differences, document_of
-from conformance.scenarios.scenario import NotPossibleError, scenario
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Lists, Publishes, Reads
 from conformance.transport.exchange import Exchange
@@ -81,7 +81,7 @@ class Publishers:
 def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
     """Read topics on which nothing was published yet."""
     if not gateway.plays:
-        raise NotPossibleError(NO_PLAY)
+        raise NotDeclaredError(NO_PLAY)
     also = {one.publishes for one in gateway.ros.operations.values() if isinstance(one, Publishes)}
     there = gateway.robot.tell("graph")["topics"]
     found = []
@@ -105,7 +105,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
 def publishers_end(gateway: Gateway) -> Publishers:
     """Publish on all topics at once, fall silent, publish again, kill the publisher, and begin anew."""
     if not gateway.plays:
-        raise NotPossibleError(NO_PLAY)
+        raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
     absences: list[Absence] = []
     presences = list(topics.shown("all topics at once"))
@@ -121,7 +121,7 @@ def publishers_end(gateway: Gateway) -> Publishers:
 def publishers_of_each_quality(gateway: Gateway) -> tuple[Presence, ...]:
     """Publish with best effort; then once, latched, before the gateway has found the publisher."""
     if not gateway.plays:
-        raise NotPossibleError(NO_PLAY)
+        raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
     found = [*topics.shown("a best-effort publisher", reliability="best_effort")]
     topics.leave()

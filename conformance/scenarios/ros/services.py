@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
-from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
+from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
@@ -116,7 +116,7 @@ class Services:
 def service_calls(gateway: Gateway, effort: Effort) -> Services:
     """Serve services well, late, never and not at all, and call them through the gateway."""
     if not gateway.plays:
-        raise NotPossibleError(NO_PLAY)
+        raise NotDeclaredError(NO_PLAY)
     probes: list[Called] = []
     requests: dict[str, Definition] = {}
     responses: dict[str, Definition] = {}
