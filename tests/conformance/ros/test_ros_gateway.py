@@ -99,7 +99,8 @@ def test_what_is_missing_is_named(tmp_path, domain_id):
         unknown = web_gateway.MAP.replace("nav_msgs/msg/Odometry", "nope_msgs/msg/Odometry")
         done, judged = _judged(tmp_path, domain_id, url, "--ros-play", "--effort", "quick", ros=unknown, code=4)
         assert judged["ros-gateway/read-exact"] == "skip"
-        assert "the package nope_msgs is not installed: apt install ros-jazzy-nope-msgs" in done.stdout
+        result = (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
+        assert "the package nope_msgs is not installed: apt install ros-jazzy-nope-msgs" in result
         done, judged = _judged(tmp_path, domain_id, url, "--ros", code=4)
         assert judged["ros-gateway/once"] == "skip"
         result = (tmp_path / "out" / "result.json").read_text(encoding="utf-8")
