@@ -41,6 +41,7 @@ from conformance.verdict.verdicts import (
     Value,
     Verdict,
     class_verdicts,
+    is_unjudged,
     overall,
     score,
     verdict_of,
@@ -216,9 +217,10 @@ def _concluded(
 
 
 def _all_hold(verdicts: Iterable[Verdict], selection: Selection) -> bool:
-    """Return whether a selected requirement passed, and each has a verdict that is no failure."""
-    values = [one.value for one in verdicts if selection.has(one.requirement.id)]
-    return Value.PASS in values and Value.FAIL not in values and Value.ERROR not in values
+    """Return whether a selected requirement passed, and none failed or would keep its class from passing."""
+    own = [one for one in verdicts if selection.has(one.requirement.id)]
+    values = {one.value for one in own}
+    return Value.PASS in values and not values & {Value.FAIL, Value.ERROR} and not any(map(is_unjudged, own))
 
 
 def _deciding(

@@ -168,8 +168,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     unjudged = [
         item
         for item in verdicts
-        if (item.value is Value.ERROR and item.requirement.level is not Level.MAY)
-        or (item.value is Value.SKIP and not item.evidence.is_unseen and holds_back(item.requirement))
+        if (item.value is Value.ERROR and item.requirement.level is not Level.MAY) or is_unjudged(item)
     ]
     if unjudged:
         first = unjudged[0]
@@ -200,6 +199,11 @@ def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str,
     )
     others = {name for one in verdicts for name in one.requirement.classes if name in acting}
     return dict.fromkeys(sorted(others), View.ON_ROS if watched else View.BLACK_BOX) | seen
+
+
+def is_unjudged(verdict: Verdict) -> bool:
+    """Return whether a requirement was not judged whose class is inconclusive without it."""
+    return verdict.value is Value.SKIP and not verdict.evidence.is_unseen and holds_back(verdict.requirement)
 
 
 def holds_back(requirement: Requirement) -> bool:
