@@ -16,6 +16,7 @@ from conformance.api.call_rules import CallRules, told
 from conformance.cli.certify_drive import NotShownError, checked, drive_options, with_map
 from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_options import CertifyOptions
+from conformance.cli.selecting import SelectionError, failed_before, selected
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
@@ -338,7 +339,7 @@ def _places(contract: Contract, statement: Path | None, source: str | None) -> d
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     """Return the run that the options describe."""
     from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
-    from conformance.verdict.selection import Selection, SelectionError, failed_before, selected  # noqa: PLC0415 - same
+    from conformance.verdict.selection import Selection  # noqa: PLC0415 - same
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}

@@ -22,6 +22,7 @@ def _played(name: str, scenario: Scenario) -> Rule:
 head = _played("head", neighbours)
 method_refused, entity_tag = _played("method-refused", own_things), _played("entity-tag", own_things)
 if_match, digest = _played("if-match", own_things), _played("digest", own_things)
+problem_status = _played("problem-status", own_things)
 
 
 @pytest.mark.phase("late")

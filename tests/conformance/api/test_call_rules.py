@@ -69,7 +69,7 @@ def test_what_the_motion_map_sends_is_called():
     moves = Operation("", "PUT", "/goal/{east}")
     lines = told(CallRules((), ("/never",)), [moves, Operation("", "PUT", "/never")], ["PUT /goal/{x}", "PUT /never"])
     assert lines[0] == "Calls 1 of 2 operations; state is changed by 1; not called: 1."
-    assert lines[1] == "  Calls 1, because the motion map names it: PUT /goal/{east}"
+    assert lines[1] == "  Calls 1, because the map in the statement names it: PUT /goal/{east}"
 
 
 def test_what_is_held_back_for_its_name_is_told_with_the_option_that_names_it():

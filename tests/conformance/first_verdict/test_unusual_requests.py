@@ -148,7 +148,7 @@ async def _locked(request):
 
 
 def _device():
-    jobs = {}
+    jobs, made = {}, {}
 
     async def make(request):
         key = re.fullmatch(
@@ -161,8 +161,10 @@ def _device():
             right = False
         if not key or not right:
             return error(400, "not a job")
-        id_ = f"j{len(jobs)}"
-        jobs[id_] = given
+        # A repeated key does not make another job, and does not stand for another one.
+        id_ = made.setdefault(key[0], f"j{len(jobs)}")
+        if jobs.setdefault(id_, given) != given:
+            return error(400, "the key of another job")
         return web.json_response({"job": {"id": id_}}, status=201, headers={"Location": f"/jobs/{id_}"})
 
     async def job(request):

@@ -1,0 +1,81 @@
+"""Choose requirements by the options: named ones, those of classes, or those that failed in the run before."""
+
+import json
+from collections.abc import Container, Iterable, Mapping
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Final
+
+from conformance.contract.ledger import Requirement
+
+_BROKEN: Final = frozenset({"fail", "error"})
+
+
+class SelectionError(ValueError):
+    """Raised for a selection that selects nothing; the message names the pattern."""
+
+
+def selected(
+    ledger: Mapping[str, Requirement],
+    claims: Container[str],
+    select: Iterable[str] = (),
+    exclude: Iterable[str] = (),
+    among: frozenset[str] | None = None,
+) -> frozenset[str] | None:
+    """Return the ids that are selected; None if no choice was made.
+
+    Args:
+        ledger: the requirements by id.
+        claims: the judged classes.
+        select: ids, classes or patterns with `*`; empty: all.
+        exclude: the same; they win.
+        among: ids that are chosen from; None: all.
+
+    Raises:
+        SelectionError: a pattern fits no requirement that is judged, or nothing is left.
+    """
+    select, exclude = tuple(select), tuple(exclude)
+    if not (select or exclude or among is not None):
+        return None
+    judged = {id_: one for id_, one in ledger.items() if any(name in claims for name in one.classes)}
+    chosen = frozenset(judged) if among is None else among & frozenset(judged)
+    if select:
+        chosen &= frozenset().union(*(_fitting(pattern, judged, "--select") for pattern in select))
+    for pattern in exclude:
+        chosen -= _fitting(pattern, judged, "--exclude")
+    if not chosen:
+        raise SelectionError("--select and --exclude leave no requirement to judge")
+    return chosen
+
+
+def _fitting(pattern: str, judged: Mapping[str, Requirement], option: str) -> frozenset[str]:
+    found = frozenset(
+        id_
+        for id_, one in judged.items()
+        if pattern in one.classes or any(fnmatchcase(name, pattern) for name in (id_, *one.aliases))
+    )
+    if not found:
+        names = [*judged, *{name for one in judged.values() for name in one.classes}]
+        near = get_close_matches(pattern, names, 1)
+        meant = f"; did you mean {near[0]}?" if near else ""
+        raise SelectionError(f"{option} {pattern!r} fits no requirement and no class that is judged{meant}")
+    return found
+
+
+def failed_before(result: Path) -> frozenset[str]:
+    """Return the ids that failed, or came to no verdict, in the run whose result.json this is.
+
+    Raises:
+        SelectionError: there is no such result, or nothing failed in it.
+    """
+    try:
+        document = json.loads(result.read_bytes())
+        found = {one["id"] for one in document["requirements"] if one["verdict"] in _BROKEN}
+    except FileNotFoundError:
+        raise SelectionError(f"--last-failed: there is no {result}; run without it first") from None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise SelectionError(f"--last-failed: {result} is no result of a run: {error}") from None
+    if not found:
+        raise SelectionError(f"--last-failed: nothing failed in {result}")
+    return frozenset(map(str, found))
