@@ -52,9 +52,10 @@ def test_what_is_wrong_in_one_operation_is_found_there(tmp_path):
         assert {one["subject"] for one in wrong} == {"GetStatus", "GetPresets", "GetNodes", "GetEvents"}
         refused = _failures(outcome, "soap/valid-accepted")
         assert [one["subject"] for one in refused] == ["GetSettings"]
-        # What the terminal shows does it again, in one line and in any shell.
-        shown = next(line for line in outcome.text.splitlines() if "replay: " in line and "/events" in line)
-        again = subprocess.run(["sh", "-c", shown.partition("replay: ")[2]], capture_output=True, check=True)
+        # What the result shows does it again, in one line and in any shell; the terminal leaves it to `roaas replay`.
+        events = next(one for one in wrong if one["subject"] == "GetEvents")
+        assert f"roaas replay {tmp_path} {events['number']}" in outcome.text
+        again = subprocess.run(["sh", "-c", events["request"]["curl"]], capture_output=True, check=True)
         assert b"GetEventsResponse" in again.stdout, again
 
 
