@@ -6,6 +6,7 @@ back, and what changes meanwhile is its axis.
 
 from __future__ import annotations
 
+import difflib
 import posixpath
 import re
 from abc import ABC, abstractmethod
@@ -146,8 +147,6 @@ def _named(operations: Sequence[Operation], label: str, option: str) -> Operatio
     labels = named_by([label.strip()], [one.label for one in operations])
     found = next((one for one in operations if one.label in labels or one.id == label.strip()), None)
     if found is None:
-        import difflib  # noqa: PLC0415 - of an error alone
-
         near = difflib.get_close_matches(label, [one.label for one in operations], 1, 0)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise NotPossibleError(f"{option} {label!r} is no operation of the description{hint}")

@@ -11,14 +11,13 @@ from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.openapi import Operation, is_json
 from conformance.engine.commanded import commanded_by, is_axis
+from conformance.engine.map_text import inline, key
 
 _GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
 _DRIVES: Final = re.compile(r"velocity|cmd_?vel|twist|drive|jog", re.IGNORECASE)
 _STOPS: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
 _LASTS: Final = re.compile(r"duration|seconds", re.IGNORECASE)
 _STAMP: Final = re.compile(r"stamp|timestamp", re.IGNORECASE)
-# A bare key in TOML 1.0.
-_BARE: Final = re.compile(r"[A-Za-z0-9_-]+")
 _DEPTH: Final = 6
 
 
@@ -44,11 +43,11 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     for name in axes:
         at = next(at for at in read if at.rpartition("/")[2] == name)
         least, most = sent[name].get("minimum", -0.1), sent[name].get("maximum", 0.1)
-        yield f'{_key(name)} = {{ at = {basic_string(at)}, unit = "", limits = [{least}, {most}] }}'
+        yield f'{key(name)} = {{ at = {basic_string(at)}, unit = "", limits = [{least}, {most}] }}'
     yield ""
     yield "[motion.goto]"
     yield f"send = {basic_string(move.label)}"
-    yield f"body = {_inline(_template(body, set(axes)))}"
+    yield f"body = {inline(_template(body, set(axes)))}"
     yield "tolerance = 0.05"
     yield from _stop(operations, move)
     if drives is not None:
@@ -73,13 +72,13 @@ def _velocity(drive: Operation, body: Schema) -> Iterator[str]:
     yield ""
     yield "[motion.velocity]"
     yield f"send = {basic_string(drive.label)}"
-    yield f"body = {_inline(_template(body, names))}"
+    yield f"body = {inline(_template(body, names))}"
     yield "tolerance = 0.05"
     yield "# hold_s = 0.5  # so long after the last command it goes on"
     yield ""
     yield "[motion.velocity.axes]  # at: where the state has it; or of: the axis that it changes"
     for name in sorted(names):
-        yield f'{_key(name)} = {{ limits = [-0.1, 0.1], at = "/" }}'
+        yield f'{key(name)} = {{ limits = [-0.1, 0.1], at = "/" }}'
 
 
 def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
@@ -92,7 +91,7 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
         yield f"send = {basic_string(found.label)}"
         body = _body(found)
         if body is not None:
-            yield f"body = {_inline(_template(body, set()))}  # an id of the move: " + '"{goto:/id}"'
+            yield f"body = {inline(_template(body, set()))}  # an id of the move: " + '"{goto:/id}"'
         yield "rests_within_s = 0.5"
 
 
@@ -121,8 +120,8 @@ def _best(
 def _parts(schema: Schema) -> Iterator[Schema]:
     """Yield a schema and its alternatives."""
     yield schema
-    for key in ("allOf", "anyOf", "oneOf"):
-        for part in schema.get(key, ()):
+    for word in ("allOf", "anyOf", "oneOf"):
+        for part in schema.get(word, ()):
             if isinstance(part, dict):
                 yield from _parts(part)
 
@@ -167,9 +166,9 @@ def _chosen(schema: Schema, axes: set[str]) -> Iterator[Schema]:
     yield schema
     for part in schema.get("allOf", ()):
         yield from _chosen(part, axes)
-    for key in ("anyOf", "oneOf"):
+    for word in ("anyOf", "oneOf"):
         ranked = sorted(
-            (part for part in schema.get(key, ()) if isinstance(part, dict)),
+            (part for part in schema.get(word, ()) if isinstance(part, dict)),
             key=lambda part: sum(at.rpartition("/")[2] in axes for at, _ in _numbers(part)),
         )
         if ranked:
@@ -178,17 +177,3 @@ def _chosen(schema: Schema, axes: set[str]) -> Iterator[Schema]:
 
 def _names(made: dict[str, Any]) -> bool:
     return any(_names(one) if isinstance(one, dict) else "{" in str(one) for one in made.values())
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else basic_string(name)
-
-
-def _inline(value: Any) -> str:
-    """Return a value in TOML, on one line."""
-    if isinstance(value, dict):
-        inside = ", ".join(f"{_key(name)} = {_inline(one)}" for name, one in value.items())
-        return f"{{ {inside} }}" if inside else "{}"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return str(value) if isinstance(value, int | float) else basic_string(str(value))
