@@ -5,6 +5,7 @@ is what it does not see: circles between modules, modules that are named in stri
 """
 
 import ast
+import collections
 import itertools
 import re
 import sys
@@ -166,6 +167,13 @@ def test_every_folder_says_what_it_is():
         or not ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8")))
     ]
     assert silent == []
+
+
+def test_no_two_helpers_of_tests_share_a_name():
+    """All folders of tests are on one path, so that the second of a name is never found."""
+    own = {"conftest.py", "__init__.py"}
+    named = [path.name for path in (ROOT / "tests").rglob("*.py") if path.name not in own]
+    assert sorted(name for name, times in collections.Counter(named).items() if times > 1) == []
 
 
 def test_no_module_is_overlong_without_a_reason():

@@ -4,9 +4,9 @@ import json
 import sys
 
 import pytest
-from gateways.mutants import rows
+from gateway_processes import gateway
+from gateways.gateway_mutants import rows
 from processes import ended
-from serving import gateway
 
 #: The requirement that each of these faults breaks, and the style of the gateway that has it.
 KILLED = {
