@@ -171,7 +171,7 @@ class Changes:
 
     @staticmethod
     def _case(occasion: Occasion, holds: bool, expected: str, found: str, cause: str) -> Case:  # noqa: FBT001 - as case()
-        return occasion.case("description/written-is-read", holds, expected, found, cause=f"{cause} state")
+        return occasion.case("description/states", holds, expected, found, cause=f"{cause} state")
 
 
 def state_of(read: Operation) -> str:

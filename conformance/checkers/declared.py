@@ -174,7 +174,7 @@ class WriteOnly:
         if name is not None:
             expected, cause = "a response without what is writeOnly", f"{operation.id} {name}"
             found = f"{name} in the response"
-            yield occasion.case("description/written-is-read", not name, expected, found, cause=cause)
+            yield occasion.case("description/read-only", not name, expected, found, cause=cause)
 
 
 def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:

@@ -300,7 +300,7 @@ class Memory:
             expected = f"{name}, which is readOnly, as the device gave it"
             found = f"{shown(now[name])} as {name}" + (f", and {shown(before[name])} before" if name in before else "")
             holds = not (is_taken or is_other)
-            yield occasion.case("description/written-is-read", holds, expected, found, cause=f"{item.label} {name}")
+            yield occasion.case("description/read-only", holds, expected, found, cause=f"{item.label} {name}")
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         thing = self._things.get(path.casefold())

@@ -38,7 +38,8 @@ _SEEN: Final = 2
 _EXACT: Final = 2**53
 # Doubles that differ by no more are equal; those that differ by more than the second are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
-_READ, _KEPT, _DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
+_READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
+_KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
 
 
 class _State(NamedTuple):
@@ -244,7 +245,7 @@ class Writes:
             if name not in change.moving and name in change.now:
                 wrong = f"{shown(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
                 expected = f"{shown(made[name])} as {name}, as {change.label} asked for (RFC 6902)"
-                yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
+                yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
 
     def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether the request has not written what is the device's."""
@@ -258,7 +259,7 @@ class Writes:
                     is_taken = len(self._doubts[change.operation.label, name]) >= _SEEN
                 expected = f"{name}, which is readOnly, as the device gave it"
                 found = f"{shown(now)} as {name}, and {shown(was)} before"
-                yield occasion.case(_READ, not is_taken, expected, found, cause=f"{item.label} {name}")
+                yield occasion.case(_OWN, not is_taken, expected, found, cause=f"{item.label} {name}")
 
     def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
@@ -348,7 +349,7 @@ class Writes:
                 wrong = f"{shown(now)} as {name}" if is_added and not same(was, now) else ""
             else:
                 continue
-            yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
+            yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
 
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps what it does not name: two bodies that reset other members are no chance."""
@@ -363,7 +364,8 @@ class Writes:
                 self._doubts[label, f"{name} reset"].add(change.write.request.body)
                 if len(self._doubts[label, f"{name} reset"]) >= _SEEN:
                     expected = f"{shown(was)} as {name}, which {change.label} does not name"
-                    yield occasion.case(_READ, False, expected, f"{shown(now)} as {name}", cause=f"{label} {name} kept")  # noqa: FBT003
+                    found, cause = f"{shown(now)} as {name}", f"{label} {name} kept"
+                    yield occasion.case(_PATCH, False, expected, found, cause=cause)  # noqa: FBT003
 
 
 def _is_rounded(value: Any, now: Any) -> bool:

@@ -8,21 +8,22 @@ from written_device import Written, blamed
 _AT_ONCE = 8
 _STYLES = {"plain": (), "marked": ("marked",)}
 _READ, _KEPT, _DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
+_PATCH, _READ_ONLY = "description/patch", "description/read-only"
 _GONE, _OWN = "description/deleted-is-gone", "description/own-identifier"
 _FAULTS = {
-    "built_at by PUT": _READ,
-    "built_at by PATCH": _READ,
-    "maker by POST": _READ,
-    "maker by PUT": _READ,
+    "built_at by PUT": _READ_ONLY,
+    "built_at by PATCH": _READ_ONLY,
+    "maker by POST": _READ_ONLY,
+    "maker by PUT": _READ_ONLY,
     "default of loud by POST": _DEFAULTS,
     "default of loud by PUT": _DEFAULTS,
     "default of lane by PUT": _DEFAULTS,
-    "null keeps": _READ,
-    "null keeps note": _READ,
-    "null keeps loud": _READ,
-    "objects replaced": _READ,
+    "null keeps": _PATCH,
+    "null keeps note": _PATCH,
+    "null keeps loud": _PATCH,
+    "objects replaced": _PATCH,
     "others reset": _READ,
-    "steps added": _READ,
+    "steps added": _PATCH,
     "speed cut off": _READ,
     "steps sorted": _READ,
     "note escaped": _READ,
@@ -34,8 +35,8 @@ _FAULTS = {
     "last test ignored": _KEPT,
     "applied in part": _KEPT,
     "failing ignored": _KEPT,
-    "patch without effect": _READ,
-    "added first": _READ,
+    "patch without effect": _PATCH,
+    "added first": _PATCH,
     "code twice by PUT": _OWN,
     "code twice by PATCH": _OWN,
     "lists the deleted": _GONE,

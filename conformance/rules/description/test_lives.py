@@ -117,7 +117,7 @@ def begun() -> list[Ended]:
 
 @pytest.mark.phase("input")
 @pytest.mark.needs("rest")
-@pytest.mark.requirement("description/written-is-read", "description/refused-keeps")
+@pytest.mark.requirement("description/states", "description/refused-keeps")
 def test_what_goes_on(api: RestInterface, values: Values, begun: list[Ended]) -> None:
     """Begin and cancel things that have a state; `checkers.changes` judges all reads of a run."""
     begun += begin_and_end(api, values)
@@ -125,7 +125,7 @@ def test_what_goes_on(api: RestInterface, values: Values, begun: list[Ended]) ->
 
 @pytest.mark.phase("late")
 @pytest.mark.needs("rest")
-@pytest.mark.requirement("description/written-is-read", "description/refused-keeps")
+@pytest.mark.requirement("description/states", "description/refused-keeps")
 def test_what_has_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
     """Read what was begun again, and cancel what is done."""
     look_at_ended(api, values, begun)

@@ -23,6 +23,7 @@ head = _played("head", neighbours)
 method_refused, entity_tag = _played("method-refused", own_things), _played("entity-tag", own_things)
 if_match, digest = _played("if-match", own_things), _played("digest", own_things)
 problem_status = _played("problem-status", own_things)
+patch, read_only = _played("patch", own_things), _played("read-only", own_things)
 
 
 @pytest.mark.phase("late")

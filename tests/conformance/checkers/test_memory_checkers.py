@@ -52,6 +52,7 @@ GONE, THERE, READ, DEFAULTS, KEEPS = (
     f"description/{name}"
     for name in ("deleted-is-gone", "created-is-there", "written-is-read", "defaults", "refused-keeps")
 )  # fmt: skip
+PATCH, OWN, STATES = (f"description/{name}" for name in ("patch", "read-only", "states"))
 
 
 def _job(id_, name="a", rank=1, **more):
@@ -154,15 +155,15 @@ BROKEN = {
         ],
         READ,
     ),
-    "a serial number that changes by PUT": ([_get("1", serial=7), _put("1"), _get("1", serial=8)], READ),
+    "a serial number that changes by PUT": ([_get("1", serial=7), _put("1"), _get("1", serial=8)], OWN),
     "a member of the device's that PUT writes": (
-        [_get("1", built="2026"), _put("1", built="roaas-own"), _get("1", built="roaas-own")], READ,
+        [_get("1", built="2026"), _put("1", built="roaas-own"), _get("1", built="roaas-own")], OWN,
     ),
     "a member of the device's that PATCH writes": (
-        [_get("1", built="2026"), _patch("1", built="roaas-own"), _get("1", built="roaas-own")], READ,
+        [_get("1", built="2026"), _patch("1", built="roaas-own"), _get("1", built="roaas-own")], OWN,
     ),
-    "a member of the device's that POST writes": ([_post("1", built="roaas-own"), _get("1", built="roaas-own")], READ),
-    "null without effect": ([_note(name="a"), _NULLED, _note(name="a")], READ),
+    "a member of the device's that POST writes": ([_post("1", built="roaas-own"), _get("1", built="roaas-own")], OWN),
+    "null without effect": ([_note(name="a"), _NULLED, _note(name="a")], PATCH),
     "a UUID twice": ([_key(_U1), _KEY_GONE, _key(_U1)], THERE),
     "a list has what was deleted": ([_post("1"), _delete("1"), _get("1", 404), 5.0, _jobs("", _job("1"))], GONE),
     "a filtered list has what was deleted": (
@@ -180,23 +181,25 @@ BROKEN = {
     ),
     "deleted, and refused": ([_get("1"), _delete("1", 403), _get("1", 404)], KEEPS),
     "cancelled goes on": (
-        [_status("running"), _CANCELLED, _status("cancelled"), _RESET, _status("cancelled"), _status("done")], READ,
+        [_status("running"), _CANCELLED, _status("cancelled"), _RESET, _status("cancelled"), _status("done")], STATES,
     ),
-    "cancelled is told and not so": ([_status("running"), _CANCELLED, 4.0, _status("running")], READ),
-    "cancelled is told, and it is done": ([_status("running"), _CANCELLED, _status("running"), _status("done")], READ),
-    "cancelled goes on after a refusal": ([_CANCELLED, _status("cancelled"), _REFUSED, _status("running")], READ),
+    "cancelled is told and not so": ([_status("running"), _CANCELLED, 4.0, _status("running")], STATES),
+    "cancelled is told, and it is done": (
+        [_status("running"), _CANCELLED, _status("running"), _status("done")], STATES,
+    ),
+    "cancelled goes on after a refusal": ([_CANCELLED, _status("cancelled"), _REFUSED, _status("running")], STATES),
     "cancelled goes on after another's creation": (
-        [_CANCELLED, _status("cancelled"), _post("2"), _status("queued")], READ,
+        [_CANCELLED, _status("cancelled"), _post("2"), _status("queued")], STATES,
     ),
-    "done is cancelled": ([_status("done"), _CANCELLED], READ),
+    "done is cancelled": ([_status("done"), _CANCELLED], STATES),
     "done is cancelled without a word": (
-        [_status("done"), ("POST", "/jobs/1/cancel", None, 204, None), _status("cancelled")], READ,
+        [_status("done"), ("POST", "/jobs/1/cancel", None, 204, None), _status("cancelled")], STATES,
     ),
-    "done is cancelled by a refusal": ([_status("done"), _cancel(409), _status("cancelled")], READ),
-    "done goes on after a refusal": ([_status("done"), _cancel(409), _status("running")], READ),
-    "done is cancelled by itself": ([_status("done"), _status("cancelled")], READ),
+    "done is cancelled by a refusal": ([_status("done"), _cancel(409), _status("cancelled")], STATES),
+    "done goes on after a refusal": ([_status("done"), _cancel(409), _status("running")], STATES),
+    "done is cancelled by itself": ([_status("done"), _status("cancelled")], STATES),
     "a start that is told and not so": (
-        [_status("queued"), _cancel(act="retry", phase="running"), 4.0, _status("queued")], READ,
+        [_status("queued"), _cancel(act="retry", phase="running"), 4.0, _status("queued")], STATES,
     ),
     "a default that is not applied": ([_post("1"), _KEPT, _post("3"), _KEPT], DEFAULTS),
 }  # fmt: skip
@@ -339,7 +342,7 @@ def _broken(contract, steps):
             else Exchange(request, Response(status, content, body, 10.0, received_s=now))
         )
         broken |= {case.requirement for case in checkers(attempt) if not case.holds}
-    return broken & {GONE, THERE, READ, DEFAULTS, KEEPS}
+    return broken & {GONE, THERE, READ, DEFAULTS, KEEPS, PATCH, OWN, STATES}
 
 
 @pytest.mark.parametrize("name", BROKEN)

@@ -31,7 +31,7 @@ def _blamed(kind, user, folder):
     contract = Contract.load(write_described_pack(folder, document, document))
     response = Response(200, (("Content-Type", "application/json"),), json.dumps(_wrapped(kind, user)).encode(), 1.0)
     cases = RestCheckers(contract, _BASE)(Exchange(Request("GET", f"{_BASE}/it", (), b""), response))
-    return [one.observed for one in cases if one.requirement == "description/written-is-read" and not one.holds]
+    return [one.observed for one in cases if one.requirement == "description/read-only" and not one.holds]
 
 
 @pytest.mark.parametrize("kind", _SCHEMAS)

@@ -8,7 +8,7 @@ from small_device import REFUSED, answers, certified, described, error, reading,
 
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _BAD = {"4XX": REFUSED}
-_KEEPS, _READ, _GONE = (f"description/{name}" for name in ("refused-keeps", "written-is-read", "deleted-is-gone"))
+_KEEPS, _FOLLOWS, _GONE = (f"description/{name}" for name in ("refused-keeps", "states", "deleted-is-gone"))
 _STATES = ["queued", "running", "done", "cancelled"]
 
 
@@ -188,12 +188,12 @@ _RIGHT = {
 }
 #: Faults: of which device, in which style, and the requirement that is broken.
 _BROKEN = {
-    "cancel is told and not done": (_jobs, {"takes": 1}, _READ),
-    "cancel after a refusal is not done": (_jobs, {"created": 202, "takes": 30}, _READ),
-    "start is told and not done": (_jobs, {"takes": 30}, _READ),
-    "done is cancelled": (_jobs, {"takes": 0.02}, _READ),
-    "a refused cancel acts": (_jobs, {"takes": 0.2, "silent": True}, _READ),
-    "a refused start revives": (_jobs, {"takes": 30}, _READ),
+    "cancel is told and not done": (_jobs, {"takes": 1}, _FOLLOWS),
+    "cancel after a refusal is not done": (_jobs, {"created": 202, "takes": 30}, _FOLLOWS),
+    "start is told and not done": (_jobs, {"takes": 30}, _FOLLOWS),
+    "done is cancelled": (_jobs, {"takes": 0.02}, _FOLLOWS),
+    "a refused cancel acts": (_jobs, {"takes": 0.2, "silent": True}, _FOLLOWS),
+    "a refused start revives": (_jobs, {"takes": 30}, _FOLLOWS),
     "a rack in use is gone": (_racks, "", _GONE),
 }
 
