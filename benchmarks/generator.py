@@ -9,6 +9,7 @@ say little.
 """
 
 import argparse
+import json
 import math
 import os
 import re
@@ -23,12 +24,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from fixed import POSE, running_bare
 from loader import Call, load
-from programs import machine, report, roaas_load
+from programs import Answer, machine, report, roaas_load, running_bare
 
 from loadtests.statistics.recorder import Recorder
 
+_POSE = json.dumps({"pose": {"pose": {"position": {"x": 1.0, "y": 2.0, "z": 0.0}}}, "covariance": [0.0] * 36})
+POSE = Answer("/robot/pose/", 200, [("content-type", "application/json"), ("content-length", str(len(_POSE)))], _POSE)
 _TARGET_RATE, _MOST_LAG_MS = 4000, 0.3
 _FAST = """
 import gevent, sys, time

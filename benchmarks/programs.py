@@ -1,18 +1,26 @@
-"""Programs that the benchmarks start, measurements of a process, and the lines that the benchmarks print."""
+"""Programs that the benchmarks start, measurements of a process, and the lines that the benchmarks print.
 
+As a program, this module is the baseline: ``python programs.py ANSWERS.json`` serves a robot's responses as fixed bytes
+with a bare uvicorn ASGI application, and prints its port.
+"""
+
+import contextlib
+import http.client
 import json
 import os
+import socket
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import uvicorn
 from loader import Call
 
 HERE = Path(__file__).parent
@@ -51,6 +59,80 @@ def running_robot(*options: str, **popen: Any) -> Iterator[Robot]:
             Call(soap.hostname, soap.port, "POST", soap.path),
             (process.pid, *map(int, children)),
         )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A response without its Date, which each server adds by itself."""
+
+    target: str
+    status: int
+    headers: list[tuple[str, str]]
+    body: str
+
+
+def answers_to(calls: list[Call]) -> list[Answer]:
+    """Return the robot's response to each call."""
+    answers = []
+    for call in calls:
+        connection = http.client.HTTPConnection(call.host, call.port)
+        connection.request(call.method, call.target, call.body or None, {"Content-Type": call.content_type})
+        answer = connection.getresponse()
+        headers = [pair for pair in answer.getheaders() if pair[0].lower() != "date"]
+        answers.append(Answer(call.target, answer.status, headers, answer.read().decode()))
+        connection.close()
+    return answers
+
+
+@contextmanager
+def running_bare(answers: list[Answer]) -> Iterator[tuple[int, subprocess.Popen[str]]]:
+    """Run the bare application with fixed answers; yields its port and process."""
+    with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+        file.write(json.dumps({answer.target: asdict(answer) for answer in answers}))
+        file.flush()
+        with started(sys.executable, __file__, file.name) as (process, port):
+            yield int(port), process
+
+
+def bare_application(answers: dict[str, Any]) -> Any:
+    """Return an ASGI application that looks up the path and sends the fixed response."""
+    messages = {
+        path: (
+            {
+                "type": "http.response.start",
+                "status": answer["status"],
+                "headers": [(name.encode(), value.encode()) for name, value in answer["headers"]],
+            },
+            {"type": "http.response.body", "body": answer["body"].encode()},
+        )
+        for path, answer in answers.items()
+    }
+
+    async def bare(scope: Any, _receive: Any, send: Any) -> None:
+        start, body = messages[scope["path"]]
+        await send(start)
+        await send(body)
+
+    return bare
+
+
+def serve(path: str) -> None:
+    """Serve the answers in a file until killed."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    print(listener.getsockname()[1], flush=True)
+    config = uvicorn.Config(
+        bare_application(json.loads(Path(path).read_text())),
+        loop="uvloop",
+        http="httptools",
+        ws="none",
+        lifespan="off",
+        interface="asgi3",
+        access_log=False,
+        log_config=None,
+        server_header=False,
+    )
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listener])
 
 
 def roaas_load(*options: Any) -> dict[str, Any]:
@@ -111,3 +193,7 @@ class Footprint:
             len(list((proc / "task").iterdir())),
             (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
         )
+
+
+if __name__ == "__main__":
+    serve(sys.argv[1])

@@ -1,9 +1,8 @@
 """How fast the reference robot responds, as ratios to a bare application, and what it uses.
 
 ``python benchmarks/robot.py`` starts the robot with its simulation, a bare uvicorn application that returns the same
-bytes and, if installed, nginx with fixed responses. It loads them alternately from another process, so that the
-machine's speed and other load cancel out. The exit code is 1 if a target is missed. ``--seconds`` sets the length of
-each measurement.
+bytes. It loads them alternately from another process, so that the machine's speed and other load cancel out. The exit
+code is 1 if a target is missed. ``--seconds`` sets the length of each measurement.
 """
 
 import argparse
@@ -21,9 +20,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import uvloop
-from fixed import answers_to, running_bare, running_nginx
 from loader import Call, Load, alternately, load
-from programs import Footprint, Robot, report, running_robot
+from programs import Footprint, Robot, answers_to, report, running_bare, running_robot
 
 DELIVERY = (
     "/robot/app/delivery/4/depot_x/68.269/depot_y/38.718/dest_x/60.633/dest_y/37.51/source_x/76.02/source_y/41.35"
@@ -83,8 +81,7 @@ def main() -> int:
         }
         answers = answers_to([call for call, _ in asked.values()])
         bare, server = stack.enter_context(running_bare(answers))
-        nginx = stack.enter_context(running_nginx(answers))
-        servers = [("bare", bare, bare), *([("nginx", nginx, nginx)] if nginx else []), *chosen.beside]
+        servers = [("bare", bare, bare), *chosen.beside]
 
         def yardsticks(call: Call) -> dict[str, Call]:
             return {name: replace(call, port=soap if call.body else rest) for name, rest, soap in servers}

@@ -29,8 +29,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from fixed import answers_to, running_bare
-from programs import HERE, Footprint, report, running_robot, started
+from programs import HERE, Footprint, answers_to, report, running_bare, running_robot, started
 from robot import DELIVERY, ENVELOPE
 from scipy import stats
 
