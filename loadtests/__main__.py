@@ -29,7 +29,7 @@ def main() -> int:
         result = carry_out(Settings.from_json(settings), lambda begun: path.write_text(str(begun), encoding="utf-8"))
         if result.file is None:
             path.unlink(missing_ok=True)
-    except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot missed a threshold
+    except Exception:  # noqa: BLE001 -- exit code 1 would say that the robot broke a service level
         traceback.print_exc()
         return ExitCode.INCONCLUSIVE
     return result.exit_code

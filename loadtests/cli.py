@@ -25,13 +25,13 @@ from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.commandline.terminal import inert
 from conformance.contract.toml_file import TomlFileError
 from conformance.papers_robot.statement import RobotStatement, load_robot_statement
-from conformance.papers_robot.thresholds import load_thresholds
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.load import LEVELS_INSTEAD
 from loadtests.clients.failures import CallError
+from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
 from loadtests.result.files import stops_lines, with_unstopped
-from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES
 from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, STAGES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings, SettingsError
 from loadtests.settings.settle import (
@@ -124,6 +124,12 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
         return None
     shared = {name: given[name] or getattr(own.endpoints, name) for name in ("token_file", "ca_file", "timeout_s")}
     return RobotStatement(endpoints=Endpoints(rest=where, **described, **shared))
+
+
+def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> None:
+    """Refuse --thresholds, and say what replaces it."""
+    if file is not None:
+        raise click.UsageError(f"--thresholds {file}: thresholds are service levels now: {LEVELS_INSTEAD}")
 
 
 @click.command(cls=ResultCommand, start=_START)
@@ -221,7 +227,7 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 @click.option("--end-to-end", is_flag=True, help="Also measure the time until the robot's application has a delivery.")
 @click.option("--ros-domain-id", type=click.IntRange(0, 232), help="The robot's ROS domain, for --end-to-end.")
 @options_of(Group.OUTPUT)
-@click.option("--thresholds", type=_FILE, help="TOML file of [[threshold]] tables.")
+@click.option("--thresholds", hidden=True, expose_value=False, callback=_levels_instead)
 @options_of(Group.CREDENTIALS)
 @click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
@@ -272,8 +278,8 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
 
     With --against, two robots take turns, and the result says whether this one is slower than the other.
 
-    Exit codes: 0 thresholds and service levels kept, and not slower; 1 one of them missed, or slower; 2 usage error; 3
-    robot not reachable; 4 measurement not valid or inconclusive; 130 interrupted.
+    Exit codes: 0 service levels kept, and not slower; 1 one of them broken, or slower; 2 usage error; 3 robot not
+    reachable; 4 measurement not valid or inconclusive; 130 interrupted.
     """
     end_like_ctrl_c()
     end_with_parent()
@@ -348,10 +354,8 @@ def _papers_robot(statement: Path | None, options: dict[str, Any]) -> Settings:
             "roaas load http://robot:8000/openapi.json"
         )
     said = load_robot_statement(statement) if statement is not None else RobotStatement()
-    file = options.pop("thresholds")
-    limits = load_thresholds(file) if file else ()
     other = _other_robot(options, said)
-    return settle(CliOptions.of(**options, against=other, thresholds=limits, command=_command_line()), said)
+    return settle(CliOptions.of(**options, against=other, command=_command_line()), said)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a vendor says of the paper's robot to whoever calls it: its ROS side, and its latency thresholds."""
+"""What a vendor says of the paper's robot to whoever calls it: its ROS side, and where its contract is."""
 
 from pathlib import Path
 from typing import Annotated, Self
@@ -8,8 +8,6 @@ import msgspec
 from conformance.contract.locating import folder_of
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Text
-from conformance.papers_robot.thresholds import Threshold
-from conformance.statement import load
 from conformance.statement.statement import Statement, load_statement
 
 #: The folder with the files of the contract, in a checkout and in a wheel alike.
@@ -30,16 +28,9 @@ class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cmd_vel_topic: Text = "/cmd_vel"
 
 
-class Load(load.Load, frozen=True, forbid_unknown_fields=True):
-    """What a load test may ask of the robot, and the latency thresholds that it is to keep."""
-
-    thresholds: tuple[Threshold, ...] = ()
-
-
 class RobotStatement(Statement, frozen=True):
     """A statement on the paper's robot, as far as it does not say how the robot is judged."""
 
-    load: Load = Load()
     ros: Ros = Ros()
 
     @property

@@ -5,10 +5,9 @@ from typing import Any
 
 import gevent
 
-from conformance.papers_robot.thresholds import ApiStyle
 from loadtests.clients.failures import CallError
 from loadtests.clients.library import LibraryRest, LibrarySoap, Sent
-from loadtests.clients.payloads import Values
+from loadtests.clients.payloads import INTERFACES, Values
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import Bridge
 from loadtests.clients.wire import Connection, Request, now_ns
@@ -47,7 +46,7 @@ class Workload:
         self.documents = documents
         self.values: list[list[Values]] = [robot.values(name, seed) for name in operations]
         self.requests: dict[str, list[list[Request]]] = {
-            str(interface): [robot.requests(interface, name, seed) for name in operations] for interface in ApiStyle
+            interface: [robot.requests(interface, name, seed) for name in operations] for interface in INTERFACES
         }
         self.bridge = robot.bridge()  # one for all users
 

@@ -15,16 +15,12 @@ from requests.adapters import HTTPAdapter
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
-from conformance.papers_robot.thresholds import Client
 from loadtests.clients.bounded import TOO_LONG, BoundedResponse, StayingSession
 from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import loader
-
-#: Options and results call it after the library for SOAP; over REST it is requests.
-LIBRARY = Client.ZEEP
 
 
 @dataclass(slots=True)

@@ -13,6 +13,11 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, COURIER, EXAM
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.wire import Request
 
+#: The ways to a robot that are compared: the two of its web services, and rosbridge beside them.
+INTERFACES = REST, SOAP, ROSBRIDGE = "rest", "soap", "rosbridge"
+#: Who sends: bytes made beforehand, or the library that people use. It is called after that for SOAP; over REST it is
+#: requests.
+CLIENTS = WIRE, LIBRARY = "wire", "zeep"
 VARIANTS = 64
 NAMESPACE = "http://soap.turtlebot.mybot.org/"
 ENVELOPE = "http://schemas.xmlsoap.org/soap/envelope/"
@@ -47,6 +52,9 @@ CATALOGUE = {
     "coffee": Operation("ExecuteCoffeeRequest", COFFEE, "publishers", "PUT", b"", b"ExecuteCoffeeRequestResponse"),
     "pose": Operation("GetPose", None, "subscribers", "GET", b'"pose"', b"GetPoseResponse"),
 }
+
+#: The operations that make the robot drive.
+MOVES = frozenset(name for name, each in CATALOGUE.items() if each.code is not None)
 
 
 def variants(operation: str, seed: int) -> list[Values]:

@@ -9,7 +9,7 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.result_command import CommandResult
 from conformance.documents.description import is_url
-from conformance.papers_robot.statement import Load, RobotStatement
+from conformance.papers_robot.statement import RobotStatement
 from conformance.target.describing import is_wsdl
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import callable_robot, named_alike, scenario_of
@@ -25,7 +25,7 @@ from loadtests.settings.settle import settle
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge", "end_to_end",
-    "ros_domain_id", "thresholds", "against_publishers_wsdl", "against_subscribers_wsdl",
+    "ros_domain_id", "against_publishers_wsdl", "against_subscribers_wsdl",
     "against_publishers_endpoint", "against_subscribers_endpoint",
 )  # fmt: skip
 _DESCRIPTIONS = (".json", ".yaml", ".yml", ".wsdl")
@@ -58,9 +58,8 @@ class Described:
         """
         alien = [name for name in _PAPERS_ONLY if options[name] not in {None, False}]
         if alien:
-            hint = "; its service levels are in the statement's [slo]" if alien[0] == "thresholds" else ""
             raise SettingsError(
-                f"--{alien[0].replace('_', '-')} is for the paper's robot, not for a device with a description{hint}"
+                f"--{alien[0].replace('_', '-')} is for the paper's robot, not for a device with a description"
             )
         if set(options["interfaces"]) - {"rest", "soap"} or set(options["clients"]) - {"wire"}:
             raise SettingsError("a device with a description is measured over REST or SOAP, with the client wire")
@@ -217,6 +216,5 @@ def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Devi
 
 def _statement(device: Device) -> RobotStatement:
     """Return a device's statement as the load test reads it."""
-    said, limits = device.statement, device.statement.load
-    load = Load(max_rate=limits.max_rate, max_duration_s=limits.max_duration_s)
-    return RobotStatement(robot=said.robot, endpoints=said.endpoints, load=load)
+    said = device.statement
+    return RobotStatement(robot=said.robot, endpoints=said.endpoints, load=said.load)

@@ -1,13 +1,9 @@
 """The first plan of a run, from settings and robot."""
 
-from conformance.papers_robot.thresholds import ApiStyle
-from loadtests.clients.library import LIBRARY
+from loadtests.clients.payloads import LIBRARY, ROSBRIDGE
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import BLOCK_S, LIBRARY_RATE, Plan
 from loadtests.settings.settings import Settings
-
-ROSBRIDGE = ApiStyle.ROSBRIDGE
-
 
 _BRIDGE_NOTE = (
     "rosbridge does not answer a publish: a delivery is timed until its echo is back, which has been through ROS, "

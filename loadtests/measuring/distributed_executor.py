@@ -12,7 +12,7 @@ import msgspec
 from locust.exception import RPCError
 from locust.runners import STATE_MISSING, STATE_RUNNING, MasterRunner
 
-from loadtests.clients.library import LIBRARY
+from loadtests.clients.payloads import LIBRARY
 from loadtests.clients.robot import Robot, Secrets, without_secrets
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import Clocks, WorkerClock, clock_id

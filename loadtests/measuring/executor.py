@@ -14,7 +14,7 @@ from locust import User, task
 from locust.env import Environment
 from locust.event import Events
 
-from loadtests.clients.library import LIBRARY
+from loadtests.clients.payloads import LIBRARY
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import WorkerClock

@@ -39,7 +39,7 @@ class RisingLoad:
         self._next_segment = self.first.first_segment + len(self.first.segments)
         self._operation = step_operation(self.first.operations)
         name = self.first.operations[self._operation]
-        self._criterion = Criterion.of(self.settings.thresholds, name, self.settings.slo.get(name))
+        self._criterion = Criterion.of(self.settings.slo.get(name))
         self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
 
     def _run(self, interface: str, rate: float) -> Step | None:
@@ -90,6 +90,6 @@ class RisingLoad:
                     )
                 return result
 
-            words = self._criterion.words(interface)
+            words = self._criterion.words()
             found.append(knee_search(interface, words, search_again(wanted.knee_searches, limits, attempt)))
         return found

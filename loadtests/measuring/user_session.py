@@ -7,8 +7,8 @@ from typing import Any
 import gevent
 
 from loadtests.clients.callers import Caller, Workload
-from loadtests.clients.library import LIBRARY, Sent, read_document
-from loadtests.clients.payloads import VARIANTS
+from loadtests.clients.library import Sent, read_document
+from loadtests.clients.payloads import LIBRARY, VARIANTS
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.machine import first_in_line, leaves_the_robot_room

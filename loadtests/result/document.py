@@ -10,8 +10,7 @@ import msgspec
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.out_folder import without_folders
 from conformance.commandline.secrecy import SECRETS
-from loadtests.clients.library import LIBRARY
-from loadtests.clients.payloads import CATALOGUE
+from loadtests.clients.payloads import CATALOGUE, LIBRARY
 from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.executor import Member
@@ -163,13 +162,11 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         else [*_undecided(settings, counted), *verdict.says_nothing(comparisons), *_silent(outcome)]
     )
     workers, losses = process_figures(executor.members if executor else [])
-    judged = [] if aborted else verdict.judge(measured, settings.thresholds)
     controls = aa_controls(measured)
     compared = _against(outcome, measured, controls)
     levels = [] if aborted else service_levels.levels(measured, settings.slo)
-    outcomes = [entry["outcome"] for entry in judged]
     kept = [level.outcome for level in levels]
-    code = _code(outcome, aborted, Reasons(reasons, undecided), [*outcomes, *kept], compared)
+    code = _code(outcome, aborted, Reasons(reasons, undecided), kept, compared)
     series = figures.series(measured, outcome.findings.sizes)
     for entry in series:
         entry.after_pause = _after_pause(outcome.paused.get(entry.name))
@@ -181,7 +178,6 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         comparisons,
         controls,
         compared,
-        outcomes,
         reasons,
         undecided,
         kept,
@@ -219,7 +215,6 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "blocks": over_time.blocks(measured),
         "knee_search": outcome.knee_searches,
         "errors": over_time.errors(recorder, plan.operations) + _early_errors(outcome.findings),
-        "thresholds": judged,
         "slo": levels,
     }
     builtins: dict[str, Any] = msgspec.to_builtins(document)
@@ -306,7 +301,7 @@ class Reasons(NamedTuple):
 
     Attributes:
         worthless: its figures say nothing about the robot.
-        undecided: they leave nothing to compare; a threshold that they miss is missed all the same.
+        undecided: they leave nothing to compare; a service level that they break is broken all the same.
     """
 
     worthless: list[str]
@@ -323,9 +318,9 @@ def _code(
     if reasons.worthless:
         return ExitCode.INCONCLUSIVE
     following = ExitCode.PASSED if compared is None else EXIT_CODES[compared.verdict]
-    if {"missed", service_levels.BROKEN}.intersection(outcomes) or following == ExitCode.FAILED:
+    if service_levels.BROKEN in outcomes or following == ExitCode.FAILED:
         return ExitCode.FAILED
-    unknown = {"inconclusive", service_levels.NOT_KNOWN}.intersection(outcomes)
+    unknown = service_levels.NOT_KNOWN in outcomes
     return ExitCode.INCONCLUSIVE if reasons.undecided or unknown else following
 
 

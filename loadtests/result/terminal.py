@@ -25,7 +25,7 @@ def _times(entry: dict[str, Any]) -> str:
 
 
 def summary(document: dict[str, Any]) -> str:
-    """Return a table of the series, the comparisons of medians, the thresholds, and the headline as the last line."""
+    """Return a table of the series, the comparisons of medians, the service levels, and last the headline."""
     wide = max([9, *(len(entry["operation"]) for entry in document["series"])])
     lines = [
         f"{'operation':{wide}}  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"
@@ -43,9 +43,6 @@ def summary(document: dict[str, Any]) -> str:
     lines += _end_to_end(document.get("end_to_end"))
     lines += _against(document.get("against"))
     lines += _knees(document)
-    for entry in document["thresholds"]:
-        reason = f": {entry['reason']}" if entry["reason"] else ""
-        lines.append(f"threshold {entry['outcome']}: {entry['name']}{reason}")
     lines += _streams(document["streams"])
     lines += [
         f"service level {entry['outcome']}: {entry['operation']} over {entry['interface']}, {entry['limit']} at most "

@@ -19,16 +19,12 @@ from typing import Any, Self
 import msgspec
 import numpy as np
 
-from conformance.papers_robot.thresholds import ApiStyle, Client, Operation
+from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 from loadtests.schedule.rotation import turns_of_all
 from loadtests.schedule.segment import Segment
 
-INTERFACES = tuple(map(str, ApiStyle))
 #: REST and SOAP at once, in steps of the load: every other request goes over the other.
 BOTH = "both"
-CLIENTS = tuple(map(str, Client))
-OPERATIONS = tuple(map(str, Operation))
-MOVES = frozenset({"delivery", "coffee"})
 
 #: The highest rate for each worker at which the library clients take part: a call costs some 1.5 ms of the
 #: generator's time, and a generator that is busy for more than a fraction of it measures itself.

@@ -8,7 +8,6 @@ from typing import Any, Self
 import click
 
 from conformance.papers_robot.statement import RobotStatement
-from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.endpoints import Endpoints
 from loadtests.settings.settings import STEP_S, Generator, Repeats, Selection
 
@@ -43,7 +42,6 @@ class CliOptions:
     knee_searches: int = KNEE_SEARCHES
     repeats: Repeats = field(default_factory=Repeats)
     allow_motion: bool = False
-    thresholds: tuple[Threshold, ...] = ()
     rosbridge: str | None = None
     against: RobotStatement | None = None
     end_to_end: bool = False

@@ -10,9 +10,9 @@ from conformance.papers_robot.statement import RobotStatement
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.reach import trusted_host
 from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
+from loadtests.clients.payloads import CATALOGUE, CLIENTS, INTERFACES, MOVES
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
-from loadtests.schedule.plan import CLIENTS, INTERFACES, MOVES, OPERATIONS
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Selection, SettingsError, Target
 
@@ -39,9 +39,9 @@ def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:
     for key in ("operations", "pairs"):
         if getattr(statement.load, key):
             raise SettingsError(f"[load] {key} is for a device with a description: see [api]; here, use --operation")
-    unknown = [name for name in statement.slo if name not in OPERATIONS]
+    unknown = [name for name in statement.slo if name not in CATALOGUE]
     if unknown:
-        raise SettingsError(f"[slo] {unknown[0]!r} is no operation: it has to be one of {', '.join(OPERATIONS)}")
+        raise SettingsError(f"[slo] {unknown[0]!r} is no operation: it has to be one of {', '.join(CATALOGUE)}")
     return Target(
         robot,
         Selection(operations=operations, interfaces=interfaces, clients=clients),
@@ -126,10 +126,10 @@ def _robot(endpoints: Endpoints, interfaces: tuple[str, ...]) -> Robot:
 
 
 def _operations(options: CliOptions) -> tuple[str, ...]:
-    unknown = [name for name in options.selection.operations if name not in OPERATIONS]
+    unknown = [name for name in options.selection.operations if name not in CATALOGUE]
     if unknown:
         raise SettingsError(
-            f"--operation {unknown[0]!r} is not one of {', '.join(OPERATIONS)}; to measure another operation, name the "
+            f"--operation {unknown[0]!r} is not one of {', '.join(CATALOGUE)}; to measure another operation, name the "
             "device's description, as in roaas load http://robot:8000/openapi.json"
         )
     if not options.selection.operations:
@@ -140,7 +140,7 @@ def _operations(options: CliOptions) -> tuple[str, ...]:
             f"operation {moving[0]!r} makes the robot drive: add --allow-motion when its surroundings are clear, "
             "or measure --operation pose"
         )
-    return tuple(name for name in OPERATIONS if name in options.selection.operations)
+    return tuple(name for name in CATALOGUE if name in options.selection.operations)
 
 
 def _token(path: str | None) -> str | None:

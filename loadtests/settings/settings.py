@@ -5,7 +5,6 @@ from typing import Self
 
 import msgspec
 
-from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
 from loadtests.clients.robot import Robot, Stream
 from loadtests.schedule.plan import Load
@@ -176,7 +175,6 @@ class Settings:
     limits: Limits
     generator: Generator
     output: Output
-    thresholds: tuple[Threshold, ...]
     against: Against | None = None
     end_to_end: EndToEnd | None = None
     slo: dict[str, ServiceLevel] = field(default_factory=dict)

@@ -126,7 +126,6 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
         ),
         output=Output(options.out, options.command, statement.robot, options.progress),
-        thresholds=options.thresholds or statement.load.thresholds,
         end_to_end=_end_to_end(options, statement, target.selection.operations, allowed.rate, duration_s),
         slo=target.slo,
         description=target.description,

@@ -1,1 +1,1 @@
-"""From recordings to figures: histograms, intervals, comparisons, thresholds, verdicts."""
+"""From recordings to figures: histograms, intervals, comparisons, service levels, verdicts."""

@@ -35,9 +35,8 @@ class Found:
     Attributes:
         plan: the plan of the run.
         most_rate: the limit on the rate, which caps the closed model.
-        outcomes: of the thresholds.
         worthless: why the figures say nothing about the robot.
-        undecided: why the run has nothing to compare; thresholds are judged all the same.
+        undecided: why the run has nothing to compare; service levels are judged all the same.
         levels: outcomes of the service levels.
         overload: how the robot was overloaded, if it was.
         interrupted: by Ctrl-C, and valid until then.
@@ -49,7 +48,6 @@ class Found:
     comparisons: Sequence[SoapOverRest] = ()
     controls: Sequence[AaControl] = ()
     against: Against | None = None
-    outcomes: Sequence[str] = ()
     worthless: Sequence[str] = field(default=())
     undecided: Sequence[str] = field(default=())
     levels: Sequence[str] = ()
@@ -63,7 +61,7 @@ def headline(found: Found) -> dict[str, str]:
         return {"words": _INTERRUPTED, "sentence": f"{_INTERRUPTED}; until then: {_measured(found)[1]}"}
     if found.worthless:
         return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
-    judged = "; ".join(filter(None, (_levels(found.levels), _thresholds(found.outcomes))))
+    judged = _levels(found.levels)
     if found.overload is not None:
         sentence = found.overload.sentence()
         return {"words": judged or _OVERLOADED, "sentence": f"{_OVERLOADED}: {sentence}.{_answered(found)}"}
@@ -85,17 +83,6 @@ def _answered(found: Found) -> str:
     )
 
 
-def _thresholds(outcomes: Sequence[str]) -> str | None:
-    """Return a text on the thresholds that were met and missed; None if there are no thresholds."""
-    number = f"{len(outcomes)} threshold{'' if len(outcomes) == 1 else 's'}"
-    for outcome, word in (("missed", "missed"), ("inconclusive", "undecided")):
-        if outcome in outcomes:
-            return f"{outcomes.count(outcome)} of {number} {word}"
-    if not outcomes:
-        return None
-    return "The threshold is met" if len(outcomes) == 1 else f"All {number} are met"
-
-
 def _levels(outcomes: Sequence[str]) -> str | None:
     """Return a text on the limits of service levels that were broken and kept; None if there are none."""
     number = f"{len(outcomes)} service level{'' if len(outcomes) == 1 else 's'}"
@@ -108,7 +95,7 @@ def _levels(outcomes: Sequence[str]) -> str | None:
 
 
 def _measured(found: Found) -> tuple[str, str]:
-    """Return two forms of the result, a few words and a sentence, for a run without thresholds or errors."""
+    """Return two forms of the result, a few words and a sentence, for a run without service levels or errors."""
     if found.against is not None:
         return _AGAINST[found.against.verdict], _other_robot(found, found.against)
     medians = [entry for entry in found.comparisons if entry.quantile == DECIDING]

@@ -1,13 +1,11 @@
 """One rate for a few seconds, and whether the robot met the criterion: what searches for the knee are made of."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
 import msgspec
 
-from conformance.papers_robot.thresholds import Threshold
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan
@@ -27,34 +25,20 @@ class Criterion:
     """What a step has to meet.
 
     Attributes:
-        limits: (time, quantile, below ms) for each interface.
-        usual: the same for an interface without limits of its own.
+        limits: values in ms that quantiles of the response time have to be below, by quantile.
     """
 
-    limits: dict[str, list[tuple[str, str, float]]]
-    usual: tuple[tuple[str, str, float], ...] = (("response", "p99", _MOST_P99_MS),)
+    limits: dict[str, float]
 
     @classmethod
-    def of(cls, thresholds: Iterable[Threshold], operation: str, level: ServiceLevel | None = None) -> Self:
-        """Return the criterion by the thresholds on an operation's wire series, or by its service level."""
-        limits: dict[str, list[tuple[str, str, float]]] = {}
-        for threshold in thresholds:
-            if threshold.operation == operation and threshold.client == "wire":
-                kept = limits.setdefault(threshold.interface, [])
-                kept.append((threshold.time, threshold.quantile, threshold.below_ms))
+    def of(cls, level: ServiceLevel | None) -> Self:
+        """Return the criterion by an operation's service level, or the usual one."""
         most = level.limits.items() if level else ()
-        usual = tuple(("response", name.removesuffix("_ms"), ms) for name, ms in most if name.endswith("_ms"))
-        return cls(limits, usual or cls.usual)
+        return cls({name.removesuffix("_ms"): ms for name, ms in most if name.endswith("_ms")} or {"p99": _MOST_P99_MS})
 
-    def of_interface(self, interface: str) -> list[tuple[str, str, float]]:
-        """Return the limits for an interface, or the usual ones if no threshold is on that interface."""
-        return self.limits.get(interface) or list(self.usual)
-
-    def words(self, interface: str) -> str:
+    def words(self) -> str:
         """Return the criterion as a sentence."""
-        limits = ", ".join(
-            f"{quantile} {time} time below {below:g} ms" for time, quantile, below in self.of_interface(interface)
-        )
+        limits = ", ".join(f"{quantile} response time below {below:g} ms" for quantile, below in self.limits.items())
         return (
             f"{limits}, errors at most {_MOST_ERRORS:.0%}, {_LEAST_ACHIEVED:.0%} of the offered rate answered in time"
         )
@@ -108,11 +92,11 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
     started = whole.service.total + whole.errors
     if started and whole.errors / started > _MOST_ERRORS:
         reasons.append(f"{whole.errors} of {started} requests failed")
-    for time, quantile, below in criterion.of_interface(interface):
-        value = counted(whole, time).figure_ms(quantile)
-        if value is not None and value >= below:
-            reasons.append(f"{quantile} {time} time {value:.3f} ms is not below {below:g} ms")
     response, lag = counted(whole, "response"), measured.spans("step", name).lag
+    for quantile, below in criterion.limits.items():
+        value = response.figure_ms(quantile)
+        if value is not None and value >= below:
+            reasons.append(f"{quantile} response time {value:.3f} ms is not below {below:g} ms")
     return Step(
         interface=interface,
         offered_rate=round(plan.step_rate or 0.0, 6),

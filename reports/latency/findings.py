@@ -41,11 +41,11 @@ def verdict(result: Mapping[str, Any], series: AllSeries) -> Verdict:
 
 
 def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
-    outcomes = {entry["outcome"] for key in ("thresholds", "slo") for entry in result.get(key, [])}
+    outcomes = {entry["outcome"] for entry in result.get("slo", [])}
     following = (result.get("against") or {}).get("verdict")
-    if not result["valid"] or outcomes & {"missed", "broken"}:
+    if not result["valid"] or "broken" in outcomes:
         return "bad", "✗"
-    if outcomes & {"inconclusive", "not known"} or not any(one.data["count"] for one in series.values()):
+    if "not known" in outcomes or not any(one.data["count"] for one in series.values()):
         return "warning", "?"
     if following is not None:
         return against.TAGS[following]

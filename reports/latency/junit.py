@@ -1,7 +1,7 @@
 """Write latency-junit.xml: a latency result in the format that most CI systems read.
 
-Its test cases are the run itself (whether its figures are valid), each limit of a service level, each threshold, and
-the comparison with another robot. What is not known is an error, because it is neither a success nor a failure.
+Its test cases are the run itself (whether its figures are valid), each limit of a service level, and the
+comparison with another robot. What is not known is an error, because it is neither a success nor a failure.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,8 +12,8 @@ from lxml import etree
 
 from reports.pages.untrusted import excerpt
 
-_GOOD = {"kept", "met", "not slower", "valid"}
-_FAILED = {"broken", "missed", "slower"}
+_GOOD = {"kept", "not slower", "valid"}
+_FAILED = {"broken", "slower"}
 _MESSAGE = 1000
 
 
@@ -67,9 +67,5 @@ def _cases(result: Mapping[str, Any]) -> Iterator[_Case]:
     for level in result.get("slo", []):
         name = f"{level['operation']} over {level['interface'].upper()}: {level['limit']} at most {level['most']:g}"
         yield _Case("slo", name, level["outcome"], level["reason"])
-    for threshold in result.get("thresholds", []):
-        measured = threshold.get("bound_ms")
-        reason = threshold.get("reason") or ("" if measured is None else f"the upper bound is {measured:g} ms")
-        yield _Case("threshold", threshold["name"], threshold["outcome"], reason)
     if result.get("against"):
         yield _Case("against", "not slower than the other robot", result["against"]["verdict"], sentence)

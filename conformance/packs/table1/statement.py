@@ -1,4 +1,4 @@
-"""What a vendor says of the paper's robot: its limits, where it may be driven, its ROS side, its latency thresholds."""
+"""What a vendor says of the paper's robot: its limits, where it may be driven, its ROS side."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from conformance.contract.classes import Prerequisite
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Finite, NotNegative, Text
 from conformance.packs.table1.limits import DeclaredLimits, Limits
-from conformance.papers_robot.statement import Load, RobotStatement, Ros
+from conformance.papers_robot.statement import RobotStatement, Ros
 from conformance.statement import statement as generic
 
 if TYPE_CHECKING:
@@ -103,7 +103,6 @@ class Statement(RobotStatement, frozen=True):
 class StatementFile(generic.StatementFile, frozen=True, forbid_unknown_fields=True):
     """The tables of a statement on the paper's robot, as they are written."""
 
-    load: Load = Load()
     limits: DeclaredLimits = DeclaredLimits()
     motion: Motion = Motion()
     ros: Ros = Ros()

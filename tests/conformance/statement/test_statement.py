@@ -8,7 +8,6 @@ from conformance.contract.pack import Contract
 from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 from conformance.packs.table1.statement import Statement
-from conformance.papers_robot.thresholds import ApiStyle, Operation, Quantile, Threshold
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import StatementError, load_statement
 
@@ -46,11 +45,8 @@ def test_a_full_statement(tmp_path):
         domain_id = 7
         [load]
         max_rate = 100
-        [[load.thresholds]]
-        operation = "pose"
-        interface = "rest"
-        quantile = "p99"
-        below_ms = 5
+        [slo.pose]
+        p99_ms = 5
         """,
     )
     assert statement.robot == {"name": "R2"}
@@ -60,7 +56,7 @@ def test_a_full_statement(tmp_path):
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
     assert (statement.motion.arena, statement.ros.domain_id) == ((0.0, 0.0, 10.0, 5.0), 7)
     assert statement.load.max_rate == 100
-    assert statement.load.thresholds == (Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, 5.0),)
+    assert statement.slo["pose"].limits == {"p99_ms": 5.0}
 
 
 @pytest.mark.parametrize(
@@ -120,14 +116,13 @@ def test_a_full_statement(tmp_path):
         ("[ros]\ndomain_id = 500", "[ros] domain_id = 500 must be a whole number from 0 to 232"),
         (
             "[load]\nmax_rates = 3",
-            "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, pairs, thresholds",
+            "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, pairs",
         ),
         ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
         (
             "[[load.thresholds]]\noperation = 'pose'",
-            "[[load.thresholds]] number 1: 'interface', 'quantile', 'below_ms' is missing",
+            "[load] unknown key 'thresholds'; service levels replace them: write into the statement",
         ),
-        ("[load.thresholds]", "[load] thresholds = {} must be an array of tables: write [[load.thresholds]]"),
         ("claims = 'full'", "claims = 'full' must be a table: [claims]"),
         ("[[", "is no TOML"),
     ],

@@ -237,7 +237,6 @@ def test_a_rotation_spreads_the_calls_of_each_operation():
         ("--stream ws://127.0.0.1:9 --rest http://127.0.0.1:9", "--stream is for a device with a description"),
         ("--operation x --rest http://127.0.0.1:9", "--operation 'x' is not one of delivery, coffee, pose"),
         ("http://127.0.0.1:9/a.json --client zeep", "measured over REST or SOAP, with the client wire"),
-        ("http://127.0.0.1:9/a.json --thresholds {0}", "its service levels are in the statement's [slo]"),
         ("http://127.0.0.1:9/a.json http://127.0.0.1:9/b.json", "are several descriptions: name one"),
         ("http://127.0.0.1:9/a.json --interface rosbridge", "measured over REST or SOAP, with the client wire"),
         ("http://127.0.0.1:9/a?wsdl --wsdl http://127.0.0.1:9/b?wsdl", "are several WSDLs: name one"),

@@ -1,4 +1,4 @@
-"""Options, statement, thresholds and WSDL: what is refused, and in which words."""
+"""Options, statement and WSDL: what is refused, and in which words."""
 
 import re
 
@@ -6,9 +6,9 @@ import pytest
 from click.testing import CliRunner
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.packs.table1.statement import Load, Statement
-from conformance.papers_robot.thresholds import ThresholdsError, load_thresholds
+from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.load import Load
 from loadtests.cli import load
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.settings import Settings, SettingsError
@@ -90,31 +90,6 @@ def test_a_slip_in_any_table_of_the_statement_is_refused(tmp_path):
     path.write_text('[endpoints]\nrest = "http://127.0.0.1:1"\n[limts]\nlinear_m_s = 0.5\n')
     ended = CliRunner().invoke(load, [str(path), "--out", str(tmp_path / "out")])
     assert (ended.exit_code, "unknown key 'limts'" in ended.output) == (ExitCode.USAGE, True), ended.output
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        *(
-            (f"[[threshold]]\noperation='pose'\ninterface='rest'\n{quantile}\n{bound}", message)
-            for quantile, bound, message in (
-                ("quantile='p99'", "below_ms=1\nabove_ms=2", "unknown key 'above_ms'"),
-                ("quantile='p42'", "below_ms=1", "quantile = 'p42'"),
-                ("quantile='p99'", "below_ms=0", "below_ms = 0"),
-                ("quantile='p99'", "below_ms=nan", "below_ms = nan"),
-            )
-        ),
-        ("[[thresholds]]\noperation='pose'", "unknown key 'thresholds'"),
-        ("threshold = 3", "with two brackets"),
-        ("", "holds no [[threshold]]"),
-        ("not toml", "is no TOML"),
-    ],
-)
-def test_thresholds_files_that_cannot_be_used(tmp_path, text, message):
-    path = tmp_path / "limits.toml"
-    path.write_text(text)
-    with pytest.raises(ThresholdsError, match=re.escape(message)):
-        load_thresholds(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"a b", "schl\u00fcssel".encode(), b"\xff\xfe"])

@@ -95,14 +95,14 @@ def test_what_spoils_a_run_is_all_that_its_headline_says():
 @pytest.mark.parametrize(
     ("outcomes", "words"),
     [
-        (["met"], "The threshold is met"),
-        (["met", "met"], "All 2 thresholds are met"),
-        (["met", "missed", "inconclusive"], "1 of 3 thresholds missed"),
-        (["inconclusive"], "1 of 1 threshold undecided"),
+        (["kept"], "The service level is kept"),
+        (["kept", "kept"], "All 2 service levels are kept"),
+        (["kept", "broken", "not known"], "1 of 3 service levels broken"),
+        (["not known"], "1 of 1 service level not known"),
     ],
 )
-def test_thresholds_decide_the_words(outcomes, words):
-    assert headline(replace(FOUND, series=[series()], outcomes=outcomes))["words"] == words
+def test_service_levels_decide_the_words(outcomes, words):
+    assert headline(replace(FOUND, series=[series()], levels=outcomes))["words"] == words
 
 
 def test_two_modes_are_said_beside_the_median():

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from conformance.papers_robot.thresholds import ApiStyle, Operation, Quantile, Threshold
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.statistics.figures import quantiles, series
@@ -25,7 +24,6 @@ from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import time_series
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import Sample, Unit, in_rounds
-from loadtests.statistics.verdict import judge
 
 
 def block(values_ms):
@@ -99,26 +97,6 @@ def test_the_order_of_independent_samples_gives_an_interval_too():
     assert 184 <= covered <= 200
     assert order_interval_ms(block([1.0] * 367), 0.99) is None
     assert order_interval_ms(block([1.0] * 368), 0.99) is not None
-
-
-@pytest.mark.parametrize(
-    ("values", "below", "outcome"),
-    [
-        ([1.0] * 40, 0.5, "missed"),
-        ([1.0] * 40, 2.0, "inconclusive"),
-        ([1.0] * 1000, 2.0, "met"),
-        ([1.0] * 1000, 0.9, "missed"),
-    ],
-)
-def test_a_threshold_is_judged_by_what_is_certain(values, below, outcome):
-    recorder = Recorder(STALL.series_of())
-    blocks = [n for n, s in enumerate(STALL.segments) if (s.phase, s.client, s.interface) == ("duel", "wire", "rest")]
-    for number, value in enumerate(values):
-        recorder.record(blocks[number % len(blocks)], 0, 0, 0, 0, 0, int(value * 1e6), -1)
-    recorder.flush()
-    (found,) = judge(Measured([STALL], recorder), [Threshold(Operation.POSE, ApiStyle.REST, Quantile.P99, below)])
-    assert found["outcome"] == outcome, found
-    assert found["reason"] if outcome != "met" else not found["reason"]
 
 
 LOAD = Load(rate=400.0, users=None, duration_s=20.0, warmup_s=0.0, arrivals="constant", seed=1)

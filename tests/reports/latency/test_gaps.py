@@ -107,4 +107,4 @@ def test_figures_come_before_tables_and_tables_fold(latency):
         for table in document.iter("table")
         if not table.xpath("ancestor::details[not(@open)]")
     ]
-    assert unfolded == ["thresholds", "errors"], "what decides and what failed is seen at once"
+    assert unfolded == ["slo", "errors"], "what decides and what failed is seen at once"

@@ -14,7 +14,7 @@ def test_the_headline_leads_with_the_sign_of_its_verdict(latency, verdict, sign)
     judged = CHANGE | FIGURES | {"verdict": verdict}
     shown = CHANGE | FIGURES | {"quantile": "mean", "verdict": None}
     none = CHANGE | dict.fromkeys(FIGURES) | {"quantile": "p99", "verdict": "unclear", "reason": "9 samples"}
-    latency |= {"valid": True, "invalid_because": [], "thresholds": [], "comparisons": []}
+    latency |= {"valid": True, "invalid_because": [], "slo": [], "comparisons": []}
     latency["against"] = {
         "robot": {"rest": "http://old:7003", "publishers": None, "subscribers": None},
         "tolerance": 0.05,

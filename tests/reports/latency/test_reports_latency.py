@@ -44,7 +44,7 @@ def test_everything_is_in_it(latency, example):
     assert figures(document) == FIGURES
     shown = text(document)
     for wanted in (
-        "✗ 1 of 2 thresholds missed",
+        "✗ 1 of 2 service levels broken",
         latency["headline"]["sentence"],
         "SOAP takes 0.047 ms longer than REST for delivery on average; 0.030 ms of that is the server's own work.",
         "1 stall in seconds 15 to 17 of the run: a request took 400.2 ms",
@@ -113,7 +113,7 @@ def emptied(latency):
         series["spans_ms"] = dict.fromkeys(("build", "wire", "server", "parse"))
     for comparison in latency["comparisons"]:
         comparison.update(soap_minus_rest_ms=None, ratio=None, ci95=None, ci95_difference_ms=None, reason="0 samples")
-    latency.update(time_series={"width_s": 1.0, "series": []}, knee_search=[], thresholds=[], noise_floor=[])
+    latency.update(time_series={"width_s": 1.0, "series": []}, knee_search=[], slo=[], noise_floor=[])
     latency.update(interrupted=True, errors=[])
     return latency
 
@@ -131,14 +131,14 @@ def test_no_series_at_all(latency):
     latency.update(series=[], comparisons=[], valid=False, exit_code=4, invalid_because=["the robot was gone"])
     del latency["time_series"]
     shown = text(page(latency))
-    assert "✗ 1 of 2 thresholds missed" in shown, "in the result's own words, and as what is bad"
+    assert "✗ 1 of 2 service levels broken" in shown, "in the result's own words, and as what is bad"
     assert "the robot was gone" in shown
 
 
 def test_invalid_run_says_so_first(latency):
     latency.update(valid=False, exit_code=4, invalid_because=["generator CPU at 97 %"])
     assert verdict(latency, all_series(latency, "x")).tone == "bad"
-    assert "✗ 1 of 2 thresholds missed" in text(page(latency)), "in the result's own words"
+    assert "✗ 1 of 2 service levels broken" in text(page(latency)), "in the result's own words"
 
 
 def test_one_interface_alone(latency):
@@ -242,7 +242,7 @@ def test_hostile_text_stays_text(latency):
     latency["environment"]["robot"].update(name=attack, vendor=attack, version=attack, servers={attack: attack})
     latency["errors"][0].update(kind=attack, message=attack)
     latency["notes"] = [attack]
-    latency["thresholds"][0]["name"] = attack
+    latency["slo"][0].update(operation=attack, reason=attack)
     document = page(latency)
     assert len(document.findall(".//script")) == 1
     assert not set(document.text_content()) & set("\x1b\u202e")
