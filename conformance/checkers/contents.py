@@ -26,7 +26,7 @@ _DIGEST: Final = re.compile(r"(sha-256|sha-512)\s*=\s*:?([A-Za-z0-9+/]+=*):?(?=\
 _HASHES: Final = {"sha-256": hashlib.sha256, "sha-512": hashlib.sha512}
 # Members that tell the digest of a file, by their plain names.
 _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
-_OCTETS: Final = "application/octet-stream"
+_OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # So many contents of so many octets are remembered.
 _MOST, _LARGEST = 200, 1 << 20
 _FILES: Final = frozenset({_OCTETS, "application/pdf", "application/zip"})
@@ -37,6 +37,11 @@ _RANGE, _DIGESTS, _READ, _TAGS = (
     "description/entity-tag",
 )
 _ASKED: Final = re.compile(r"bytes=(\d*)-(\d*)")
+# By these words a description says that a text is kept as it was sent; other devices may write its lines otherwise.
+_KEEPS: Final = re.compile(
+    r"\b(?:octets?|bytes?)\b[^.]*\b(?:stored|sent|uploaded|received|written)\b|\bverbatim\b|\bbyte[ -](?:for|by)[ -]",
+    re.IGNORECASE,
+)
 
 
 def keeps_octets(media_type: str) -> bool:
@@ -83,7 +88,8 @@ class Contents:
         self._whole.clear()
         self._parts.clear()
         self._sent.clear()
-        is_file = keeps_octets(request.media_type) and 0 < len(request.body) <= _LARGEST
+        is_file = keeps_octets(request.media_type) or request.media_type == _TEXT
+        is_file = is_file and 0 < len(request.body) <= _LARGEST
         if is_file and answer.ok and answer.status != HTTPStatus.ACCEPTED:
             if request.method == "PUT":
                 self._sent[request.url] = occasion
@@ -116,13 +122,14 @@ class Contents:
         body, known = occasion.response.body, self._known.setdefault(occasion.request.url, set())
         if sent is not None and (sent.request.body == body or hash(body) not in known):
             octets, label = sent.request.body, label_of(occasion.operation)
+            is_kept = octets == body or (_is_free(occasion, sent) and octets.split() == body.split())
             differs = self._differs.setdefault(occasion.request.url.partition("?")[0], set())
-            differs |= set() if octets == body else {octets}
+            differs |= set() if is_kept else {octets}
             # Once, another client may have sent another file.
-            if octets == body or len(differs) > 1:
+            if is_kept or len(differs) > 1:
                 expected = f"the {len(octets)} octets that {label_of(sent.operation)} has sent"
                 found, cause = f"{len(body)} octets, which differ", f"{label} octets"
-                yield occasion.case(_READ, octets == body, expected, found, cause=cause)
+                yield occasion.case(_READ, is_kept, expected, found, cause=cause)
         known |= {hash(body)} | ({hash(sent.request.body)} if sent is not None else set())
         if len(self._known) > _MOST:
             del self._known[next(iter(self._known))]
@@ -131,9 +138,16 @@ class Contents:
     def _ignored(occasion: Occasion, value: str) -> Iterator[Case]:
         """Judge a part for a client whose If-Range names another content (RFC 9110 13.1.5)."""
         tag = occasion.response.header("etag") or ""
-        if value.startswith('"') and tag.startswith('"') and value != tag:
+        # A weak tag is none that a part may be asked for by.
+        if value.startswith('"') and tag.startswith(('"', "W/")) and value != tag:
             expected = f"status 200 with the whole, because If-Range does not have {tag}"
             yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
+
+
+def _is_free(read: Occasion, sent: Occasion) -> bool:
+    """Return whether a device may end the lines of a file as it likes: it is a text, and no description says more."""
+    operations = [one.operation for one in (read, sent) if one.operation is not None]
+    return sent.request.media_type == _TEXT and not any(_KEEPS.search(one.text) for one in operations)
 
 
 def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:

@@ -25,9 +25,9 @@ _ASKED: Final = 1000
 _COMPARED: Final = 60
 # Items of one kind may come before those of another.
 _KINDS: Final = 2
-# By these a client may ask for a value or more, as logs are filtered; by these it may ask for more items, not for these
-# alone, where the value is true.
-_LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
+#: By these a client may ask for a value or more, as logs are filtered; by those below it may ask for more items, not
+#: for these alone, where the value is true.
+LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
 
@@ -171,7 +171,7 @@ class Lists:
             return others[:1] if is_plain and values else None
         items = flat(member["items"]) if isinstance(member.get("items"), dict) else member
         if choices and set(asked) <= set(map(text_of, items.get("enum", ()))):
-            if name in _LEVELS and len(asked) == 1:
+            if name in LEVELS and len(asked) == 1:
                 ranks = [choices.index(one) - choices.index(asked[0]) for one in others if one in choices]
                 return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
             return others[:1] if values else None

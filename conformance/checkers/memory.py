@@ -10,13 +10,14 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
+from conformance.api.call_rules import words_of
 from conformance.api.rest.listing import listed
-from conformance.api.rest.references import collections_of
+from conformance.api.rest.references import collections_of, singular
 from conformance.api.rest.things import (
     as_answered,
     collection_of,
@@ -51,6 +52,14 @@ _SHOWN: Final = 200
 # Members of a device that no change of its thing changes; and the fewest characters that no device has by chance.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
+# By these words a description says that an identifier is given once, and that something outlives a thing.
+_NEVER_AGAIN: Final = re.compile(
+    r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)",
+    re.IGNORECASE,
+)
+_STAYS: Final = re.compile(
+    r"\b(?:not|keeps?|kept|stays?|remains?|without|unless|but|except|survives?)\b", re.IGNORECASE
+)
 
 
 @dataclass
@@ -105,12 +114,17 @@ class Memory:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        self._items = {
-            one.template.rstrip("/"): one
-            for one in operations
-            if one.method == "GET" and collection_of(one.template) and not one.parameter("query")
-        }
+        methods = {(one.method, one.template) for one in operations}
+        reads = [one for one in operations if one.method == "GET" and not one.parameter("query")]
+        self._items = {one.template.rstrip("/"): one for one in reads if collection_of(one.template)}
         self._of_collections = {collection_of(template): one for template, one in self._items.items()}
+        # What is below one thing, and can be there or not.
+        self._items |= {
+            one.template: one
+            for one in reads
+            if one.template.rpartition("/")[0] in self._items
+            and {("PUT", one.template), ("DELETE", one.template)} <= methods
+        }
         self._actions = {one.template for one in operations if not self._items.keys().isdisjoint(_above(one.template))}
         self._single = {one.template for one in operations if one.method == "GET"} - {
             one.template for one in self._items.values()
@@ -182,12 +196,17 @@ class Memory:
 
     def _changed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Take a PUT, PATCH or DELETE of an item."""
+        if not collection_of(operation.template):
+            # The thing that it is below may tell of it.
+            self._drop(lambda other: _is_below(path, other))
+            self._last.clear()
         last = self._last.pop(path, None)
         if operation.method != "DELETE" and last is not None:
             self._last[path] = last[0], {}
         if operation.method == "PUT" and occasion.response.status == HTTPStatus.CREATED:
             yield from self._located(occasion, path, path)
             yield from self._defaults(occasion, operation)
+        below = self._ending(operation, path) if operation.method == "DELETE" else []
         self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
         before = self._things.pop(path.casefold(), None)
         status = occasion.response.status
@@ -197,6 +216,7 @@ class Memory:
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone, thing.own = True, path in self._made
+            self._things |= {one.casefold(): replace(thing, path=one, own=True) for one in below}
         if status == HTTPStatus.CREATED:
             self._made.add(path)
         if not thing.gone and (body := _body_of(occasion, operation)) is not None:
@@ -206,6 +226,12 @@ class Memory:
                 thing.written[name] = value, operation
                 thing.shown.pop(name, None)
         self._things[path.casefold()] = thing
+
+    def _ending(self, delete: Operation, path: str) -> list[str]:
+        """Return what the run has put below a thing, and ends with it by what the description of its DELETE says."""
+        found = [one.path for one in self._things.values() if _is_below(one.path, path) and not one.gone]
+        said = set(map(singular, words_of(delete.text))) if not _STAYS.search(delete.text) else set()
+        return [one for one in found if one in self._made and singular(one.rpartition("/")[2]) in said]
 
     def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
@@ -228,8 +254,8 @@ class Memory:
             yield from self._located(occasion, path, target)
             yield from self._defaults(occasion, operation)
             sent = _sent_of(occasion)
-            if before is not None and before.gone and flat(item.parameter("path")[-1].schema).get("format") == "uuid":
-                expected = f"a UUID of its own, not that of the thing that {before.change} has deleted"
+            if before is not None and before.gone and _is_for_ever(item):
+                expected = f"an identifier of its own, not that of the thing that {before.change} has deleted"
                 is_chosen = target.rpartition("/")[2].casefold() in {str(one).casefold() for one in sent.values()}
                 yield occasion.case("description/created-is-there", is_chosen, expected, target, cause=operation.label)
             self._last[target] = {}, sent
@@ -420,6 +446,15 @@ def _sent_of(occasion: Occasion) -> dict[str, Any]:
     is_short = len(request.body) <= _MOST_OCTETS and is_json(request.media_type)
     value = read_json(request.body).value if is_short else None
     return value if isinstance(value, dict) else {}
+
+
+def _is_for_ever(item: Operation) -> bool:
+    """Return whether no other thing gets the identifier of a deleted one: it is a UUID, or the description says so."""
+    parameter, parts = item.parameter("path")[-1], flat(item.shape or {}).get("properties", {})
+    named = [flat(one) for name, one in parts.items() if plain_name(name) in {plain_name(parameter.name), "id"}]
+    given = flat(parameter.schema)
+    said = [str(one["description"]) for one in (given, *named) if "description" in one]
+    return given.get("format") == "uuid" or any(_NEVER_AGAIN.search(one) for one in said)
 
 
 def _above(template: str) -> Iterator[str]:

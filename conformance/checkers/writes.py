@@ -8,6 +8,7 @@ with nothing between them count, and members that change by themselves do not.
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from datetime import datetime
@@ -38,6 +39,11 @@ _SEEN: Final = 2
 _EXACT: Final = 2**53
 # Doubles that differ by no more are equal; those that differ by more than the second are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
+# By these words a description says what becomes of what a PUT leaves out.
+_GONE: Final = re.compile(
+    r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
+    re.IGNORECASE,
+)
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
 _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
 
@@ -311,18 +317,21 @@ class Writes:
         return f"{shown(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
-        """Judge whether what a PUT leaves out has its declared default."""
+        """Judge whether what a PUT leaves out has its declared default, or is gone where the description says so."""
+        is_said, needed = _GONE.search(change.operation.text), flat(item.shape or {}).get("required", ())
         for name, part in _parts(change.schema).items():
             given = flat(part) if isinstance(part, dict) else {}
-            if name in change.sent or "default" not in given or name not in change.before or given.get("readOnly"):
+            is_open = "default" not in given and (not is_said or name in needed)
+            if name in change.sent or is_open or name not in change.before or given.get("readOnly"):
                 continue
             if is_devices(name, given, self._collections) or is_shared(name) or name in change.moving:
                 continue
-            was, now, default = change.before[name], change.now.get(name), given["default"]
+            was, now, default = change.before[name], change.now.get(name), given.get("default")
             if same(was, default):
                 continue
             is_kept = same(now, was) and change.is_settled(name, change.sent)
-            expected = f"{shown(default)} as {name}, the default of what {change.label} left out"
+            of = "the default of what" if "default" in given else "which"
+            expected = f"{shown(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
             found = f"{shown(now)} as {name}, as before"
             yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=f"{item.label} {name}")
 
@@ -344,12 +353,26 @@ class Writes:
                 kept = [one for one in value if value[one] is None and one in was and same(now.get(one), was[one])]
                 kept = kept if any(not same(now.get(one), was.get(one)) for one in value) else []
                 wrong = f"no {lost[0]} in {name}" if lost else f"{kept[0]} in {name}" if kept else ""
+                wrong = wrong or self._reset_within(change, name)
             elif isinstance(value, list) and isinstance(was, list) and isinstance(now, list) and was:
                 is_added = len(now) > len(value) and len(now) >= len(was) and all(one in now for one in (*was, *value))
                 wrong = f"{shown(now)} as {name}" if is_added and not same(was, now) else ""
             else:
                 continue
             yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
+
+    def _reset_within(self, change: _Change, name: str) -> str:
+        """Return a member of an object that a patch has reset, which names another one with the value that it had.
+
+        One member may follow another one. Two that reset each other, by values that change nothing, do not.
+        """
+        value, was, now = change.sent[name], change.before[name], change.now[name]
+        others = [one for one in was if one in now and one not in value and not same(now[one], was[one])]
+        doubts = self._doubts[change.operation.label, f"{name} within"]
+        if all(same(value[one], was.get(one)) for one in value):
+            doubts |= {f"{one} resets {other}".encode() for one in value for other in others}
+        both = [one for one in others if any(f"{one} resets {other}".encode() in doubts for other in value)]
+        return f"{shown(now[both[0]])} as {both[0]} in {name}" if both else ""
 
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps what it does not name: two bodies that reset other members are no chance."""

@@ -71,6 +71,7 @@ class Operation:
         never: whether the description says that a test must not send it (x-roaas-never).
         stop: whether it stops the device (x-roaas-stop).
         reads: whether it only reads, whatever its method (x-roaas-reads).
+        text: what its summary and its description say.
     """
 
     id: str
@@ -88,6 +89,7 @@ class Operation:
     never: bool = False
     stop: bool = False
     reads: bool = False
+    text: str = ""
 
     @cached_property
     def label(self) -> str:
@@ -231,6 +233,7 @@ def _operation(
         never=bool(given.get("x-roaas-never", False)),
         stop=bool(given.get("x-roaas-stop", False)),
         reads=bool(given.get("x-roaas-reads", False)),
+        text=" ".join(one for key in ("summary", "description") if isinstance(one := given.get(key), str)),
     )
 
 

@@ -236,6 +236,5 @@ def _referring(writer: Writer, create: Operation, name: str, id_: Any) -> dict[s
 def _said_of(api: RestInterface, operation: Operation) -> str:
     """Return what the description says of an operation and its 409."""
     given: Any = api.run.contract.openapi.get("paths", {}).get(operation.template, {}).get(operation.method.lower(), {})
-    refusal = given.get("responses", {}).get("409", {})
-    texts = (given.get("summary"), given.get("description"), represented(refusal, ()).get("description"))
-    return " ".join(text for text in texts if isinstance(text, str))
+    said = represented(given.get("responses", {}).get("409", {}), ()).get("description")
+    return f"{operation.text} {said if isinstance(said, str) else ''}"

@@ -105,7 +105,7 @@ class _Rounds:
         )
 
     def play(self, number: int) -> Iterator[Keyed]:
-        """Send a request, the same again, its key with another body, and a new key with a third one."""
+        """Send a request twice, its key with another body, a new key with a third one, and the first request again."""
         bodies, keys = self._bodies(_TURN + 10 * number), self._keys()
         if len(keys) < 2 or not bodies:  # noqa: PLR2004 - the first one, and a new one
             return
@@ -131,6 +131,10 @@ class _Rounds:
                 is_old = new.response.status == HTTPStatus.CREATED and self._name(new) == name
                 expected = f"something else than {name}, which was made for another key and another body"
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
+                # Another client's key in between makes a retry no other request.
+                again = self._send(request)
+                made.append(again)
+                yield self._repeated(first, again, name, before)
         finally:
             self._tidied(made)
 

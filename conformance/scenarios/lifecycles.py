@@ -22,6 +22,7 @@ from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
+from conformance.scenarios.chosen import Chosen
 from conformance.scenarios.living import ABSENT, Kind, Life, Living, State, Thing
 from conformance.scenarios.refusing import is_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
@@ -29,6 +30,7 @@ from conformance.scenarios.singletons import singletons
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
 # So many things of a collection are created: where nothing deletes them, at quick, and at the other efforts.
@@ -39,6 +41,8 @@ _BUDGETS, _SLOW_BUDGETS = 10, 3
 _ACTIONS: Final = 3
 # A thing is left alone for at most so long, s.
 _ALONE_S: Final = 6.0
+# So many clients create things at once; and the first turn of those.
+_CLIENTS, _AT_ONCE = 3, 110
 # The turns of changes, of refused requests, and of an identifier that is never created, so that their values differ.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99
 # Members that say when something was changed.
@@ -115,6 +119,8 @@ class _Cycle:
             self._create_all(count)
             self.living.look_at_older()
             self._change_all()
+            Chosen(self.living, self._changes, self.operations).look()
+            self._create_at_once(count)
             self._act()
         with suppress(NoAnswerError):
             if delete is not None:
@@ -262,6 +268,24 @@ class _Cycle:
                 return False
             self._found(created, path, "")
             return True
+        return self._taken(created, before)
+
+    def _create_at_once(self, count: int) -> None:
+        """Create things by several clients at the same moment: each gets its own."""
+        writer, turns = self.writer, [count * self.round + _AT_ONCE + number for number in range(_CLIENTS)]
+        # Things that nothing deletes are not for that.
+        if self.create.method != "POST" or count == _KEPT or not self.living.of(State.ALIVE) or self.living.is_over:
+            return
+        bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
+        requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
+        if len({one.body for one in requests}) == len(turns):
+            for created in send_together([[(writer.api.client, one) for one in requests]])[0]:
+                if isinstance(created, Exchange) and created.response.status == HTTPStatus.CREATED:
+                    self._taken(created, None)
+
+    def _taken(self, created: Exchange, before: set[str] | None) -> bool:
+        """Take what a POST has created, by the identifiers that were there before; return whether it is new."""
+        status = created.response.status
         id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
             # A POST that is answered 200 may search, or log in.

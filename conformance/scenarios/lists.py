@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import combinations, islice, product
 from typing import Any, Final
 
 from conformance.api.rest.applicable import allowed
@@ -243,6 +243,7 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     rows: list[dict[str, Any]] = []
     for name, parameter in listing.filters.items():
         rows += [{parameter.name: value} for value in _choices(parameter, name, page)[:most]]
+    rows += [both] if len(rows) > 1 and (both := _together(listing, page)) else []
     for bound in listing.bounds:
         there = {
             members_of(one).get(bound.member) for one in page.items if members_of(one).get(bound.member) is not None
@@ -269,6 +270,17 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
             yield {**row, **part}
         elif later or part:
             yield {**sorts, **row, **part, **later}
+
+
+def _together(listing: Listing, page: Page) -> dict[str, Any]:
+    """Return values of two filters at once of which each leaves an item that the other one does not; else nothing."""
+    items = [members_of(one) for one in page.items]
+    for (name, first), (other, second) in combinations(listing.filters.items(), 2):
+        for one, two in product(_choices(first, name, page), _choices(second, other, page)):
+            left = {(item.get(name) == one, item.get(other) == two) for item in items}
+            if {(True, False), (False, True)} <= left:
+                return {first.name: one, second.name: two}
+    return {}
 
 
 def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:

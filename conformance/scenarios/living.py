@@ -46,6 +46,7 @@ class Kind(StrEnum):
     KEPT = "kept"  # what was written reads otherwise later
     GONE = "gone"  # what was deleted is back, or still listed
     SHOWN = "shown"  # the list shows other values than the thing itself
+    CHOSEN = "chosen"  # a list by a filter has a thing by the value that it had
     REFUSED = "refused"  # a refused request has changed something
 
 

@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
@@ -45,15 +45,17 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _MEMBERS: Final = 6
 # So many filters of a list are tried; a device may list for so long what was deleted, s, and is asked so often.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
-_PARTS: Final = ((("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
+_PARTS: Final = ((("Range", "bytes=-2"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 _GONE_PLACE: Final = "path of what was deleted"
-_OCTETS: Final = "application/octet-stream"
+_OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # Files with what programs take for the end of a line, of a text or of a file.
 _FILES: Final = (
     b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
     bytes(range(256)) * 17 + b"\r\n\n \0end",
     bytes(range(255, -1, -1)) * 18,
 )
+# Texts of as many octets, with several ends of lines.
+_TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b"end" for word in ("one", "other"))
 # The turn of an identifier that no other check chooses.
 _TURN: Final = 98
 # So many are written one by one after all together, which shows whether the others stay.
@@ -83,6 +85,8 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if thing_path := make(surveyor, create, read):
                     thing = _Thing(surveyor, read, thing_path)
                     thing.asked()
+                    if "206" in read.responses:
+                        thing.in_parts(read, thing.target)
                     thing.written(changes)
                     thing.filled()
                     if values.unique.knows(create) and changes:
@@ -149,6 +153,8 @@ class _Thing:
     target: str
     tag: str = ""
     last: Exchange | None = None
+    # Files below it that are there.
+    below: list[tuple[Operation, Outgoing]] = field(default_factory=list)
 
     @property
     def api(self) -> RestInterface:
@@ -269,28 +275,34 @@ class _Thing:
             if method != "GET" or put is None or not template.startswith(above) or "{" in template[len(above) :]:
                 continue
             media_type = next((one for one in put.bodies if keeps_octets(one)), "")
-            if not media_type or not (allowed(self.api, put) and allowed(self.api, read)):
+            if not (media_type or _TEXT in put.bodies) or not (allowed(self.api, put) and allowed(self.api, read)):
                 continue
             path = self.target.rstrip("/") + template[len(above) - 1 :]
-            for octets in _FILES:
-                inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=media_type)
+            files = [(media_type, octets) for octets in _FILES if media_type]
+            files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
+            for kept_as, octets in files:
+                inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=kept_as)
                 request = replace(written(put, inputs), target=path)
                 # A device may look into an image, and refuse what is none.
-                kind = Kind.AGAIN if media_type == _OCTETS else Kind.ODD
+                kind = Kind.AGAIN if kept_as == _OCTETS else Kind.ODD
                 if not self.surveyor.send(put, Variation(kind, "", "", inputs), request).ok:
                     break
-                whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
-                more = _PARTS if "206" in read.responses and octets is _FILES[-1] else ()
-                for fields in ((), (("Range", "bytes=2-5"),), *more, ()):
-                    part = replace(whole, headers=(*whole.headers, *fields))
-                    self.surveyor.send(read, Variation(Kind.ODD if fields else Kind.AGAIN, "", "", Inputs()), part)
+                self.in_parts(read, path, more="206" in read.responses and octets is _FILES[-1])
             else:
-                self._ended(put, read, operations.get(("DELETE", template)), replace(request, body=_FILES[0]), whole)
+                whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+                self._ended(put, read, operations.get(("DELETE", template)), request, whole)
+
+    def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
+        """Read a file, parts of it, and the file again."""
+        whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+        for fields in ((), (("Range", "bytes=2-5"),), *(_PARTS if more else ()), ()):
+            part = replace(whole, headers=(*whole.headers, *fields))
+            self.surveyor.send(read, Variation(Kind.ODD if fields else Kind.AGAIN, "", "", Inputs()), part)
 
     def _ended(
         self, put: Operation, read: Operation, delete: Operation | None, request: Outgoing, whole: Outgoing
     ) -> None:
-        """Write to a file that is there as if it were not, and delete it; read it after each."""
+        """Write to a file that is there as if it were not, delete it, and write it again; read it after each."""
         steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = []
         if any(one.name.lower() == "if-none-match" for one in put.parameter("header")):
             steps.append((put, request, (("If-None-Match", "*"),)))
@@ -299,9 +311,22 @@ class _Thing:
             steps.append((delete, replace(own, target=whole.target), ()))
         for operation, outgoing, fields in steps:
             headers = (*(one for one in outgoing.headers if one[0].lower() != "if-none-match"), *fields)
-            odd, again = Variation(Kind.ODD, "", "", Inputs()), Variation(Kind.ODD, "", _GONE_PLACE, Inputs())
-            self.surveyor.send(operation, odd, replace(outgoing, headers=headers))
-            self.surveyor.send(read, again if operation is delete else odd, whole)
+            odd = Variation(Kind.ODD, "", "", Inputs())
+            done = self.surveyor.send(operation, odd, replace(outgoing, headers=headers))
+            if operation is delete and done.ok:
+                self._look_at_gone(read, whole)
+                self.surveyor.send(put, odd, request)
+                self.below.append((read, whole))
+            else:
+                self.surveyor.send(read, odd, whole)
+
+    def _look_at_gone(self, read: Operation, request: Outgoing) -> None:
+        """Read what was deleted until it is gone, or until a device has had its time."""
+        began = time.monotonic()
+        while self.surveyor.send(read, Variation(Kind.ODD, "", _GONE_PLACE, Inputs()), request).ok:
+            if time.monotonic() - began > _SETTLES_S:
+                return
+            time.sleep(_PAUSE_S)
 
     def _members(self) -> dict[str, Any]:
         return members(self.last, ()) if self.last is not None else {}
@@ -355,6 +380,12 @@ class _Thing:
         if delete is None or not self.get().ok:
             return
         was, began = members(self.last, ()) if self.last is not None else {}, time.monotonic()
+        listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
+        id_ = identifier_of(was, self.read)
+        queries = list(_filters(listing, was)) if listing is not None and id_ else []
+        for query in queries:
+            # A device may keep the answer.
+            self._look_in(listing, query, id_, began - _SETTLES_S)
         self._refused(delete)
         if not self.get().ok:
             return
@@ -364,13 +395,15 @@ class _Thing:
         variation = Variation(Kind.ODD, "", _GONE_PLACE, Inputs())
         self.surveyor.send(self.read, variation, replace(head, target=self.target), fresh=False)
         is_gone = self.get(place=_GONE_PLACE).status in ABSENT
-        listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
-        if is_gone and listing is not None and identifier_of(was, self.read):
-            for query in _filters(listing, was):
-                self._look_in(listing, query, identifier_of(was, self.read), began)
+        for read, request in self.below if is_gone else ():
+            self._look_at_gone(read, request)
+        for query in queries if is_gone else ():
+            self._look_in(listing, query, id_, began)
 
-    def _look_in(self, listing: Listing, query: dict[str, Any], id_: str, began: float) -> None:
+    def _look_in(self, listing: Listing | None, query: dict[str, Any], id_: str, began: float) -> None:
         """Read a list until what was deleted is not in it, or until a device has had its time."""
+        if listing is None:
+            return
         inputs = usual_inputs(listing.operation, self.surveyor.values)[0]
         inputs = replace(inputs, query={**inputs.query, **query})
         while True:

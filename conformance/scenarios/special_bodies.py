@@ -155,8 +155,12 @@ def _nulls(
     for name, value in changed.items():
         inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
         if inner and len(value) > 1:
-            # Each alone: what the patch before has changed stays.
-            yield from ({name: usable[name]}, *({name: {one: value[one]}} for one in inner[:2]))
+            # Each alone: what the patch before has changed stays; also where the patch names what is there already.
+            for one in inner[:2]:
+                if now().get(name) != value:
+                    yield {name: value}
+                yield {name: {one: value[one]}}
+            yield {name: {inner[0]: usable[name].get(inner[0])}}
             break
 
 

@@ -57,8 +57,8 @@ _CYCLES: Final = 24
 # Statuses of an operation that is not there.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
-#: Where a request has JSON with a charset, which means nothing (RFC 8259 11).
-CHARSET: Final = "header Content-Type"
+# Where a request has JSON with a charset, which means nothing (RFC 8259 11), so that nobody refuses it (RFC 2045 5).
+_CHARSET: Final = "header Content-Type"
 #: Statuses by which a request is refused for what is in it, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
@@ -400,7 +400,7 @@ class Surveyor:
             if self.send(operation, Variation(Kind.AGAIN, "", "", fewer)).ok:
                 self.send(operation, most)
         if is_json(usual.media_type) and operation.label not in self.given_up:
-            shown = Variation(Kind.OPTIONAL, "with a charset", CHARSET, usual)
+            shown = Variation(Kind.OPTIONAL, "with a charset", _CHARSET, usual)
             request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
         # What is left out has its default, more than once.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -55,7 +57,9 @@ def chooses(lister: Operation) -> bool:
     return any(one not in parts for one in lister.parameter("query"))
 
 
-def read_whole(writer: Writer, lister: Operation, item: Operation, path: str) -> WholeList:
+def read_whole(
+    writer: Writer, lister: Operation, item: Operation, path: str, always: Mapping[str, Any] = MappingProxyType({})
+) -> WholeList:
     """Read a list by a bounded number of pages.
 
     Args:
@@ -63,18 +67,21 @@ def read_whole(writer: Writer, lister: Operation, item: Operation, path: str) ->
         lister: the operation that lists.
         item: the operation that reads one of the items.
         path: that of the collection.
+        always: values of query parameters that each request has.
     """
-    exchange, found, is_whole = writer.send(lister, path), list[Any](), False
+    exchange, found, is_whole = writer.send(lister, path, query=always), list[Any](), False
     for number in range(1, _PAGES + 1):
         page = page_of(exchange.response, lister)
         if page is None or (number > 1 and page.items and page.items[0] in found):
             break
         found += page.items
-        is_whole = not (page.goes_on or max(page.totals.values(), default=0) > len(found) or _seems_cut(lister, page))
+        is_whole = not (
+            page.goes_on or max(page.totals.values(), default=0) > len(found) or _seems_cut(lister, page, always)
+        )
         query = None if is_whole else _next(lister, exchange, page, len(found), number)
         if query is None:
             break
-        exchange = writer.send(lister, path, query=query)
+        exchange = writer.send(lister, path, query={**always, **query})
     items = tuple(one for one in found if isinstance(one, dict))
     ids = tuple(identifier_of(one, item) for one in items)
     equal = Counter((id_, json_text(one)) for id_, one in zip(ids, items, strict=True) if id_)
@@ -103,11 +110,11 @@ def _next(lister: Operation, exchange: Exchange, page: Page, count: int, number:
     return None
 
 
-def _seems_cut(lister: Operation, page: Page) -> bool:
+def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
     """Return whether a page has as many items as a limit allows, said or not."""
     count, listing = len(page.items), listing_of(lister)
     said = [one for part in page.around for name, one in part.items() if plain_name(name) in _LIMITS]
-    most = listing.most({}) if listing is not None else 0
+    most = listing.most({name: str(one) for name, one in sent.items()}) if listing is not None else 0
     return bool(count) and (
         count in {most, *(one for one in said if isinstance(one, int))} or (count >= _FEWEST and count % _ROUND == 0)
     )

@@ -17,7 +17,7 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.observe.polling import Patience
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Outgoing
 
 # A device that writes later has so long, s; and it is read so often meanwhile.
 _SETTLES_S: Final = 3.0
@@ -79,7 +79,21 @@ class Writer:
         media_type: str = "",
         fresh: bool = False,
     ) -> Exchange:
-        """Send an operation's usual request, with another path, JSON body or query, and further headers, if given.
+        """Send an operation's usual request as `request` makes it; fresh: on a connection of its own."""
+        outgoing = self.request(operation, path, body, query=query, headers=headers, media_type=media_type)
+        return self.api.send(outgoing, fresh=fresh)
+
+    def request(
+        self,
+        operation: Operation,
+        path: str = "",
+        body: Any = None,
+        *,
+        query: Mapping[str, Any] | None = None,
+        headers: tuple[tuple[str, str], ...] = (),
+        media_type: str = "",
+    ) -> Outgoing:
+        """Return an operation's usual request, with another path, JSON body or query, and further headers, if given.
 
         Args:
             operation: the operation.
@@ -88,7 +102,6 @@ class Writer:
             query: members of the query that differ from the usual ones.
             headers: beside the usual ones.
             media_type: by which the body is called, instead of its own.
-            fresh: on a connection of its own.
         """
         inputs = usual_inputs(operation, self.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
@@ -99,7 +112,7 @@ class Writer:
         kept = [one for one in request.headers if one[0].lower() not in given]
         request = replace(request, headers=(*kept, *headers))
         request = request.having_type(media_type) if media_type else request
-        return self.api.send(replace(request, target=path + rest) if path else request, fresh=fresh)
+        return replace(request, target=path + rest) if path else request
 
     def bodies(self, operation: Operation, turn: int, now: dict[str, Any] | None = None) -> list[dict[str, Any]]:
         """Return JSON objects to send with an operation: with other values in each turn, then the usual one.

@@ -19,10 +19,12 @@ from conformance.documents.representation import flat
 
 # Ends of the names of path parameters that a member with another name may give, such as ``id`` for ``item_pk``.
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
-# Members that a device sets itself, or hides, by the end of their plain names.
+# Members that a device sets itself, or hides, by the end of their names: the last words, with what stands before them.
+# ``on`` alone is a switch; ``season``, ``format`` and ``standby`` are words of their own.
 _OWN: Final = re.compile(
-    r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time|at|on|by"
-    r"|owner|author|user|password|secret|token|pin|key)$"
+    r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time"
+    r"|owner|author|user|password|secret|token|pin|key|[^a-z](?:at|by)|(?:[a-z]ed|[^a-z]?(?:seen|made|built|sent))_?on"
+    r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
 )
 # Names and states of what is deleted and can still be read, and names of what says that it is not.
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
@@ -189,7 +191,12 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     """Return whether a member is the device's: it sets, hides or checks it."""
     given = flat(part) if isinstance(part, dict) else {}
     marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}
-    return bool(marked or "const" in given or _OWN.search(plain_name(name)) or refers(name, given, collections))
+    return bool(marked or "const" in given or _OWN.search(_snake(name)) or refers(name, given, collections))
+
+
+def _snake(name: str) -> str:
+    """Return a name in lower case with a line between its words: ``created_at`` for ``createdAt``."""
+    return re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
 def is_shared(name: str) -> bool:

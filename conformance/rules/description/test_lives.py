@@ -88,6 +88,12 @@ def same_values(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     yield from _looks(trace, Kind.SHOWN)
 
 
+@rule("description/list-filter", on=(lifecycles,))
+def chosen_by_value(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether a filter goes by the values that things have now."""
+    yield from _looks(trace, Kind.CHOSEN)
+
+
 @rule("description/same-values", on=(tables,))
 def same_rows(trace: tuple[Table, ...]) -> Iterable[Outcome]:
     """Judge whether a list as CSV has the rows and the numbers that it has as JSON."""

@@ -17,7 +17,7 @@ from conformance.documents.openapi import operations_of
 from conformance.documents.writing import json_text
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.rule import Outcome, rule
-from conformance.scenarios.survey import CHARSET, Probe, Survey, generated_requests, survey
+from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
@@ -157,9 +157,7 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 @rule("description/valid-accepted", on=(survey, generated_requests))
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
-    # A device that takes no charset anywhere knows application/json alone.
-    is_taken = any(one.ok for one in trace.probes if one.place == CHARSET)
-    trace = replace(trace, probes=tuple(one for one in _named(trace, run) if one.place != CHARSET or is_taken))
+    trace = replace(trace, probes=tuple(_named(trace, run)))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
     # An operation that never accepts anything may need a state; which status it has then, another rule judges.
     works = {one.operation for one in trace.probes if one.ok}
