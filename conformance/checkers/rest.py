@@ -14,6 +14,7 @@ from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
+from conformance.checkers.transitions import Transitions
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
@@ -43,7 +44,7 @@ class RestCheckers:
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(),
+            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

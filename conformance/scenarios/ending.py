@@ -21,13 +21,14 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, identified, represented
 from conformance.api.rest.values import Values
 from conformance.checkers.changes import ENDING, FINAL, state_of
+from conformance.checkers.transitions import KEEPS, OFTEN, state_member
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.living import ABSENT
-from conformance.scenarios.own_things import located
+from conformance.scenarios.own_things import located, path_of_usual
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
@@ -62,23 +63,27 @@ class Ended:
 
 
 def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
-    """Create two things of each collection with states: begin one and end it twice, and begin the other one."""
+    """Create two things of each collection with states: begin one and end it twice, and begin the other one.
+
+    Of a collection in which nothing can be created, the usual thing goes through its states.
+    """
     operations = _callable(api)
     found, writer = list[Ended](), Writer(api, values)
     for (method, path), read in operations.items():
-        state = state_of(read) if method == "GET" and collection_of(path) else ""
+        create = operations.get(("POST", collection_of(path)))
+        state = (state_of(read) or (state_member(read) if create is None else "")) if method == "GET" else ""
         actions = _actions(read, operations) if state and len(read.parameter("path")) == 1 else ()
-        if not actions or len(found) >= _KINDS:
+        if not actions or len(found) >= _KINDS or not collection_of(path):
             continue
         kind, paths = Ended(read, state, actions), list[str]()
-        create = operations.get(("POST", collection_of(path)))
         begins = [one for one in actions if not _ends(one)][:_BEGINNING]
         ends = [one for one in actions if _ends(one)][:1]
         for steps in ([*begins, *ends, *begins, *ends], begins):
-            if create is None:
-                break
             api.run.limit.check()
             with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+                if create is None:
+                    _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
+                    break
                 made = writer.send(create)
                 if (path := located(api, read, made)) and made.response.ok:
                     paths.append(path)
@@ -115,6 +120,15 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
             return told is None or now == told or now in FINAL or not found.response.ok
 
         writer.until(lambda: writer.send(kind.read, path), is_so)
+        if KEEPS.search(step.text):
+            # What changes by itself does so now as well.
+            writer.send(kind.read, path)
+
+
+def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
+    """Return operations one after another, each until it is refused for sure, and twice in the opposite order."""
+    forth = [one for one in actions for _ in range(OFTEN + 1 if KEEPS.search(one.text) else 2)]
+    return [*forth, *reversed(actions), *reversed(actions)]
 
 
 def _listed_as_done(writer: Writer, kind: Ended) -> str:

@@ -42,7 +42,7 @@ _ACTIONS: Final = 3
 # A thing is left alone for at most so long, s.
 _ALONE_S: Final = 6.0
 # So many clients create things at once; and the first turn of those.
-_CLIENTS, _AT_ONCE = 3, 110
+_CLIENTS, _AT_ONCE = 2, 110
 # The turns of changes, of refused requests, and of an identifier that is never created, so that their values differ.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99
 # Members that say when something was changed.
@@ -120,11 +120,11 @@ class _Cycle:
             self.living.look_at_older()
             self._change_all()
             Chosen(self.living, self._changes, self.operations).look()
-            self._create_at_once(count)
             self._act()
         with suppress(NoAnswerError):
             if delete is not None:
                 self._delete_all(delete)
+                self._create_at_once(delete, count)
         return [replace(one.life, looks=tuple(self.living.looks) if one is things[0] else ()) for one in things]
 
     def changes_alone(self, seconds: float) -> bool:
@@ -270,11 +270,10 @@ class _Cycle:
             return True
         return self._taken(created, before)
 
-    def _create_at_once(self, count: int) -> None:
-        """Create things by several clients at the same moment: each gets its own."""
+    def _create_at_once(self, delete: Operation, count: int) -> None:
+        """Create things by two clients at the same moment, of which each gets its own, and delete them."""
         writer, turns = self.writer, [count * self.round + _AT_ONCE + number for number in range(_CLIENTS)]
-        # Things that nothing deletes are not for that.
-        if self.create.method != "POST" or count == _KEPT or not self.living.of(State.ALIVE) or self.living.is_over:
+        if self.create.method != "POST" or not self.living.of(State.GONE) or self.living.is_over:
             return
         bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
         requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
@@ -282,6 +281,8 @@ class _Cycle:
             for created in send_together([[(writer.api.client, one) for one in requests]])[0]:
                 if isinstance(created, Exchange) and created.response.status == HTTPStatus.CREATED:
                     self._taken(created, None)
+            for thing in self.living.of(State.ALIVE):
+                self._deleted(thing, delete)
 
     def _taken(self, created: Exchange, before: set[str] | None) -> bool:
         """Take what a POST has created, by the identifiers that were there before; return whether it is new."""
