@@ -227,15 +227,6 @@ class FrontDoor:
         return code
 
     @staticmethod
-    def history(folder: Path) -> None:
-        """Write the page with the history of the latency results stored in a folder."""
-        try:
-            for path in import_module("reports.latency.history").write_history(folder):
-                click.echo(f"history: {path}")
-        except import_module("reports.errors").ReportError as error:
-            click.echo(f"no history: {error.format_message()}", err=True)
-
-    @staticmethod
     def description_changes(old: str, new: str, *, allow_files: bool = False) -> list[tuple[bool | None, str, str]]:
         """Return what changed: whether it breaks clients (None if that is not known), the operation, and what it is."""
         comparing = import_module("conformance.engine.comparing")

@@ -392,8 +392,6 @@ class _Baselines:
                 click.echo(f"roaas load: {inert(str(error))}", err=True)
                 return CommandResult(ExitCode.USAGE, result.file)
             click.echo(f"stored: {stored}" if stored else "not stored: the measurement is not valid", err=True)
-            if stored is not None and door is not None:
-                door.history(self.store_in)
         return CommandResult(code, result.file)
 
 

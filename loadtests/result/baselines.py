@@ -1,4 +1,4 @@
-"""Results stored by name, which later runs are compared with and a history is made of.
+"""Results stored by name, which later runs are compared with.
 
 A baseline is a folder of latency.json files, named by when they were measured; the latest one is compared with.
 """

@@ -1,1 +1,1 @@
-"""Write reports from latency.json: of one measurement, of two compared, and of a robot's history."""
+"""Write reports from latency.json: of one measurement, and of two compared."""
