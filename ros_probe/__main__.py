@@ -1,10 +1,9 @@
-"""The probe's process: `python -m ros_probe observe|listen|publish|play --domain-id N --delivery-topic NAME`.
+"""The probe's process: `python -m ros_probe observe|play --domain-id N --delivery-topic NAME`.
 
 It writes a line of JSON that says that it is ready, or what its problem is. An observer then answers each line of its
-input ("deliveries", "velocities", "graph") with a line. A listener writes a line for each delivery when it arrives. A
-publisher reads lines of values, publishes each and writes `{"sent_ns": …}`. Times are of CLOCK_MONOTONIC, which all
-processes of a machine share, in ns; messages are `[time, value, …]` with values in the order of the ROS message, in
-hexadecimal, which loses no bit. A player does what each line says (player.py). The process ends when its input ends.
+input ("deliveries", "velocities", "graph") with a line. Times are of CLOCK_MONOTONIC, which all processes of a machine
+share, in ns; messages are `[time, value, …]` with values in the order of the ROS message, in hexadecimal, which loses
+no bit. A player does what each line says (player.py). The process ends when its input ends.
 """
 
 import argparse
@@ -19,9 +18,9 @@ def _say(answer: dict[str, Any]) -> None:
 
 
 def main() -> int:
-    """Run the probe; return 0 when its input ended, 3 without ROS or without a peer on the topic."""
+    """Run the probe; return 0 when its input ended, 3 without ROS or without a robot."""
     parser = argparse.ArgumentParser(prog="python -m ros_probe", description=__doc__)
-    parser.add_argument("role", choices=["observe", "listen", "publish", "play"])
+    parser.add_argument("role", choices=["observe", "play"])
     parser.add_argument("--domain-id", type=int, required=True)
     parser.add_argument("--delivery-topic", default="")
     parser.add_argument("--name", default="roaas_player")
@@ -57,12 +56,12 @@ def _probe(options: argparse.Namespace) -> int:
         _say({"problem": f"{type(error).__name__}: {error}"})
         return 3
     try:
-        problem = node.publish_to() if options.role == "publish" else node.observe(_say, live=options.role == "listen")
+        problem = node.observe()
         _say({"problem": problem} if problem else {"ready": True})
         if problem:
             return 3
         for line in sys.stdin:
-            _say({"sent_ns": node.publish(json.loads(line))} if options.role == "publish" else node.answer(line))
+            _say(node.answer(line))
     finally:
         node.close()
     return 0

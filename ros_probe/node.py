@@ -1,4 +1,4 @@
-"""The probe's ROS node: hears deliveries and velocity commands, reads the ROS graph, and publishes deliveries."""
+"""The probe's ROS node: hears deliveries and velocity commands, and reads the ROS graph."""
 
 import threading
 import time
@@ -41,32 +41,22 @@ class ProbeNode:
         self._delivery_topic, self._cmd_vel_topic = delivery_topic, cmd_vel_topic
         # Filled by the executor's thread, emptied by the one that answers: deque's ends are safe for that.
         self._heard: dict[str, deque[list[Any]]] = {"deliveries": deque(), "velocities": deque()}
-        self._tell: Callable[[dict[str, Any]], None] | None = None
-        self._publisher: Any = None
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
         self._thread.start()
 
-    def observe(self, tell: Callable[[dict[str, Any]], None], *, live: bool) -> str:
+    def observe(self) -> str:
         """Subscribe once the robot's publishers are there; return the problem, or empty.
 
         Publishers count as well as nodes, as they may be discovered before their nodes' names.
-
-        Args:
-            tell: gets each delivery when it arrives, on the executor's thread, if `live`.
-            live: whether this listens in the application's place, where the topic has a publisher.
         """
         topics = [topic for topic in (self._delivery_topic, self._cmd_vel_topic) if topic]
         count = self._node.count_publishers
         self._awaited(lambda: all(map(count, topics)))
         nodes = sum(name != _NAME for name in self._node.get_node_names())
-        domain = self._context.get_domain_id()
-        if live and not count(self._delivery_topic):
-            return f"nothing publishes {self._delivery_topic} in ROS domain {domain}"
         if not nodes + sum(map(count, topics)):
-            return f"no ROS node is found in domain {domain}"
-        self._tell = tell if live else None
+            return f"no ROS node is found in domain {self._context.get_domain_id()}"
         self._subscribe(DeliveryRequestMsg, self._delivery_topic, self._delivery_came)
         if self._cmd_vel_topic:
             stamped = _STAMPED in dict(self._node.get_topic_names_and_types()).get(self._cmd_vel_topic, [])
@@ -74,23 +64,6 @@ class ProbeNode:
             self._subscribe(TwistStamped if stamped else Twist, self._cmd_vel_topic, came)
         time.sleep(_MATCHED_S)
         return ""
-
-    def publish_to(self) -> str:
-        """Become a publisher of deliveries, once there is a subscriber; return the problem, or empty."""
-        self._publisher = self._node.create_publisher(
-            DeliveryRequestMsg, self._delivery_topic, QoSProfile(depth=_DEPTH)
-        )
-        if not self._awaited(self._publisher.get_subscription_count):
-            return f"nothing subscribes to {self._delivery_topic} in ROS domain {self._context.get_domain_id()}"
-        return ""
-
-    def publish(self, values: list[str]) -> int:
-        """Publish a delivery; return when that began."""
-        code, *places = (float.fromhex(value) for value in values)
-        message = DeliveryRequestMsg(**dict(zip(_FIELDS, (int(code), *places), strict=True)))
-        began = time.monotonic_ns()
-        self._publisher.publish(message)
-        return began
 
     def answer(self, question: str) -> dict[str, Any]:
         """Return the messages of a kind received since the last call, or the published topics with their types."""
@@ -128,20 +101,13 @@ class ProbeNode:
         )
 
     def _came(self, what: str, at_ns: int, values: list[float]) -> None:
-        message = [at_ns, *(float(value).hex() for value in values)]
-        if self._tell is not None:
-            self._tell({what: [message]})
-        else:
-            self._heard[what].append(message)
+        self._heard[what].append([at_ns, *(float(value).hex() for value in values)])
 
     @staticmethod
-    def _awaited(there: Callable[[], Any]) -> bool:
+    def _awaited(there: Callable[[], Any]) -> None:
         until = time.monotonic() + _DISCOVERY_S
-        while not there():
-            if time.monotonic() > until:
-                return False
+        while not there() and time.monotonic() <= until:
             time.sleep(_STEP_S)
-        return True
 
     def _spin(self) -> None:
         try:

@@ -1,7 +1,6 @@
 """Start the probe's process, and ask it in lines of JSON.
 
-So the suite and the load tests need no ROS themselves. Every wait has a deadline. In a process that gevent has patched,
-waiting blocks no other greenlet.
+So the suite needs no ROS itself. Every wait has a deadline.
 """
 
 import atexit
@@ -33,7 +32,7 @@ class RosProcess:
     """A started probe; call await_ready() before anything else.
 
     Args:
-        role: observe, listen, publish or play.
+        role: observe or play.
         options: its options, beside the domain.
         domain_id: the robot's ROS domain.
 

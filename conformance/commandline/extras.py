@@ -9,10 +9,7 @@ _SOAP: Final = ("zeep", "xmlschema")
 #: The modules that an extra of pyproject.toml brings, by their import names. `roaas robot` names its own.
 EXTRAS: Final = {
     "soap": _SOAP,
-    "load": (
-        *("locust", "hdrh", "matplotlib", "numpy", "httptools", "prometheus_client", "scipy", "websockets"),
-        *_SOAP,
-    ),
+    "load": (*("locust", "hdrh", "matplotlib", "numpy", "httptools", "scipy", "websockets"), *_SOAP),
 }
 
 

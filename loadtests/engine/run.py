@@ -15,10 +15,8 @@ from loadtests.engine.planning import duel_plan
 from loadtests.engine.progress import Progress
 from loadtests.engine.watching import Watch, show_web_ui, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
-from loadtests.measuring.end_to_end import end_to_end
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
-from loadtests.measuring.metrics import Collector, serve
 from loadtests.measuring.pauses import after_pauses
 from loadtests.measuring.preflight import preflight, reach
 from loadtests.measuring.rising_load import RisingLoad
@@ -27,7 +25,6 @@ from loadtests.measuring.streams import hear
 from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
-from ros_probe.process import ProbeError
 
 
 class Run:
@@ -39,7 +36,6 @@ class Run:
         self.robots: tuple[Robot, ...] = (settings.robot, *other)
         self.outcome = Outcome(settings, self.robots, Started())
         self.plan, _ = duel_plan(settings, *self.robots)  # preliminary: the WSDLs have not been read
-        self.collector: Collector | None = None
         self.progress = Progress(settings.output.progress)
         self._watch = Watch(self.outcome, REPORT_S if settings.generator.expect else 0.0, self.progress)
 
@@ -141,9 +137,6 @@ class Run:
             try:
                 executor = self.outcome.executor = self._executor()
                 stack.callback(executor.close)
-                if generator.metrics_port is not None:
-                    self.collector = Collector(lambda: executor.recorder, plan.operations)
-                    stack.callback(serve(self.collector, generator.web_host, generator.metrics_port).stop)
                 if generator.web_port is not None:
                     show_web_ui(executor, generator.web_host, generator.web_port, self.progress.say)
                 executor.prepare(self.robots, plan, settings.scenario)
@@ -158,7 +151,6 @@ class Run:
                 return
             if settings.scenario is None:
                 self._pause(plan)
-            self._follow_deliveries()
             self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, self.progress.say)
             if settings.steps.asked and not self._over:
                 self._load_more(plan, executor)
@@ -179,7 +171,7 @@ class Run:
     def _load_more(self, plan: Plan, executor: Executor) -> None:
         """Search the knee."""
         outcome = self.outcome
-        load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self._number, self.progress.say)
+        load = RisingLoad(plan, executor, self.settings, lambda: outcome.interrupted, self.progress.say)
         outcome.knee_searches += load.knees()
 
     @property
@@ -216,21 +208,6 @@ class Run:
         except GeneratorError as error:
             raise RunAborted(ExitCode.UNREACHABLE, str(error)) from None
 
-    def _follow_deliveries(self) -> None:
-        """Measure the time from a delivery request to the message in the application, if the settings say so."""
-        wanted, outcome = self.settings.end_to_end, self.outcome
-        if wanted is None or self._over:
-            return
-        number = self.plan.operations.index("delivery")
-        ways = tuple(name for name in self.plan.interfaces if number in self.plan.offered(name, "wire"))
-        self.progress.say(f"end to end: {wanted.rounds} rounds over {', '.join(ways)} and ROS itself")
-        try:
-            outcome.journeys = end_to_end(
-                self.robots[0], wanted, ways, self.settings.load.seed, lambda: outcome.interrupted, self.progress.say
-            )
-        except ProbeError as error:
-            outcome.invalid.append(f"deliveries could not be followed to the application: {error}")
-
     def _executor(self) -> Executor:
         generator = self.settings.generator
         if generator.expect:
@@ -240,14 +217,8 @@ class Run:
 
     def _carry_out(self, plan: Plan, executor: Executor) -> None:
         """Carry out a plan until its end, Ctrl-C or the robot's death."""
-        self._number(plan)
         carried = Carried(plan)
         self.outcome.carried.append(carried)
         ceiling = self.settings.limits.max_rate if not plan.open_model else None
         executor.run(plan, ceiling, lambda elapsed: self._watch.look(carried, executor.recorder, elapsed))
         self.outcome.cpu_share = max(busiest(executor.members) or 0.0, self.outcome.cpu_share or 0.0)
-
-    def _number(self, plan: Plan) -> None:
-        """Register the series of a plan's segments in the metrics."""
-        if self.collector is not None:
-            self.collector.series_of.update(plan.series_of())

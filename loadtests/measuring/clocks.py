@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 import gevent
 
 from loadtests.measuring.stamps import Stamp
-from loadtests.statistics.end_to_end import Offset
+from loadtests.statistics.streams import Offset
 
 #: How many exchanges a reading chooses from, and how long they may take in all.
 EXCHANGES = 8

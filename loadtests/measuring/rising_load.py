@@ -23,7 +23,6 @@ class RisingLoad:
     Args:
         first: the comparison's plan.
         stopped: returns whether to end.
-        announce: receives each plan before it begins.
         tell: writes progress to the terminal.
     """
 
@@ -31,7 +30,6 @@ class RisingLoad:
     executor: Executor
     settings: Settings
     stopped: Callable[[], bool]
-    announce: Callable[[Plan], None]
     tell: Callable[[str], None]
     _next_segment: int = field(init=False)
 
@@ -60,7 +58,6 @@ class RisingLoad:
             first_segment=self._next_segment,
         )
         self._next_segment += len(plan.segments)
-        self.announce(plan)
         self.executor.run(plan, None, lambda _: self.stopped())
         if self.stopped():
             return None

@@ -11,7 +11,6 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.out_folder import without_folders
 from conformance.commandline.secrecy import SECRETS
 from loadtests.clients.payloads import CATALOGUE, LIBRARY
-from loadtests.measuring.end_to_end import LOST_S
 from loadtests.measuring.environment import describe
 from loadtests.measuring.executor import Member
 from loadtests.measuring.machine import Moment, conditions
@@ -23,10 +22,9 @@ from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.schedule.plan import Plan
 from loadtests.schedule.segment import GAP_S
 from loadtests.settings.settings import Settings
-from loadtests.statistics import counts, end_to_end, figures, modes, over_time, service_levels, streams, verdict
+from loadtests.statistics import counts, figures, modes, over_time, service_levels, streams, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
-from loadtests.statistics.end_to_end import SHARED
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
@@ -34,6 +32,7 @@ from loadtests.statistics.overload import overload
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import between_runs
 from loadtests.statistics.stages import stage_figures
+from loadtests.statistics.streams import SHARED
 
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
@@ -208,7 +207,6 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "heat_map": modes.heat_map(measured),
         "noise_floor": controls,
         "further_interfaces": further_interfaces(measured),
-        **_end_to_end(outcome),
         "streams": _streams(outcome),
         **({"against": compared} if compared else {}),
         "time_series": over_time.time_series(measured),
@@ -264,20 +262,6 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
     if settings is None:
         return None
     return against(measured, controls, settings.tolerance, len(settings.looks), outcome.robots[1].shown)
-
-
-def _end_to_end(outcome: Outcome) -> dict[str, Any]:
-    """Return the `end_to_end`, where deliveries were followed to the application."""
-    settings, journeys = outcome.settings.end_to_end, outcome.journeys
-    if settings is None or not journeys:
-        return {}
-    ways = end_to_end.ways(
-        {way: one.to_application_ns for way, one in journeys.items()},
-        {way: one.answer_ns for way, one in journeys.items()},
-        {way: len(one.errors) for way, one in journeys.items()},
-        int(LOST_S * 1e9),
-    )
-    return {"end_to_end": {"domain_id": settings.domain_id, "topic": outcome.robots[0].delivery_topic, "ways": ways}}
 
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:

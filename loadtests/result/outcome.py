@@ -6,7 +6,6 @@ from typing import Any
 from conformance.commandline.started import Started
 from loadtests.clients.robot import Robot
 from loadtests.measuring.distributed_executor import Executor
-from loadtests.measuring.end_to_end import Journeys
 from loadtests.measuring.machine import Moment
 from loadtests.measuring.pauses import Paused
 from loadtests.measuring.preflight import Findings
@@ -47,7 +46,6 @@ class Outcome:
         robot_process: the process at the robot's address before the comparison, where that is known.
         cpu_share: the busiest worker's share of a core in the comparison.
         knee_searches: results of the searches for the knee.
-        journeys: deliveries from the request to the application, by way.
         heard: what came over each stream.
     """
 
@@ -66,5 +64,4 @@ class Outcome:
     robot_process: RobotProcess | None = None
     cpu_share: float | None = None
     knee_searches: list[dict[str, Any]] = field(default_factory=list)
-    journeys: dict[str, Journeys] = field(default_factory=dict)
     heard: list[Heard] = field(default_factory=list)

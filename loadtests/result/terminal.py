@@ -40,7 +40,6 @@ def summary(document: dict[str, Any]) -> str:
     lines += _counts(document["counts"])
     lines += _stages(document["stages"])
     lines += _medians(document)
-    lines += _end_to_end(document.get("end_to_end"))
     lines += _against(document.get("against"))
     lines += _knees(document)
     lines += _streams(document["streams"])
@@ -163,18 +162,3 @@ def _sure(error_ms: float | None) -> str:
     if error_ms is None:
         return "; the age of the data is not known, because the robot's clock is not"
     return f" (± {error_ms:.3f} ms: the robot's clock)" if error_ms else ""
-
-
-def _end_to_end(found: dict[str, Any] | None) -> list[str]:
-    """Return how long a delivery takes over each way until the application has it."""
-    lines = []
-    for entry in (found or {"ways": []})["ways"]:
-        times, lost = entry["to_application_ms"], entry["lost"] + entry["errors"]
-        answer = entry["answer_ms"]["p50"] if entry["answer_ms"] else None
-        answered = "" if answer is None else f", the response after {answer:.3f} ms"
-        missing = f", {lost} never arrived" if lost else ""
-        lines.append(
-            f"{entry['interface']} to the application: {_ms(times['p50']).strip()} ms at the median, "
-            f"{_ms(times['p90']).strip()} at p90{answered}{missing}"
-        )
-    return lines

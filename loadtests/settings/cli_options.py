@@ -23,7 +23,6 @@ class CliOptions:
         endpoints: override the statement's [endpoints].
         rosbridge: address of the rosbridge.
         against: the other robot.
-        ros_domain_id: the robot's ROS domain, if the statement does not say.
         tolerance: by which share the robot may be slower than the other one.
     """
 
@@ -44,8 +43,6 @@ class CliOptions:
     allow_motion: bool = False
     rosbridge: str | None = None
     against: RobotStatement | None = None
-    end_to_end: bool = False
-    ros_domain_id: int | None = None
     tolerance: float = TOLERANCE
     out: str = ""
     progress: str = "auto"

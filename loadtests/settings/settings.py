@@ -69,7 +69,7 @@ class Generator:
         processes: workers on this machine.
         expect: workers on all machines; 0 when this process alone generates the load.
         master_host, master_port: where the master listens for workers; port 0 picks a free one.
-        web_host: where Locust's web UI (`web_port`) and the metrics for Prometheus (`metrics_port`) listen.
+        web_host: where Locust's web UI (`web_port`) listens.
     """
 
     processes: int = 1
@@ -78,7 +78,6 @@ class Generator:
     master_port: int = 0
     web_host: str = "127.0.0.1"
     web_port: int | None = None
-    metrics_port: int | None = None
 
 
 @dataclass(frozen=True)
@@ -95,23 +94,6 @@ class Output:
     command: str
     about: dict[str, str]
     progress: str = "auto"
-
-
-@dataclass(frozen=True)
-class EndToEnd:
-    """The measurement from the request to the application.
-
-    Attributes:
-        domain_id: the robot's ROS domain.
-        most_rate: the highest rate allowed.
-        longest_s: the measurement ends after this time.
-        rounds: how many deliveries over each way, if time allows.
-    """
-
-    domain_id: int
-    most_rate: float | None
-    longest_s: float
-    rounds: int = 100
 
 
 @dataclass(frozen=True)
@@ -159,7 +141,6 @@ class Settings:
         robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
         load: its rate is None in the closed model.
         against: None where no other robot takes part.
-        end_to_end: None where it is not wanted.
         slo: the service levels of the operations that are measured.
         description: URL or name of the description that the operations come from; None for the paper's robot.
         notes: what the result should say of the choice of operations.
@@ -176,7 +157,6 @@ class Settings:
     generator: Generator
     output: Output
     against: Against | None = None
-    end_to_end: EndToEnd | None = None
     slo: dict[str, ServiceLevel] = field(default_factory=dict)
     description: str | None = None
     notes: tuple[str, ...] = ()

@@ -9,7 +9,7 @@ from conformance.papers_robot.statement import RobotStatement
 from loadtests.schedule.plan import Load
 from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.papers_robot import papers_robot
-from loadtests.settings.settings import Against, EndToEnd, Limits, Output, Settings, SettingsError, Steps, Target
+from loadtests.settings.settings import Against, Limits, Output, Settings, SettingsError, Steps, Target
 
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
@@ -126,7 +126,6 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
         ),
         output=Output(options.out, options.command, statement.robot, options.progress),
-        end_to_end=_end_to_end(options, statement, target.selection.operations, allowed.rate, duration_s),
         slo=target.slo,
         description=target.description,
         notes=target.notes,
@@ -169,23 +168,6 @@ class _Allowed:
             raise SettingsError(
                 f"--duration {duration_s:g}{times} exceeds {self.duration_s:g} s ({self.duration_by}{whose})"
             )
-
-
-def _end_to_end(
-    options: CliOptions,
-    statement: RobotStatement,
-    operations: tuple[str, ...],
-    most_rate: float | None,
-    duration_s: float,
-) -> EndToEnd | None:
-    if not options.end_to_end:
-        return None
-    domain_id = statement.ros.domain_id if options.ros_domain_id is None else options.ros_domain_id
-    if domain_id is None:
-        raise SettingsError("--end-to-end needs the robot's ROS domain: --ros-domain-id or [ros] domain_id")
-    if "delivery" not in operations:
-        raise SettingsError("--end-to-end follows deliveries, which make the robot drive: add --allow-motion")
-    return EndToEnd(domain_id, most_rate, duration_s)
 
 
 def _compared(settings: Settings, options: CliOptions, other: RobotStatement, target: Target) -> Settings:

@@ -63,7 +63,6 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
         *cold(series),
         *repeated(series),
         *_further(result),
-        *_followed(result),
         *_stalled(result),
         *_two_modes(series),
         *_searched(result),
@@ -97,20 +96,6 @@ def _further(result: Mapping[str, Any]) -> Iterator[str]:
                 f"at the median for {way['operation']}, with the {way['client']} client (95 % interval), "
                 f"{ms(way['minus_rest_ms'])} ms more."
             )
-
-
-def _followed(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the median time of a delivery until the application has received it, for each interface."""
-    ways = result.get("end_to_end", {}).get("ways", [])
-    parts = [
-        f"{ms(way['to_application_ms']['p50'])} ms over {way['interface'].upper()}"
-        for way in ways
-        if way["to_application_ms"]["p50"] is not None
-    ]
-    lost = sum(way["lost"] for way in ways)
-    missing = f" {lost:,} deliveries that the robot accepted never arrived." if lost else ""
-    if parts:
-        yield f"Median time until the application has received a delivery: {', '.join(parts)}.{missing}"
 
 
 def _stalled(result: Mapping[str, Any]) -> Iterator[str]:

@@ -13,8 +13,7 @@ from loadtests.measuring.clocks import RobotClock
 from loadtests.measuring.stamps import Stamp, stamp_of
 from loadtests.measuring.streams import listen
 from loadtests.settings.settings import Streams
-from loadtests.statistics.end_to_end import SHARED, Offset
-from loadtests.statistics.streams import stream_figures
+from loadtests.statistics.streams import SHARED, Offset, stream_figures
 
 
 def robot_at(port):

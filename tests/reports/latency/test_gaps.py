@@ -66,21 +66,9 @@ def with_knees(latency):
     latency["knee_search"][2]["curve"] = [step | {"p50_ms": None, "p99_ms": None}]
 
 
-def followed(latency):
-    way = {"count": 0, "lost": 3, "errors": 1, "to_application_ms": QUANTILES, "ci95_ms": {"p50": None, "p99": None}}
-    latency["end_to_end"] = {
-        "domain_id": 7,
-        "topic": "/x",
-        "ways": [
-            way | {"interface": "rest", "answer_ms": QUANTILES, "over_rest": None},
-            way | {"interface": "ros", "answer_ms": None, "over_rest": {"ratio": None, "ci95": None}},
-        ],
-    }
-
-
 @pytest.mark.parametrize(
     "change",
-    [as_in_the_first_version, with_one_interface, invalid, without_an_answer, against_another, with_knees, followed],
+    [as_in_the_first_version, with_one_interface, invalid, without_an_answer, against_another, with_knees],
     ids=lambda change: change.__name__,
 )
 def test_no_cell_and_no_sentence_says_none(latency, change):
