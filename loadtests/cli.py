@@ -30,8 +30,7 @@ from conformance.statement.load import LEVELS_INSTEAD
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 from loadtests.described.device import DESCRIBED_ONLY, Named
-from loadtests.result.baselines import FOLDER, BaselineError, folder_of, newest, store
-from loadtests.result.files import stops_lines, with_unstopped
+from loadtests.result.files import FOLDER, BaselineError, folder_of, newest, stops_lines, store, with_unstopped
 from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, STAGES, CliOptions
 from loadtests.settings.settings import STEP_S, Settings, SettingsError
 from loadtests.settings.settle import (
@@ -44,8 +43,8 @@ from loadtests.settings.settle import (
 )
 
 if TYPE_CHECKING:
+    from loadtests.described.operators import Stopping
     from loadtests.described.run import Described
-    from loadtests.described.stopping import Stopping
 
 DEFAULT_OUT = "out"  # as `roaas certify` does
 #: Threads of NumPy's linear algebra wait for one another by spinning, ten times as long on a busy machine.
@@ -331,7 +330,7 @@ def _stopping_of(settings: Settings) -> Iterator[Stopping]:
     moved = [] if MOVES.isdisjoint(settings.selection.operations) else [settings.robot, *others]
     for robot in moved:
         if robot.rest:
-            from loadtests.described.stopping import Stopping  # noqa: PLC0415 -- it takes 0.3 s
+            from loadtests.described.operators import Stopping  # noqa: PLC0415 -- it takes 0.3 s
 
             yield Stopping.of_papers_robot(robot)
 

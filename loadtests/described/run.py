@@ -13,10 +13,8 @@ from conformance.papers_robot.statement import RobotStatement
 from conformance.target.describing import is_wsdl
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import callable_robot, named_alike, scenario_of
-from loadtests.described.operators import stops_beside
-from loadtests.described.pairs import Choice
-from loadtests.described.stopping import Stopping
-from loadtests.described.streams import streams_to_hear
+from loadtests.described.operators import Stopping, stops_beside
+from loadtests.described.pairs import Choice, streams_to_hear
 from loadtests.result.files import with_operators
 from loadtests.schedule.plan import step_operation
 from loadtests.settings.cli_options import CliOptions

@@ -10,10 +10,8 @@ from conformance.documents.wsdl import WsdlError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import with_addresses
-from loadtests.engine.deciding import until_decided
-from loadtests.engine.planning import duel_plan
-from loadtests.engine.progress import Progress
-from loadtests.engine.watching import Watch, show_web_ui, tell_plan
+from loadtests.engine.planning import duel_plan, until_decided
+from loadtests.engine.watching import Progress, Watch, show_web_ui, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest

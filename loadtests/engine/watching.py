@@ -2,24 +2,24 @@
 
 import math
 import os
+import shutil
+import sys
+import time
 from collections.abc import Callable
 
 import gevent
 
 from conformance.commandline.endings import PARENT_VARIABLE
-from loadtests.engine.liveness import Liveness
-from loadtests.engine.progress import Progress
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
 from loadtests.schedule.arrivals import Schedule
-from loadtests.schedule.plan import Plan
-from loadtests.schedule.rotation import rotation
+from loadtests.schedule.plan import Plan, rotation
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import samples_for_point
 from loadtests.statistics.recorder import Recorder
 
-_OFTEN_S = 0.2
+_LOOKS_S = 0.2
 
 
 def tell_plan(plan: Plan, pacing: str, tell: Callable[[str], None]) -> None:
@@ -76,8 +76,99 @@ def follow_parent(interrupt: Callable[[], None]) -> None:
     """
     parent = int(os.environ.pop(PARENT_VARIABLE, os.getppid()))
     while os.getppid() == parent:
-        gevent.sleep(_OFTEN_S)
+        gevent.sleep(_LOOKS_S)
     interrupt()
+
+
+_OFTEN_S, _SELDOM_S = 1.0, 10.0  # from one line to the next: on a terminal, and elsewhere
+_QUANTILES = (("p50", 0.5), ("p90", 0.9), ("p95", 0.95), ("p99", 0.99))
+
+
+class Progress:
+    """Says what happens.
+
+    Args:
+        mode: `auto` renews one line on a terminal and writes few lines elsewhere; `lines` writes one a second; `none`
+            writes nothing.
+    """
+
+    def __init__(self, mode: str) -> None:
+        self._silent, self._every_s = mode == "none", _SELDOM_S if mode == "auto" else _OFTEN_S
+        self._renews = mode == "auto" and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        self._open = False
+        self._due = 0.0
+        self._before = (0.0, 0)  # when the last line was written, and how many requests were answered by then
+
+    def say(self, message: str) -> None:
+        """Write a line."""
+        if not self._silent:
+            self.end()
+            sys.stderr.write(message + "\n")
+            sys.stderr.flush()
+
+    def look(self, recorder: Recorder, elapsed_s: float, length_s: float) -> None:
+        """Say how far the run is, and its figures so far, if the next line is due."""
+        now = time.monotonic()
+        if self._silent or now < self._due:
+            return
+        line = self._figures(recorder, elapsed_s, length_s)
+        answered = recorder.live.total
+        self._due = now + (_OFTEN_S if self._renews or not answered else self._every_s)
+        self._before = elapsed_s, answered
+        if self._renews:
+            width = shutil.get_terminal_size().columns
+            sys.stderr.write(f"\r{line[: width - 1]}\x1b[K")
+            self._open = True
+        else:
+            sys.stderr.write(line + "\n")
+        sys.stderr.flush()
+
+    def _figures(self, recorder: Recorder, elapsed_s: float, length_s: float) -> str:
+        live, (before_s, before) = recorder.live, self._before
+        failed = sum(failure.count for failure in recorder.failures.values())
+        rate = (live.total - before) / (elapsed_s - before_s) if elapsed_s > before_s else 0.0
+        line = f"{elapsed_s:5.1f} of {length_s:.0f} s: {live.total} requests answered, {rate:.0f}/s, {failed} failed"
+        if not live.total:
+            return line
+        times = ", ".join(f"{name} {live.quantile_ms(share) or 0.0:.3g}" for name, share in _QUANTILES)
+        return f"{line}; {times}, max {live.highest_ns / 1e6:.3g} ms"
+
+    def end(self) -> None:
+        """Go on below a line that was renewed."""
+        if self._open:
+            sys.stderr.write("\n")
+            self._open = False
+
+
+_DEAD_S = 3.0
+_DEAD_REQUESTS = 10
+_LOOK_S = 0.5
+
+
+class Liveness:
+    """Decides by the counts of a run whether the robot is dead.
+
+    Args:
+        report_s: how late the counts may be, in seconds: workers report once a second.
+    """
+
+    def __init__(self, report_s: float) -> None:
+        self._silence_s = _DEAD_S + report_s
+        self._looked_s = 0.0
+        self._alive = (0.0, 0, 0)  # when something had last succeeded; successes and failures until then
+
+    def is_due(self, elapsed_s: float) -> bool:
+        """Return whether the next count is due; counting costs the load generator time."""
+        return elapsed_s - self._looked_s >= _LOOK_S
+
+    def dead_since(self, elapsed_s: float, succeeded: int, failed: int) -> float | None:
+        """Return since when the robot has been silent, in seconds from the start; None unless that is long enough."""
+        self._looked_s = elapsed_s
+        since, before, failed_before = self._alive
+        if succeeded > before or failed - failed_before < _DEAD_REQUESTS:
+            self._alive = (elapsed_s, succeeded, failed if succeeded > before else failed_before)
+            return None
+        return since if elapsed_s - since > self._silence_s else None
 
 
 class Watch:

@@ -1,9 +1,12 @@
-"""The robot's process, if it is on this machine: its command line and processor time; and its restart.
+"""What the figures depend on besides the robot; and the robot's process, if it is on this machine.
 
-The robot's other processes, such as a simulation behind its web services, are not included.
+The process has a command line and processor time, and can be restarted. Other processes of the robot, such as a
+simulation behind its web services, are not included.
 """
 
 import ipaddress
+import os
+import platform
 import re
 import shlex
 import socket
@@ -11,7 +14,9 @@ import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Self
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Self
 
 import gevent
 import psutil
@@ -21,6 +26,8 @@ from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.robot import Robot
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.preflight import Findings
+from loadtests.settings.settings import Output
+from loadtests.statistics.figures import rounded
 
 _SECRET = re.compile(r"^-.*(token|password|secret|key)\b(?!-file)", re.IGNORECASE)
 
@@ -152,3 +159,60 @@ def _until_ready(look: Callable[[], Findings], stopped: Callable[[], bool]) -> N
                 f"the robot did not come back within {_READY_S:g} s of its restart: {'; '.join(findings.messages())}"
             )
         gevent.sleep(_LOOK_S)
+
+
+_PACKAGES = ("roaas", "locust", "gevent", "httptools", "zeep", "requests", "urllib3", "lxml", "numpy", "hdrhistogram")
+
+
+def describe(
+    robot: Robot, output: Output, servers: dict[str, str | None], process: RobotProcess | None
+) -> dict[str, Any]:
+    """Return the `environment` of latency.json.
+
+    Args:
+        robot: addresses.
+        output: the robot's name, vendor and version as the statement gives them, and our command line.
+        servers: Server header by interface.
+        process: the process at the robot's address, where that is known.
+    """
+    return {
+        "cpu": _cpu_model(),
+        "cpus": os.cpu_count() or 1,
+        "memory_mb": psutil.virtual_memory().total // 2**20,
+        "kernel": platform.release(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "versions": _versions(),
+        "command": output.command,
+        "robot_command": process.command or None if process is not None else None,
+        "robot_cpu_share": rounded(process.cpu_share()) if process is not None else None,
+        "robot": {
+            "name": output.about.get("name"),
+            "vendor": output.about.get("vendor"),
+            "version": output.about.get("version"),
+            **robot.shown,
+            **({"rosbridge": robot.rosbridge} if robot.rosbridge else {}),
+            "servers": servers,
+            "same_machine": same_machine(robot),
+        },
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _cpu_model() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()

@@ -21,13 +21,11 @@ from locust.exception import RescheduleTask
 from locust.user.task import LOCUST_STATE_RUNNING, LOCUST_STATE_STOPPING
 
 from loadtests.clients.robot import Robot
-from loadtests.clients.routes import Routes, ScenarioError
-from loadtests.clients.scenario import Client
+from loadtests.clients.scenario import Client, Routes, ScenarioError
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.recording import AFTER_ERROR_S, NS, Recording
-from loadtests.schedule.plan import Plan
-from loadtests.schedule.rotation import rotation
+from loadtests.schedule.plan import Plan, rotation
 from loadtests.settings.settings import Scenario
 
 _PERCENT = 100

@@ -29,9 +29,8 @@ from loadtests.clients.failures import CallError, connect_error, shown
 from loadtests.clients.robot import Robot, Stream
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.clients.wire import now_ns
-from loadtests.measuring.clocks import RobotClock
+from loadtests.measuring.clocks import RobotClock, stamp_of
 from loadtests.measuring.robot_process import is_here, same_machine
-from loadtests.measuring.stamps import stamp_of
 from loadtests.settings.settings import Settings, Streams
 
 _CHUNK = 65_536

@@ -11,16 +11,14 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.out_folder import without_folders
 from conformance.commandline.secrecy import SECRETS
 from loadtests.clients.payloads import CATALOGUE, LIBRARY
-from loadtests.measuring.environment import describe
 from loadtests.measuring.executor import Member
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.pauses import PAUSE_S, Paused
 from loadtests.measuring.preflight import Findings
-from loadtests.measuring.robot_process import same_machine
+from loadtests.measuring.robot_process import describe, same_machine
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
-from loadtests.schedule.plan import Plan
-from loadtests.schedule.segment import GAP_S
+from loadtests.schedule.plan import GAP_S, Plan
 from loadtests.settings.settings import Settings
 from loadtests.statistics import counts, figures, modes, over_time, service_levels, streams, verdict
 from loadtests.statistics.against import EXIT_CODES, Against, against
@@ -28,10 +26,10 @@ from loadtests.statistics.comparisons import AaControl, aa_controls, further_int
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
+from loadtests.statistics.over_time import stage_figures
 from loadtests.statistics.overload import overload
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import between_runs
-from loadtests.statistics.stages import stage_figures
 from loadtests.statistics.streams import SHARED
 
 

@@ -9,8 +9,7 @@ from collections import Counter
 import numpy as np
 
 from loadtests.clients.payloads import VARIANTS
-from loadtests.schedule.plan import Plan
-from loadtests.schedule.rotation import rotation
+from loadtests.schedule.plan import Plan, rotation
 
 _NS = 1_000_000_000
 

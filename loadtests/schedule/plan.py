@@ -11,6 +11,7 @@ Three interfaces take turns in the same way, in sextets; two robots over one int
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, count, product
@@ -20,8 +21,45 @@ import msgspec
 import numpy as np
 
 from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
-from loadtests.schedule.rotation import turns_of_all
-from loadtests.schedule.segment import Segment
+
+GAP_S = 0.010
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of time in which one client calls one interface.
+
+    Attributes:
+        start_ns, end_ns: offsets from the run's start.
+        phase: `warmup`, `duel`, `aa`, `against` (the comparison's blocks of the other robot) or `step`.
+        label: in phase `aa` the name that the interface goes by, `a` or `b`.
+        pair: neighbours that are compared with one another share a number.
+        rate: arrivals per second over all workers; 0 in the closed model.
+        robot: 0, or 1 for the robot that it is compared with.
+        gap: whether it begins with a gap in which no request starts.
+    """
+
+    start_ns: int
+    end_ns: int
+    phase: str
+    interface: str
+    client: str
+    label: str
+    pair: int
+    rate: float
+    robot: int = 0
+    gap: bool = True
+
+    @property
+    def opens_ns(self) -> int:
+        """Return the offset at which its requests may start: after the quiet gap, if it has one."""
+        return self.start_ns + self.gap * min(int(GAP_S * _NS), (self.end_ns - self.start_ns) // 8)
+
+    @property
+    def active_s(self) -> float:
+        """Return for how long its requests may start."""
+        return (self.end_ns - self.opens_ns) / _NS
+
 
 #: REST and SOAP at once, in steps of the load: every other request goes over the other.
 BOTH = "both"
@@ -304,3 +342,39 @@ def step_operation(operations: tuple[str, ...]) -> int:
     """Return the operation of the steps: a read where there is one, because their rates are unusually high."""
     reads = [number for number, name in enumerate(operations) if name not in MOVES]
     return reads[0] if reads else 0
+
+
+#: At most so many turns for each operation are waited for in a block: a rare operation is not called in every block.
+_MOST_TURNS = 4
+
+
+def rotation(offered: Sequence[int], weights: Sequence[int]) -> tuple[int, ...]:
+    """Return the numbers of the operations in the order in which they are called (nginx's smooth weighted round robin).
+
+    Args:
+        offered: the numbers of the operations.
+        weights: of all operations, by number; empty where they are called equally often.
+    """
+    if not weights or not offered:
+        return tuple(offered)
+    own = {number: weights[number] for number in offered}
+    total, credit, made = sum(own.values()), dict.fromkeys(offered, 0), []
+    for _ in range(total // math.gcd(*own.values())):
+        for number, weight in own.items():
+            credit[number] += weight
+        chosen = max(offered, key=lambda number: credit[number])
+        credit[chosen] -= total
+        made.append(chosen)
+    return tuple(made)
+
+
+def share(number: int, weights: Sequence[int], operations: int) -> float:
+    """Return the share of one operation in the requests for all `operations`."""
+    return weights[number] / sum(weights) if weights else 1 / operations
+
+
+def turns_of_all(weights: Sequence[int], operations: int) -> int:
+    """Return how many requests it takes until each operation has been called, up to four for each operation."""
+    if not weights:
+        return operations
+    return min(sum(weights) // math.gcd(*weights), _MOST_TURNS * operations)

@@ -8,8 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from loadtests.schedule.plan import SERIES, Plan, SeriesName
-from loadtests.schedule.segment import Segment
+from loadtests.schedule.plan import SERIES, Plan, Segment, SeriesName
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.recorder import Cell, Recorder, Spans
 from loadtests.statistics.rounds import Unit

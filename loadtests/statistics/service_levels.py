@@ -15,7 +15,7 @@ from scipy import special
 
 from conformance.statement.load import ServiceLevel
 from loadtests.schedule.plan import SeriesName
-from loadtests.schedule.rotation import share as share_of_requests
+from loadtests.schedule.plan import share as share_of_requests
 from loadtests.statistics.figures import quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import SHARES, Floats, Histogram, edges_us
 from loadtests.statistics.measured import Block, Measured, counted

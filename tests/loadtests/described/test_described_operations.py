@@ -13,9 +13,9 @@ from loadtests.clients.robot import Secrets, with_secrets
 from loadtests.described import operations, run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen, named_alike
+from loadtests.described.pairs import streams_to_hear
 from loadtests.described.requests import robot_of
-from loadtests.described.streams import streams_to_hear
-from loadtests.schedule.rotation import rotation, turns_of_all
+from loadtests.schedule.plan import rotation, turns_of_all
 from loadtests.settings.settings import Selection, SettingsError, Target
 
 NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from loadtests.engine.deciding import until_decided
+from loadtests.engine.planning import until_decided
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.settings.settings import Against

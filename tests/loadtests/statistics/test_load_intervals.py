@@ -7,6 +7,7 @@ import pytest
 
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
+from loadtests.statistics.comparisons import judge as judge_ratio
 from loadtests.statistics.figures import quantiles, series
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.intervals import (
@@ -19,7 +20,6 @@ from loadtests.statistics.intervals import (
     samples_for_interval,
     samples_for_point,
 )
-from loadtests.statistics.judgement import judge as judge_ratio
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import time_series
 from loadtests.statistics.recorder import Recorder

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from loadtests.schedule.plan import Load, Plan
+from loadtests.statistics.comparisons import judge
 from loadtests.statistics.figures import series
-from loadtests.statistics.judgement import judge
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import lag_correlation
