@@ -2,7 +2,7 @@
 
 import pytest
 
-from loadtests.engine.watching import Liveness
+from loadtests.statistics.overload import Liveness
 
 
 @pytest.mark.parametrize("report_s", [0.0, 1.0])

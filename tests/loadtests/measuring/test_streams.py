@@ -9,8 +9,8 @@ from jsonpath import JSONPointer
 from websockets.sync.server import serve
 
 from loadtests.clients.robot import Described, Robot, Stream
-from loadtests.measuring.clocks import RobotClock
-from loadtests.measuring.streams import Stamp, listen, stamp_of
+from loadtests.measuring.clocks import RobotClock, Stamp, stamp_of
+from loadtests.measuring.streams import listen
 from loadtests.settings.settings import Streams
 from loadtests.statistics.streams import SHARED, Offset, stream_figures
 
