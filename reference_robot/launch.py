@@ -26,8 +26,7 @@ from reference_robot.ending import Ending
 from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.ros import RosArgumentsError, RosRuntime
 from reference_robot.simulated import SimulatedRobot, SimulationError
-from reference_robot.simulation.delivery import Delivery
-from reference_robot.simulation.requests import DeliveryRequests
+from reference_robot.simulation.delivery import Delivery, DeliveryRequests
 from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import Configuration, load_configuration
 from reference_robot.webservices.endpoint import PortInUseError

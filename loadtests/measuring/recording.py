@@ -19,7 +19,11 @@ AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refuse
 
 
 class LocustFeed:
-    """Adds our requests to the statistics of a Locust environment.
+    """Adds our requests to the statistics of a Locust environment, so that its web UI shows what our histograms hold.
+
+    Locust itself rounds to milliseconds, and its request event costs some 8 us. Here whole buffers of successful
+    requests go in at once, with the histogram's microseconds as keys. Failures, which are rare, go through the event,
+    where other listeners expect them.
 
     Args:
         environment: Locust's.

@@ -6,6 +6,7 @@ reason for the last refusal.
 """
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,8 +25,37 @@ from reference_robot.names import RosNames
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
-from reference_robot.simulation.progress import PATIENCE_S, Progress
 from reference_robot.simulation.pursuit import EXACT, Command, Pursuit
+
+PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
+_NEARER_M: Final = 0.05
+# A control step follows each odometry message, 50 times a second. A longer interval means that the processes were
+# delayed, which must not count as a lack of progress.
+_STEP_S: Final = 0.1
+
+
+class Progress:
+    """The remaining distance to a goal, followed over time.
+
+    Args:
+        now: When the goal was accepted, by any clock in seconds.
+        time_scale: Simulated seconds per second of that clock.
+    """
+
+    def __init__(self, now: float, time_scale: float) -> None:
+        self._time_scale = time_scale
+        self._stepped = now
+        self._nearest = math.inf
+        self._waited_s = 0.0
+
+    def is_lacking(self, remaining: float, now: float) -> bool:
+        """Record the remaining distance in metres; return whether it has not decreased for 20 simulated seconds."""
+        self._waited_s += min(now - self._stepped, _STEP_S) * self._time_scale
+        self._stepped = now
+        if remaining < self._nearest - _NEARER_M:
+            self._nearest, self._waited_s = remaining, 0.0
+        return self._waited_s > PATIENCE_S
+
 
 _FEEDBACK_PERIOD_S: Final = 0.2
 _FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on

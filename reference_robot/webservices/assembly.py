@@ -3,21 +3,17 @@
 from typing import Final, NamedTuple
 
 from reference_robot.webservices.configuration import Configuration
-from reference_robot.webservices.http.address import Address
+from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.listening import REST, SOAP, Listening
-from reference_robot.webservices.nodes.calls import RosCalls
-from reference_robot.webservices.nodes.lifecycle import ManagedNode
+from reference_robot.webservices.nodes.calls import ManagedNode, RosCalls
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
 from reference_robot.webservices.resources.description import OpenApi, Wadl
-from reference_robot.webservices.resources.goal import Goal
-from reference_robot.webservices.resources.graph import GraphList
 from reference_robot.webservices.resources.health import Health as HealthResource
-from reference_robot.webservices.resources.plan import Plan
-from reference_robot.webservices.resources.pose import Pose
-from reference_robot.webservices.resources.velocity import LinearVelocity
-from reference_robot.webservices.resources.velocity import Velocity as VelocityResource
+from reference_robot.webservices.resources.navigation import Goal, Plan
+from reference_robot.webservices.resources.state import GraphList, LinearVelocity, Pose
+from reference_robot.webservices.resources.state import Velocity as VelocityResource
 from reference_robot.webservices.rest import RestInterface
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals

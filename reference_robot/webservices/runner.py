@@ -17,7 +17,7 @@ from reference_robot.ros import RosRuntime
 from reference_robot.webservices.assembly import Endpoints, interfaces
 from reference_robot.webservices.configuration import Configuration, WebSettings
 from reference_robot.webservices.endpoint import EndpointPublisher, bound
-from reference_robot.webservices.http.address import url_of
+from reference_robot.webservices.http.hosts import url_of
 from reference_robot.webservices.http.listening import Listening
 from reference_robot.webservices.http.port import Limits
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode

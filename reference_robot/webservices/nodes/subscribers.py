@@ -4,20 +4,22 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 from time import monotonic
-from typing import Final
+from typing import Any, Final
 
 from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Odometry
 from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 
 from reference_robot.goal_statuses import GoalStatuses
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-from reference_robot.webservices.nodes.transforms import MapTransform
 
 _LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _MISSION_REPORTS: Final = 200
@@ -111,3 +113,33 @@ class RobotSubscribersNode:
     def ask_plan_action(self, goal: ComputePathToPose.Goal) -> Future:
         """Send a ComputePathToPose goal, from the executor's thread; the future holds rclpy's ClientGoalHandle."""
         return self._planner_action.send_goal_async(goal)
+
+
+_MOVING: Final = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+_STATIC: Final = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class MapTransform:
+    """A subscriber that keeps the latest transform from the map to the odometry frame.
+
+    Only one transform is needed out of the many that a robot publishes up to a hundred times a second. So there is no
+    tf2 listener: a message is deserialized only if its bytes contain the map's frame id, which takes a hundredth of the
+    time.
+
+    Attributes:
+        latest: The last geometry_msgs/Transform; None before the first.
+    """
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        self.latest: Any = None
+        self._parent = names.frames.map
+        self._child = names.frames.odom
+        self._mark = self._parent.encode() + b"\0"  # CDR strings end with a zero byte
+        node.create_subscription(TFMessage, names.topics.tf, self._receive, _MOVING, raw=True)
+        node.create_subscription(TFMessage, names.topics.tf_static, self._receive, _STATIC, raw=True)
+
+    def _receive(self, serialized: bytes) -> None:
+        if self._mark in serialized:
+            for stamped in deserialize_message(serialized, TFMessage).transforms:
+                if (stamped.header.frame_id, stamped.child_frame_id) == (self._parent, self._child):
+                    self.latest = stamped.transform

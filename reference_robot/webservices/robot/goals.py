@@ -15,13 +15,13 @@ from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
 from reference_robot.names import Frames
-from reference_robot.webservices.nodes.calls import RosCalls
-from reference_robot.webservices.nodes.lifecycle import ManagedNode
+from reference_robot.webservices.nodes.calls import ManagedNode, RosCalls
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
+from reference_robot.webservices.robot.poses import require_pose
 from reference_robot.webservices.robot.reported_goals import (
     ENDED_TEXTS,
     STATUS_TEXTS,
@@ -30,7 +30,6 @@ from reference_robot.webservices.robot.reported_goals import (
     goal_from_status,
     status_of,
 )
-from reference_robot.webservices.robot.target_poses import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
 # move_base_msgs/MoveBaseActionGoal, a ROS 1 type that only the web interface uses.

@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import dataclass
 from typing import Any
 
-from reference_robot.webservices.nodes.lifecycle import ManagedNode
+from reference_robot.webservices.nodes.calls import ManagedNode
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.robot.odometry import OLDEST, LatestOdometry

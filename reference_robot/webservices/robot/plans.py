@@ -12,14 +12,12 @@ from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
 
 from reference_robot.names import Frames
-from reference_robot.webservices.nodes.calls import RosCalls
-from reference_robot.webservices.nodes.lifecycle import ManagedNode
+from reference_robot.webservices.nodes.calls import ManagedNode, RosCalls
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
-from reference_robot.webservices.robot.frames import inverse, moved
 from reference_robot.webservices.robot.odometry import LatestOdometry
-from reference_robot.webservices.robot.target_poses import planar_pose, require_known_frame
+from reference_robot.webservices.robot.poses import inverse, moved, planar_pose, require_known_frame
 
 _Move: TypeAlias = Callable[[Pose], Pose]
 

@@ -10,7 +10,7 @@ from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
-from reference_robot.webservices.soap.faults import client_fault
+from reference_robot.webservices.soap.envelope import client_fault
 from reference_robot.webservices.soap.service import SoapService
 
 PATH: Final = "/turtlesim_publisher_ws"

@@ -1,4 +1,4 @@
-"""A SOAP service: dispatches a message to its operation and returns the response."""
+"""A SOAP service: dispatches a message to its operation and returns the response; and its WSDL and XSD."""
 
 import logging
 from collections.abc import Awaitable, Callable, Iterable
@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from lxml import etree
 
+from conformance.papers_robot.statement import CONTRACT_DIR
 from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.interface import awaited
 from reference_robot.webservices.http.messages import Request, Response, content
@@ -15,9 +16,7 @@ from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import parsed_content_type
 from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.representation.xml_input import parsed
-from reference_robot.webservices.soap.description import ServiceDescription
-from reference_robot.webservices.soap.envelope import operation_element
-from reference_robot.webservices.soap.faults import SOAP, Fault, FaultCode, client_fault
+from reference_robot.webservices.soap.envelope import SOAP, Fault, FaultCode, client_fault, operation_element
 
 Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: SLF001 - lxml's only name for the class
 
@@ -92,3 +91,36 @@ def _faulted(root: etree._Element, error: Exception) -> Response:
         _LOGGER.error("cannot respond to %s", root.tag, exc_info=error)
         error = Fault(FaultCode.SERVER, "an internal error of the robot; the robot's log has the details")
     return content(500, _MEDIA_TYPE, error.envelope())
+
+
+_WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
+_XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
+_ERRORS_SHOWN: Final = 3
+
+
+class ServiceDescription:
+    """The WSDL and XSD of one service of the contract, ``publishers`` or ``subscribers``, at a path."""
+
+    def __init__(self, name: str, path: str) -> None:
+        self._path = path
+        self._wsdl = etree.parse(CONTRACT_DIR / f"{name}.wsdl")
+        self.xsd = (CONTRACT_DIR / f"{name}.xsd").read_bytes()
+        document = etree.fromstring(self.xsd)
+        self.namespace = str(document.get("targetNamespace"))
+        self._schema = etree.XMLSchema(document)
+
+    def wsdl(self, base: str) -> bytes:
+        """Return the WSDL with the robot's address (WS-I BP R2001) and the location ``?xsd=1`` of its schema."""
+        for address in self._wsdl.iter(f"{_WSDL_SOAP}address"):
+            address.set("location", base + self._path)
+        for schema in self._wsdl.iter(f"{_XSD}import"):
+            schema.set("schemaLocation", f"{base}{self._path}?xsd=1")
+        return etree.tostring(self._wsdl, encoding="utf-8", xml_declaration=True)
+
+    def require_valid(self, element: etree._Element) -> None:
+        """Raise a Client fault for an element that is invalid by the XSD (R2724)."""
+        if not self._schema.validate(element):
+            # libxml2's texts quote only names and values of the message, nothing internal to the robot.
+            log: Any = self._schema.error_log
+            errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
+            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")

@@ -14,7 +14,7 @@ from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity
-from reference_robot.webservices.soap.faults import client_fault
+from reference_robot.webservices.soap.envelope import client_fault
 from reference_robot.webservices.soap.service import Operation, SoapService
 
 PATH: Final = "/turtlesim_subscriber_ws"

@@ -13,10 +13,9 @@ from unique_identifier_msgs.msg import UUID
 from conformance.papers_robot.delivery import EXAMPLE
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.delivery import Delivery, DeliveryRequests
 from reference_robot.simulation.messages import MISSION_REPORTS
 from reference_robot.simulation.office import DEPOT, DESTINATION, SOURCE
-from reference_robot.simulation.requests import DeliveryRequests
 
 FAST = pytest.mark.parametrize("robot", [{"time_scale": 20.0}], indirect=True)
 NEAR = ((69.0, 38.7), (69.0, 39.2), (68.3, 38.7))  # a mission of a few seconds

@@ -14,12 +14,11 @@ from observer import Observer, pose, until
 
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-from reference_robot.simulation.delivery import Delivery
+from reference_robot.simulation.delivery import Delivery, DeliveryRequests
 from reference_robot.simulation.localisation import Localisation
 from reference_robot.simulation.navigation import Navigation
 from reference_robot.simulation.office import DEPOT, OFFICE, SOURCE
 from reference_robot.simulation.planner import Planner
-from reference_robot.simulation.requests import DeliveryRequests
 
 
 def test_a_goal_is_reached_with_feedback_and_shown_while_it_is_active(robot):

@@ -3,9 +3,9 @@
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 
+from reference_robot.simulation.base import SerializedOdometry
 from reference_robot.simulation.kinematics import Motion
 from reference_robot.simulation.messages import quaternion_of
-from reference_robot.simulation.odometry import SerializedOdometry
 
 
 def test_filled_octets_are_the_message_whatever_the_frames_and_the_numbers():

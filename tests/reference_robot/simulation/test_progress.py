@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference_robot.simulation.progress import PATIENCE_S, Progress
+from reference_robot.simulation.navigation import PATIENCE_S, Progress
 
 _STEP_S = 0.02
 

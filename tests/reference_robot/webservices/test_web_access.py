@@ -14,10 +14,9 @@ from web_robot import eventually, problem, running_robot, usage_error
 from conformance.contract.pack import Contract
 from conformance.packs.table1.selftest import REFERENCE
 from conformance.selftest.certifying import Job, run_job
-from reference_robot.webservices.http.address import Address
 from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
-from reference_robot.webservices.http.hosts import AllowedHosts, is_loopback
+from reference_robot.webservices.http.hosts import Address, AllowedHosts, is_loopback
 from reference_robot.webservices.http.messages import Request
 from reference_robot.webservices.http.proxies import TrustedProxies, take_forwarded
 from reference_robot.webservices.representation.problems import Problem

@@ -1,16 +1,48 @@
-"""/robot/navigation/service/plan: a path to the pose in the query string."""
+"""/robot/navigation/: the active goal, which clients read, send and cancel; and a path to a pose in the query."""
 
 import math
 import re
 from typing import Any, Final
 from urllib.parse import unquote_to_bytes
 
+from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.checking import shown
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.representation.reading import NUMBER
-from reference_robot.webservices.resources.resource import Resource, represented, wanted_format
+from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, sent, wanted_format
+from reference_robot.webservices.robot.goals import GOAL, Goals
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
+
+_CREATED: Final = 201
+
+
+class Goal(Resource):
+    """The active goal as a move_base_msgs/MoveBaseActionGoal, with a status that the robot adds."""
+
+    path = "/robot/navigation/action/goal/"
+
+    def __init__(self, goals: Goals, address: Address) -> None:
+        self._goals = goals
+        self._location = address.location(self.path)
+
+    def get(self, request: Request) -> Response:
+        """Return the active goal; raise the Problem 404 if there is none."""
+        media_type = wanted_format(request)
+        return represented(self._goals.followed(), GOAL.name, media_type)
+
+    async def put(self, request: Request) -> Response:
+        """Send a goal to the navigation; return 201 for a new goal, 202 if it displaces another, 200 for a repeat."""
+        media_type = wanted_format(request)
+        status, goal = await self._goals.send(sent(request, GOAL))
+        location = ((b"location", self._location),) if status == _CREATED else ()
+        return represented(goal, GOAL.name, media_type, status, location)
+
+    async def delete(self, _request: Request) -> Response:
+        """Cancel the active goal and return 204; raise the Problem 404 if there is none."""
+        await self._goals.cancel()
+        return NO_CONTENT
+
 
 _NUMBER: Final = re.compile(NUMBER)
 _REQUIRED: Final = ("x", "y")

@@ -1,10 +1,15 @@
-"""/robot/velocity/ and /robot/velocity/linear/: the measured velocity, and velocity commands."""
+"""What the robot does and has: velocity, which clients command; pose, from its odometry; and lists of the ROS graph."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
 
 from geometry_msgs.msg import Twist, Vector3
 
 from reference_robot.webservices.http.messages import Request, Response
 from reference_robot.webservices.representation.shapes import shape_of
-from reference_robot.webservices.resources.resource import Resource, represented, sent, wanted_format
+from reference_robot.webservices.resources.resource import FORMATS, Resource, represented, sent, wanted_format
+from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 
@@ -46,3 +51,32 @@ class LinearVelocity(Resource):
         linear = sent(request, shape_of(Vector3))
         await self._velocity.command_linear(linear)
         return represented(linear, "Vector3", media_type)
+
+
+_WRITERS: Final = {media_type: partial(represented, root="Odometry", media_type=media_type) for media_type in FORMATS}
+
+
+class Pose(Resource):
+    """The latest odometry as a complete nav_msgs/Odometry."""
+
+    path = "/robot/pose/"
+
+    def __init__(self, odometry: LatestOdometry) -> None:
+        self._odometry = odometry
+
+    def get(self, request: Request) -> Response:
+        """Return the odometry; raise the Problem 503 before the first message."""
+        return self._odometry.written(_WRITERS[wanted_format(request)])
+
+
+class GraphList(Resource):
+    """A list of topics or services that is read from the ROS graph for each request; ``root`` is its XML element."""
+
+    def __init__(self, path: str, root: str, entries: Callable[[], list[dict[str, str]]]) -> None:
+        self.path = path
+        self._root = root
+        self._entries = entries
+
+    def get(self, request: Request) -> Response:
+        """Return the list in the format that the client prefers."""
+        return represented(self._entries(), self._root, wanted_format(request))
