@@ -6,20 +6,15 @@ code is 1 if a target is missed. ``--seconds`` sets the length of each measureme
 """
 
 import argparse
-import asyncio
 import os
-import resource
-import socket
 import statistics
 import sys
 import time
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import pairwise
 
-import uvloop
 from loader import Call, Load, alternately, load
 from programs import Footprint, Robot, answers_to, report, running_bare, running_robot
 
@@ -42,9 +37,6 @@ SERVER_CPUS, LOADER_CPUS = ({0}, {1}) if {0, 1} <= os.sched_getaffinity(0) else 
 MANY_CONNECTIONS = 32
 # Requests a second on 32 connections
 LEAST_RATES = {"GET pose": 30_000, "PUT delivery": 20_000, "SOAP ExecuteDeliveryRequest": 8_000}
-IDLE_CONNECTIONS, MOST_BESIDE_IDLE = 1000, 1.2  # times p50 without them
-CROWD, HUNG = 10_000, 30.0  # connections at once; seconds without a response
-LINGER = 3.0  # seconds after which refused connections no longer take descriptors of the robot
 REQUESTS_FOR_GROWTH = 200_000
 MORE_TIMES = 3
 MOST_GROWTH = 0.01  # by as many again
@@ -91,12 +83,8 @@ def main() -> int:
                 met.append(back_to_back(name, call, yardsticks(call), most, chosen.seconds))
             for name, (call, _) in asked.items():
                 met.append(now_and_then(name, call, yardsticks(call), 5 * chosen.seconds))
-        _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # after the robot's start, which sets its own limit
         for name, (call, _) in asked.items():
             met.append(many_connections(name, call, yardsticks(call), LEAST_RATES[name], chosen.seconds))
-            met.append(beside_idle(name, call, chosen.seconds))
-            met.append(crowd(name, call))
         met.append(growth(robot, before))
     print("all targets met" if all(met) else "targets missed")
     return 0 if all(met) else 1
@@ -159,63 +147,6 @@ def many_connections(name: str, call: Call, yardsticks: dict[str, Call], least: 
         f"{name}, {MANY_CONNECTIONS} connections: {text} a second (robot at least {least:,}), {measured.errors} errors",
         met=measured.rate >= least and not measured.errors,
     )
-
-
-def beside_idle(name: str, call: Call, seconds: float) -> bool:
-    """Measure a request alternately with and without idle connections; print the ratio's median over the rounds."""
-    rounds = []
-    for _ in range(ROUNDS):
-        alone = load(call, 1, seconds)
-        with ExitStack() as stack:
-            for _ in range(IDLE_CONNECTIONS):
-                stack.enter_context(socket.create_connection((call.host, call.port)))
-            rounds.append({"alone": alone, "beside": load(call, 1, seconds)})
-    middle, tail = (
-        statistics.median(getattr(turn["beside"], of) / getattr(turn["alone"], of) for turn in rounds)
-        for of in ("median_us", "p99_us")
-    )
-    errors = sum(turn["beside"].errors for turn in rounds)
-    return report(
-        f"{name}, {IDLE_CONNECTIONS:,} idle connections: p50/p99 {told(rounds)} us, {middle:.2f} times the p50 "
-        f"(at most {MOST_BESIDE_IDLE}), {tail:.2f} times the p99, {errors} errors",
-        met=middle <= MOST_BESIDE_IDLE and not errors,
-    )
-
-
-def crowd(name: str, call: Call) -> bool:
-    """Open 10,000 connections at once, with a request on each; all must be served or refused, and one later served.
-
-    The robot closes a connection whose request takes 10 s to come, as it may on a busy machine.
-    """
-    began = time.monotonic()
-    outcomes = Counter(uvloop.run(_outcomes(call)))
-    took = time.monotonic() - began
-    time.sleep(LINGER)
-    later = uvloop.run(_outcome(call))
-    return report(
-        f"{name}, {CROWD:,} connections at once: {dict(outcomes.most_common())} in {took:.1f} s, then {later}",
-        # Too many open files, of this process or of the machine, are an OSError.
-        met=not outcomes["hung"] and not outcomes["OSError"] and later in {"200", "204"},
-    )
-
-
-async def _outcomes(call: Call) -> list[str]:
-    return await asyncio.gather(*(_outcome(call) for _ in range(CROWD)))
-
-
-async def _outcome(call: Call) -> str:
-    """Return the status of a request on a connection of its own, what broke the connection, or ``hung``."""
-    try:
-        async with asyncio.timeout(HUNG):
-            reader, writer = await asyncio.open_connection(call.host, call.port)
-            writer.write(call.octets())
-            line = await reader.readline()
-            writer.close()
-    except TimeoutError:
-        return "hung"
-    except OSError as error:
-        return type(error).__name__
-    return line[9:12].decode() or "closed"
 
 
 def idle(robot: Robot) -> list[bool]:

@@ -5,38 +5,28 @@ servers, is killed and restarted every minute. The exit code is 1 unless
 
 - good clients always get a response, and no 5xx but 503 (or the SOAP fault that says the same);
 - hostile clients get only the expected statuses, and the robot's log has no traceback;
-- memory stays within 5 % of its size after the first tenth, descriptors and threads where they were;
-- the good clients' p99 at the end is within 20 % of the beginning's, both under the same load. A bare application,
-  loaded alternately with the robot, shows how much slower the machine itself has become; that is taken out.
-
-It also prints how p99 and memory change per hour after the first tenth, with 95 % intervals.
+- memory stays within 5 % of its size after the first tenth, descriptors and threads where they were.
 """
 
 import argparse
 import contextlib
 import http.client
 import json
-import math
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from programs import HERE, Footprint, answers_to, report, running_bare, running_robot, started
+from programs import HERE, Footprint, report, running_robot, started
 from robot import DELIVERY, ENVELOPE
-from scipy import stats
 
-RATE = 100.0  # good requests a second, and as many to the bare application
-WINDOWS = 30  # of a run, each with a p99 and a size of memory, to which slopes are fitted
-SLICES = 10  # of a window; its p99 is the median of theirs, so that a neighbour's burst is none of the robot's
-MOST_GROWTH, MOST_SLOWER = 0.05, 0.20
+RATE = 100.0  # good requests a second
+MOST_GROWTH = 0.05
 DEADLINE = 10.0  # seconds for an answer
 BACK = 20.0  # seconds for the robot to be served again, and for what is left to go
 SETTLED = 75.0  # seconds after which idle connections are gone
@@ -56,10 +46,8 @@ ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seld
 
 @dataclass
 class Good:
-    """The results of good clients: response times in ms, each with the time when it was due, and errors."""
+    """What good clients got: statuses, and what was wrong."""
 
-    robot: list[tuple[float, float]] = field(default_factory=list)
-    bare: list[tuple[float, float]] = field(default_factory=list)
     statuses: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)
 
@@ -70,14 +58,11 @@ class Client:
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=DEADLINE)
 
-    def ask(self, method: str, target: str, body: str = "") -> tuple[int, bytes, float]:
-        """Send a request; return status, body, and response time in ms."""
-        fields = {"Content-Type": "text/xml"} if body else {}
-        began = time.perf_counter()
-        self._connection.request(method, target, body or None, fields)
+    def ask(self, method: str, target: str, body: str = "") -> tuple[int, bytes]:
+        """Send a request; return status and body."""
+        self._connection.request(method, target, body or None, {"Content-Type": "text/xml"} if body else {})
         answer = self._connection.getresponse()
-        content = answer.read()
-        return answer.status, content, (time.perf_counter() - began) * 1000
+        return answer.status, answer.read()
 
     def close(self) -> None:
         """Close the connection."""
@@ -91,7 +76,6 @@ class Soak:
         self.seconds, self.log, self._domain = seconds, log, f"--domain-id={domain_id}"
         self.good = Good()
         self.warm, self.left = Footprint(0, 0, 0, 0), Footprint(0, 0, 0, 0)
-        self.used: list[tuple[float, Footprint]] = []  # s since the start, and what the web services use
         self.hostile: dict[str, dict[str, int]] = {}
         self.restarts = 0
 
@@ -103,9 +87,7 @@ class Soak:
             robot = stack.enter_context(running_robot("--attach", self._domain, stderr=log))
             pid, rest, soap = robot.pids[0], robot.rest.port, robot.soap.port
             self._await_pose(rest)
-            bare, _ = stack.enter_context(running_bare(answers_to([replace(robot.rest, target="/robot/pose/")])))
             clients = {False: Client(rest), True: Client(soap)}
-            yardstick = Client(bare)
             before = Footprint.of(pid)
             command = (sys.executable, HERE / "hostile.py", rest, soap)
             hostile, _ = stack.enter_context(started(*command, stdin=subprocess.PIPE))
@@ -115,14 +97,11 @@ class Soak:
             while (now := time.monotonic() - began) < self.seconds:
                 if not self.warm.threads and now > tenth:
                     self.warm = Footprint.of(pid)
-                # None in the last part, whose time is compared with that of the first.
                 if now > next_kill and now < self.seconds - 2 * tenth:
                     next_kill = now + max(tenth, 60.0)
                     self._restart(simulation)
-                self._ask(clients, yardstick, asked, now)
+                self._ask(clients, asked)
                 asked += 1
-                if asked % RATE == 0:
-                    self.used.append((now, Footprint.of(pid)))
                 if asked % (10 * RATE) == 0:
                     print(f"{now:5.0f} s: {dict(self.good.statuses)}, {Footprint.of(pid)}", flush=True)
                 time.sleep(max(0.0, began + asked / RATE - time.monotonic()))
@@ -135,11 +114,11 @@ class Soak:
             self.left = self._settled(pid, before)
             self.warm.descriptors, self.warm.threads = before.descriptors, before.threads
 
-    def _ask(self, clients: dict[bool, Client], yardstick: Client, number: int, now: float) -> None:
+    def _ask(self, clients: dict[bool, Client], number: int) -> None:
         name, is_soap, method, target, body = ASKED[number * 7 % len(ASKED)]
         client = clients[is_soap]
         try:
-            status, content, took = client.ask(method, target, body)
+            status, content = client.ask(method, target, body)
         except (OSError, http.client.HTTPException) as error:
             self.good.wrong[f"{name}: {type(error).__name__}: {error}"] += 1
             client.close()
@@ -148,12 +127,6 @@ class Soak:
         self.good.statuses[f"{status}"] += 1
         if status >= 400 and not refused:  # noqa: PLR2004 - RFC 9110 15.5
             self.good.wrong[f"{name}: {status} {content[:200]!r}"] += 1
-        if name == "pose" and not refused:
-            self.good.robot.append((now, took))
-            try:
-                self.good.bare.append((now, yardstick.ask("GET", "/robot/pose/")[2]))
-            except (OSError, http.client.HTTPException):
-                yardstick.close()  # it drops idle connections after a few seconds
 
     def _restart(self, simulation: list[subprocess.Popen[str]]) -> None:
         simulation[0].kill()
@@ -195,58 +168,11 @@ class Soak:
             time.sleep(1.0)
 
 
-def p99(times: list[tuple[float, float]], start: float, end: float) -> float:
-    """Return the p99 of a time window in ms: the median over its slices; NaN if there was no response."""
-    length = (end - start) / SLICES
-    found = []
-    for number in range(SLICES):
-        begin = start + number * length
-        within = [took for asked, took in times if begin <= asked < begin + length]
-        if len(within) > 1:
-            found.append(statistics.quantiles(within, n=100)[-1])
-    return statistics.median(found) if found else math.nan
-
-
-def busy(used: list[tuple[float, Footprint]], start: float, end: float) -> float:
-    """Return the share of a processor that was used in a window."""
-    within = [(at, footprint.processor) for at, footprint in used if start <= at < end]
-    return (within[-1][1] - within[0][1]) / (within[-1][0] - within[0][0]) if len(within) > 1 else math.nan
-
-
-def memory(used: list[tuple[float, Footprint]], start: float, end: float) -> float:
-    """Return the median size of memory in a window, MB; NaN if it was not measured."""
-    within = [footprint.megabytes for at, footprint in used if start <= at < end]
-    return statistics.median(within) if within else math.nan
-
-
-def slope(of: Callable[[float, float], float], seconds: float) -> str:
-    """Return the change per hour of a figure of a window, with its 95 % interval (Theil and Sen's), as a text.
-
-    The estimate is the median of the slopes between all pairs of windows, so that a neighbour's bursts count little.
-    """
-    first, length = seconds / 10, seconds * 9 / 10 / WINDOWS
-    starts = [first + number * length for number in range(WINDOWS)]
-    found = [(start / 3600, value) for start in starts if not math.isnan(value := of(start, start + length))]
-    hours, values = zip(*found, strict=True)
-    fitted = stats.theilslopes(values, hours)
-    return f"{fitted.slope:+.2f} an hour ({fitted.low_slope:+.2f} to {fitted.high_slope:+.2f})"
-
-
 def judged(soak: Soak) -> list[bool]:
     """Print the results, line by line; returns which are met."""
     good, warm, left = soak.good, soak.warm, soak.left
-    fifth = soak.seconds / 5
-    first, last = (fifth / 2, fifth * 1.5), (soak.seconds - fifth, soak.seconds)
-    robot, bare = ([p99(times, *window) for window in (first, last)] for times in (good.robot, good.bare))
-    machine = max(1.0, bare[1] / bare[0])
-    slower = robot[1] / robot[0] / machine - 1
-    # A machine that is overloaded lets those wait longest who ask it for most, which the bare application does not.
-    work = [busy(soak.used, *window) for window in (first, last)]
     log = soak.log.read_text(encoding="utf-8")
     grown = left.megabytes / warm.megabytes - 1
-    slopes = [slope(partial(p99, times), soak.seconds) for times in (good.robot, good.bare)]
-    print(f"p99 of GET pose, ms: {slopes[0]}; of the bare application {slopes[1]}")
-    print(f"memory, MB: {slope(partial(memory, soak.used), soak.seconds)}")
     return [
         report(
             f"good clients: {dict(good.statuses)} over {soak.restarts} restarts, wrong {dict(good.wrong)}",
@@ -262,12 +188,6 @@ def judged(soak: Soak) -> list[bool]:
         ),
         report(f"descriptors: {warm.descriptors}, then {left.descriptors}", met=left.descriptors <= warm.descriptors),
         report(f"threads: {warm.threads}, then {left.threads}", met=left.threads <= warm.threads),
-        report(
-            f"p99 of GET pose: {robot[0]:.2f} ms, then {robot[1]:.2f}; of the bare application {bare[0]:.2f}, then "
-            f"{bare[1]:.2f}: {slower:+.0%} beside the machine (at most {MOST_SLOWER:+.0%}); the robot took "
-            f"{work[0]:.0%} of a processor, then {work[1]:.0%}",
-            met=slower <= MOST_SLOWER,
-        ),
     ]
 
 
