@@ -269,7 +269,7 @@ class _Quiet(WSGIRequestHandler):
 def serving(device: Device) -> Iterator[str]:
     """Serve a device; yield scheme, host and port."""
     server = make_server("127.0.0.1", 0, device.app, _Server, _Quiet)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}"
     server.shutdown()
     server.server_close()

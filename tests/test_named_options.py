@@ -107,7 +107,7 @@ class Guarded(BaseHTTPRequestHandler):
 
 def test_diff_of_a_guarded_description_names_no_option():
     with ThreadingHTTPServer(("127.0.0.1", 0), Guarded) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
+        Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         url = f"http://127.0.0.1:{server.server_port}/openapi.json"
         done = click.testing.CliRunner().invoke(roaas.main, ["diff", url, url])
         server.shutdown()

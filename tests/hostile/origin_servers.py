@@ -81,7 +81,7 @@ def serving(answers: Mapping[str, Answer] | None = None) -> Iterator[Server]:
     listening = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     listening.daemon_threads = True
     server.url = f"http://127.0.0.1:{listening.server_port}"
-    threading.Thread(target=listening.serve_forever, daemon=True).start()
+    threading.Thread(target=listening.serve_forever, args=(0.01,), daemon=True).start()
     yield server
     listening.shutdown()
     listening.server_close()

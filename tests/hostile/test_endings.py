@@ -263,7 +263,7 @@ def test_a_guard_stops_the_device_unless_that_is_done(told, tmp_path):
         "request": base64.b64encode(request).decode(),
     }
     given = json.dumps({"stops": [stop], "for_s": 60, "deadline_s": 10}).encode() + b"\n"
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     with subprocess.Popen((sys.executable, "-I", "-S", _GUARD), stdin=subprocess.PIPE) as guard:
         guard.stdin.write(given + told.last)
         guard.stdin.close()

@@ -574,7 +574,7 @@ def wired_device(faults: Collection[str] = (), styles: Collection[str] = ()) -> 
     """Serve a rack in threads; yields its base URL."""
     handler = type("Handler", (_Handler,), {"rack": Rack(styles, faults)})
     server = _Server(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
     thread.start()
     try:
         yield f"http://127.0.0.1:{server.server_port}"

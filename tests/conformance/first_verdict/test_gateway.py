@@ -58,7 +58,7 @@ def gateway(device: str, status: int, absent: range, patience_s: float) -> Itera
     with ThreadingHTTPServer(("127.0.0.1", 0), _Gateway) as server:
         server.device, server.status, server.absent, server.count = urlsplit(device).netloc, status, absent, 0
         server.patience_s = patience_s
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         yield f"http://127.0.0.1:{server.server_port}"
         server.shutdown()
 

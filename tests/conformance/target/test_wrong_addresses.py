@@ -53,7 +53,7 @@ def server(kind: str, context: ssl.SSLContext | None = None) -> Iterator[str]:
         running.handle_error = lambda *_: None
         if context is not None:
             running.socket = context.wrap_socket(running.socket, server_side=True)
-        threading.Thread(target=running.serve_forever, daemon=True).start()
+        threading.Thread(target=running.serve_forever, args=(0.01,), daemon=True).start()
         yield f"127.0.0.1:{running.server_port}"
         running.shutdown()
 

@@ -89,7 +89,7 @@ def _protected(algorithm="SHA-256", lasts=1_000_000):
             pass
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}/api", state
     server.shutdown()
     server.server_close()
