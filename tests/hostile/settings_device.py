@@ -2,25 +2,17 @@
 
 import asyncio
 import json
-from contextlib import closing
 
 from aiohttp import web
-from small_device import REFUSED, answers, described, small_device
+from driven_device import driven
+from small_device import REFUSED, answers, described
 
-from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.rules.description.test_lives import written_is_read
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Calls, Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.verdict.effort import Effort
-from conformance.verdict.run import Run
 
 _MEMBERS = {
     "volume": {"type": "integer", "minimum": 0, "maximum": 10},
@@ -100,12 +92,7 @@ class Settings:
 
 def lived(device, folder):
     """Return what of a device's settings reads otherwise than it was written."""
-    description, routes = device.description()
-    contract = Contract.load(write_described_pack(folder, description, description))
-    with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
-        statement = Statement(endpoints=Endpoints(rest=url), calls=Calls(allow=("PUT *", "PATCH *")))
-        run = Run(statement=statement, contract=contract, effort=Effort("quick"))
-        api = RestInterface(run, client, alive=lambda: True)
+    with driven(*device.description(), folder) as (api, contract, _):
         try:
             trace = lifecycles.play(api, Values({}, collections_of(operations_of(contract))))
         except NotPossibleError:

@@ -3,27 +3,18 @@
 import asyncio
 import json
 import time
-from contextlib import closing
 
 from aiohttp import web
-from small_device import REFUSED, answers, described, small_device
+from driven_device import driven
+from small_device import REFUSED, answers, described
 
-from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.rules.description import test_lives as rules
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.other_exchanges import OtherExchanges
-from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Calls, Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Listener
-from conformance.verdict.effort import Effort
-from conformance.verdict.run import Run
 
 WRITTEN = {
     "label": {"type": "string", "minLength": 1, "maxLength": 20},
@@ -346,31 +337,15 @@ class Things:
         return web.json_response(body, headers=headers)
 
 
-class _Kept(Listener):
-    """Keeps the exchanges of a life."""
-
-    def __init__(self):
-        self.exchanges = []
-
-    def answered(self, exchange):
-        self.exchanges.append(exchange)
-
-
 def blamed(description, routes, folder):
     """Return the requirements by which the lives of a device's things fail, with what was found."""
-    contract = Contract.load(write_described_pack(folder, description, description))
-    with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
-        statement = Statement(
-            endpoints=Endpoints(rest=url), calls=Calls(allow=("POST *", "PUT *", "PATCH *", "DELETE *"))
-        )
-        run = Run(statement=statement, contract=contract, effort=Effort("quick"))
-        api = RestInterface(run, client, alive=lambda: True)
+    with driven(description, routes, folder) as (api, contract, kept):
         operations = operations_of(contract)
         api.working.update(dict.fromkeys(one.label for one in operations))
-        client.connection.listeners += [OtherExchanges(api), kept := _Kept()]
+        api.client.connection.listeners.insert(0, OtherExchanges(api))
         trace = lifecycles.play(api, Values({}, collections_of(operations)))
     cases = [(one.requirement, case) for one in RULES for case in one.judge(trace)]
-    checkers = RestCheckers(contract, url)
+    checkers = RestCheckers(contract, api.client.base_url)
     cases += [(case.requirement, case) for exchange in kept.exchanges for case in checkers(exchange)]
     wrong = {id_: f"{case.expected}: {case.observed}" for id_, case in cases if not case.holds}
     return {id_: text for id_, text in wrong.items() if id_.startswith(("description/", "robustness/"))}

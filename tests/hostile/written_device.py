@@ -2,28 +2,19 @@
 
 import itertools
 import json
-from contextlib import closing
 
 from aiohttp import web
-from small_device import REFUSED, answers, described, error, small_device
+from driven_device import driven
+from small_device import REFUSED, answers, described, error
 
-from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import PatchError, merged, partly_patched, patched
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.values import Values
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.scenarios.own_things import own_things
 from conformance.scenarios.survey import survey
-from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Calls, Statement
-from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Listener
-from conformance.verdict.effort import Effort
-from conformance.verdict.run import Run
 
 _PARTS = {
     "code": {"type": "string", "pattern": "^[A-Z]{2}[0-9]{3}$", "examples": ["AB100"]},
@@ -285,29 +276,12 @@ def _types(schema):
     return schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
 
 
-class _Kept(Listener):
-    def __init__(self):
-        self.exchanges = []
-
-    def answered(self, exchange):
-        """Keep an exchange."""
-        self.exchanges.append(exchange)
-
-
 def blamed(device, folder):
     """Return what is wrong in a device by the survey and the things that the run has created: texts by requirement."""
-    description, routes = device.description()
-    contract = Contract.load(write_described_pack(folder, description, description))
-    with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
-        statement = Statement(
-            endpoints=Endpoints(rest=url), calls=Calls(allow=("POST *", "PUT *", "PATCH *", "DELETE *"))
-        )
-        run = Run(statement=statement, contract=contract, effort=Effort("quick"))
-        api = RestInterface(run, client, alive=lambda: True)
-        client.connection.listeners += [kept := _Kept()]
+    with driven(*device.description(), folder) as (api, contract, kept):
         values = Values({}, collections_of(operations_of(contract)))
         survey.play(api, values)
         own_things.play(api, values)
-    checkers = RestCheckers(contract, url)
+    checkers = RestCheckers(contract, api.client.base_url)
     cases = [one for exchange in kept.exchanges for one in checkers(exchange) if not one.holds]
     return {one.requirement: f"{one.expected}: {one.observed}" for one in cases if one.requirement[:5] != "http/"}

@@ -1,21 +1,17 @@
 """What is kept of the exchanges of checks that no scenario records."""
 
-from contextlib import closing
-
 import pytest
 from aiohttp import web
-from small_device import REFUSED, answers, described, error, reading, small_device
+from driven_device import driven
+from small_device import REFUSED, answers, described, error, reading
 
 from conformance.api.rest.interface import RestInterface
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.scenarios.other_exchanges import OtherExchanges, others
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
-from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Calls, Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
-from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _LEVEL = {"name": "level", "in": "query", "required": True, "schema": {"type": "integer", "minimum": 0}}
@@ -144,14 +140,11 @@ class _Tubes:
 def test_what_is_missing_or_there_again_is_read_once_more_after_a_wait(tmp_path, broken):
     tubes = _Tubes(broken=broken)
     document, routes = tubes.served()
-    contract = Contract.load(write_described_pack(tmp_path, document, document))
-    with small_device(document, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
-        statement = Statement(endpoints=Endpoints(rest=url), calls=Calls(allow=("POST *", "DELETE *")))
-        api = RestInterface(Run(statement=statement, contract=contract, effort=Effort("quick")), client)
-        client.connection.listeners.append(kept := OtherExchanges(api))
+    with driven(document, routes, tmp_path) as (api, _, _):
+        api.client.connection.listeners.append(kept := OtherExchanges(api))
         api.working.update(dict.fromkeys(("POST /tubes", "GET /tubes/{id}")))
         for _ in range(7):
-            client.send("POST", "/tubes")
+            api.client.send("POST", "/tubes")
         others.play(api, kept)
     deleted = [int(one.rpartition("/")[2]) for one in tubes.sent if one.startswith("DELETE")]
     assert {number % 3 for number in deleted} == {0, 1, 2}, "a thing in each state"

@@ -4,10 +4,11 @@ import threading
 from contextlib import closing
 
 import pytest
+from driven_device import Kept
 from toy_server import Handler, server_of
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Outgoing
+from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 from conformance.transport.parallel import is_busy, send_together
 
 CLIENTS = 4
@@ -25,17 +26,9 @@ class Together(Handler):
         self.send(status, self.path.encode())
 
 
-class Heard(Listener):
-    def __init__(self):
-        self.exchanges = []
-
-    def answered(self, exchange):
-        self.exchanges.append(exchange)
-
-
 @pytest.fixture
 def client():
-    connection = Connection(timeout_s=60.0, listeners=[Heard()])
+    connection = Connection(timeout_s=60.0, listeners=[Kept()])
     to_server = server_of(Together, all_here=threading.Barrier(CLIENTS, timeout=60.0))
     with to_server as server, closing(HttpClient(server.url, connection)) as client:
         yield client
