@@ -31,7 +31,7 @@ class Kept(Listener):
 
 @contextmanager
 def driven(description: Any, routes: Any, folder: Path) -> Iterator[tuple[RestInterface, Contract, Kept]]:
-    """Serve a device on which all may be called; yields its interface at effort quick, its contract, and what is sent."""
+    """Serve a device that lets a run call all; yields its interface at effort quick, its contract, and what is sent."""
     contract = Contract.load(write_described_pack(folder, description, description))
     with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
         allowed = Calls(allow=("POST *", "PUT *", "PATCH *", "DELETE *"))
