@@ -1,19 +1,16 @@
 """Drive a robot by velocity commands and record a trace; drive_rules judges the trace."""
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from http import HTTPStatus
 from typing import Final
 
 from conformance.measures.samples import SEVERAL
-from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot import drive_rules, windows
 from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
-from conformance.packs.table1.robot.renewing import Renewing, renewed
-from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
@@ -45,7 +42,6 @@ class Drive:
         self.trace = Trace(self.clock.now())
         self.aside: Callable[[int], object] = lambda _turn: None
         self._turn_at = 0.0
-        self._crowded = False
 
     def command(
         self,
@@ -105,9 +101,15 @@ class Drive:
         return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
+        """Send the last command again as it was sent, as another resource or format could hide a fault of this one."""
         last = self.trace.last_command
         if last is not None:
-            self.trace = self.trace.commanded(renewed(self.robot, last))
+            request, sent = last.exchange.request, self.clock.now()
+            path = LINEAR if last.linear_only else VELOCITY
+            headers = (("Content-Type", request.media_type), *ACCEPT_JSON)
+            exchange = self.robot.rest.send("PUT", path, headers=headers, body=request.body)
+            again = replace(last, sent=sent, answered=self.clock.now(), exchange=exchange, renewal=True)
+            self.trace = self.trace.commanded(again)
 
     @property
     def holds_until(self) -> float:
@@ -126,49 +128,20 @@ class Drive:
         return hold_s is not None and self.look_s > hold_s
 
     @property
-    def paces(self) -> bool:
-        """Return whether a velocity must be renewed beside the looks, as a look takes too long to renew it between two.
-
-        Not where the robot limits the rate of requests, or answers several at once more slowly.
-        """
-        # Whoever simulates the clock does so in one thread.
-        if self._crowded or self.clock is not WALL_CLOCK:
-            return False
-        return self._looks_long and self.robot.rest.connection.request_rate is None
-
-    @property
-    def _looks_long(self) -> bool:
+    def looks_long(self) -> bool:
         """Return whether a look takes so long that a renewal after it may be late."""
         hold_s = self.robot.limits.hold_s
         return hold_s is not None and self.look_s > _LOOK_SHARE * hold_s
 
-    @contextmanager
-    def renewing(self, command: Command) -> Iterator[Renewing]:
-        """Renew a command beside all that is done in the context, and record the renewals at its end."""
-        paced = Renewing(self.robot, command)
-        try:
-            with paced:
-                yield paced
-        finally:
-            self.trace = replace(self.trace, commands=(*self.trace.commands, *paced.commands))
-            self._crowded = self._crowded or paced.is_crowded
+    def hold(self, velocity: Velocity) -> Callable[[], bool]:
+        """Command a velocity; return what says whether it certainly has not ended since.
 
-    @contextmanager
-    def held(self, velocity: Velocity) -> Iterator[Callable[[float], bool]]:
-        """Command a velocity, and hold it beside the reads in the context where these take too long to renew it.
-
-        Yields a function that returns whether the velocity certainly has not ended since a time, s of the run's clock.
         If it has, the robot may have slowed down and sped up again between two reads.
         """
         self.command(velocity)
-        last = self.trace.last_command
-        if velocity == STILL or last is None or not self._looks_long:
-            yield lambda _since: True
-        elif self.paces:
-            with self.renewing(last) as renewing:
-                yield lambda since: renewing.lasted(self.clock.now(), since)
-        else:
-            yield lambda _since: self.clock.now() <= self.holds_until
+        if velocity == STILL or not self.looks_long:
+            return lambda: True
+        return lambda: self.clock.now() <= self.holds_until
 
     def refresh(self, velocity: Velocity) -> None:
         """Command a velocity again, and wait until the robot reaches it if it had ended in the meantime."""
@@ -232,9 +205,7 @@ class Drive:
             within: time allowed, s; by default the settle time.
             since: start of that time, s of the run's clock; by default the response to the last command.
         """
-        limits, last = self.robot.limits, self.trace.last_command
-        if wanted != STILL and last is not None and self.paces:
-            return self._reach_paced(wanted, ids, part, last)
+        limits = self.robot.limits
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
         begun = self.trace.answered if since is None else since
         first = len(self.trace.turns)
@@ -270,37 +241,7 @@ class Drive:
             # By the time of such a response the watchdog may have stopped the robot, and the command did not.
             outlasted = bool(there) and within is not None and self.trace.answered > begun + patience
         else:
-            outlasted = not there and self._outlasts_hold
-        reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
-        self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
-        return bool(there)
-
-    def _reach_paced(self, wanted: Velocity, ids: tuple[str, ...], part: slice, last: Command) -> bool:
-        """Look as reach() does, while the last command is renewed beside the looks; begin anew where that was too late.
-
-        A velocity that is reached shows that it was renewed in time. One that is not reached proves nothing where a
-        renewal may have come too late.
-        """
-        limits, count, begun = self.robot.limits, SEVERAL if ids else 1, last.answered
-        for _ in range(1 + _LAPSES):
-            until, first = begun + self.robot.settle_s, len(self.trace.turns)
-            settled = min(until, begun + limits.settle_s + self.robot.sample_s)
-            with self.renewing(last) as renewing:
-                while True:
-                    self.look()
-                    turns = self.trace.turns[first:]
-                    there = windows.shown(limits, turns, wanted, part=part, count=count)
-                    late = [turn for turn in turns if turn.at >= settled]
-                    decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
-                    now = self.clock.now()
-                    if there or (now > until and decided) or now > until + _LONGER_S:
-                        break
-            lasted = renewing.lasted(self.trace.turns[-1].at)
-            if there or lasted:
-                break
-            begun = self.clock.now()
-            last = replace(last, sent=begun, answered=begun)
-        counted, outlasted = begun if there else settled, not there and not lasted
+            outlasted = not there and (self._outlasts_hold or lapses == _LAPSES)
         reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
         self.trace = replace(self.trace, reaches=(*self.trace.reaches, reach))
         return bool(there)
@@ -353,7 +294,7 @@ class Drive:
     @property
     def whole(self) -> Trace:
         """Return the trace of a finished drive in which the pose is to be judged as well."""
-        return replace(self.trace, outlasted=self._outlasts_hold and not self.paces)
+        return replace(self.trace, outlasted=self._outlasts_hold)
 
 
 def _renewed_s(hold_s: float, settle_s: float) -> float:

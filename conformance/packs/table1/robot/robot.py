@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from copy import copy
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -21,9 +20,7 @@ from conformance.packs.table1.robot import abilities
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.packs.table1.statement import said_of
-from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange
-from conformance.transport.passage import Heard
 
 POSE: Final = "/robot/pose/"
 VELOCITY: Final = "/robot/velocity/"
@@ -132,13 +129,6 @@ class Robot:
         self.usual_s = max(api.run.effort.usual_ms / 1000, 1 / (api.client.connection.request_rate or 1e9))
         # How long what must not happen is watched for, in relation to standard effort.
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
-
-    def apart(self) -> Robot:
-        """Return the robot for another thread, with its own connections, to be closed; the caller tells listeners."""
-        other = copy(self)
-        settings = self.rest.connection.unheard(heard=Heard.ALWAYS, request_rate=None, resent=0)
-        other.rest = HttpClient(self.rest.base_url, settings)
-        return other
 
     @property
     def limits_declared(self) -> bool:

@@ -61,7 +61,7 @@ def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     return from_element(found[0], shape.schema), ""
 
 
-def _always(_since: float) -> bool:
+def _always() -> bool:
     return True
 
 
@@ -74,17 +74,16 @@ def read_state(
     subscribers: SoapService,
     name: str,
     apart_s: float,
-    lasted: Callable[[float], bool] = _always,
+    lasted: Callable[[], bool] = _always,
     *,
     first: Callable[[], object] = _nothing,
 ) -> StateRead | None:
     """Read a state over REST, SOAP and REST, ``apart_s`` apart; ``first`` is called just before SOAP's.
 
     Return None where REST has no value, which the observers have judged, and where SOAP's differs although the state
-    has not ``lasted`` since the first read: it may have changed to and fro.
+    has not ``lasted``: it may have changed to and fro.
     """
     path, operation, shape = STATES[name]
-    since = robot.clock.now()
     before, _ = robot.read(path, shape)
     robot.clock.sleep(apart_s)
     first()
@@ -94,7 +93,7 @@ def read_state(
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None
-    steady, broken = lasted(since), ""
+    steady, broken = lasted(), ""
     if not problem:
         broken = shape.problem(between) or restamped(between, before, after) or contradiction(between, before, after)
     problem = problem or disagreement(before, between, after, _slack(robot))
@@ -139,7 +138,7 @@ def compare(
     subscribers: SoapService,
     name: str,
     renew: Callable[[], object] = lambda: None,
-    lasted: Callable[[float], bool] = _always,
+    lasted: Callable[[], bool] = _always,
     *,
     first: Callable[[], object] = _nothing,
 ) -> list[StateRead]:
@@ -150,7 +149,7 @@ def compare(
         subscribers: its SOAP service.
         name: "pose" or "velocity".
         renew: called before each try to keep the state as it is.
-        lasted: returns whether it has been kept since a time, s of the run's clock.
+        lasted: returns whether it certainly has been kept.
         first: called just before each reading over SOAP.
     """
 

@@ -52,14 +52,10 @@ def renewed(robot: Robot, drive: Drive, turning: Velocity) -> bool:
     for _ in range(_RENEWED_TRIES):
         drive.command(STILL)
         takes_s = robot.limits.settle_s + robot.sample_s
-        if drive.paces or (robot.usual_s > _QUICK_S and takes_s < times.seen_s):
+        if robot.usual_s > _QUICK_S and takes_s < times.seen_s:
             # Reached while it is renewed: who looks for it first, at three slow answers a look, renews it too late.
             drive.command(turning)
-            reached = drive.trace.answered + takes_s
-            if drive.paces:
-                lasts, found = _renew_beside(drive, turning, max(drive.trace.sent + times.seen_s, reached))
-            else:
-                lasts, found = _renew(robot, drive, turning, times, (), reached)
+            lasts, found = _renew(robot, drive, turning, times, (), drive.trace.answered + takes_s)
         else:
             drive.refresh(turning)
             lasts, found = _renew(robot, drive, turning, times, ())
@@ -132,16 +128,6 @@ def _renew(
     lasts, found = drive.sees(turning, 2, until=drive.trace.sent + times.holds_s, alone=alone)
     commands = drive.trace.commands[first:]
     if any(later.answered > one.sent + times.holds_s for one, later in itertools.pairwise(commands)):
-        lasts = None
-    return lasts, found
-
-
-def _renew_beside(drive: Drive, turning: Velocity, seen: float) -> tuple[bool | None, str]:
-    """Renew the last command beside a look at the time ``seen``, s of the run's clock; return what _renew() returns."""
-    with drive.renewing(drive.trace.commands[-1]) as renewing:
-        drive.clock.sleep(seen - drive.clock.now())
-        lasts, found = drive.sees(turning, 2, alone=True)
-    if not lasts and not renewing.lasted(drive.trace.turns[-1].at):
         lasts = None
     return lasts, found
 

@@ -55,20 +55,20 @@ def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateR
             drive.reach(wanted)
             # The first time as soon as may be; then when both interfaces must have heard of it.
             pause_s = robot.sample_s if change else 0.0
-            with drive.held(wanted) as lasted:
-                drive.clock.sleep(pause_s)
-                for name in [name for name, moves in suspects if moves == (wanted != STILL)]:
-                    drive.command(wanted)
-                    read = read_state(robot, subscribers, name, pause_s, lasted)
-                    del suspects[name, wanted != STILL]
-                    if read is not None:
-                        reads += for_good([read])
-                        suspects |= {(name, wanted != STILL): read} if read.differs else {}
-                for _ in range(0 if change else _TIMES if wanted == moving else 1):
-                    for name in STATES:
-                        # A state that differs costs three tries each time.
-                        if not any(one.name == name and (one.broken or one.differs) for one in reads):
-                            reads += compare(robot, subscribers, name, partial(drive.command, wanted), lasted)
+            lasted = drive.hold(wanted)
+            drive.clock.sleep(pause_s)
+            for name in [name for name, moves in suspects if moves == (wanted != STILL)]:
+                drive.command(wanted)
+                read = read_state(robot, subscribers, name, pause_s, lasted)
+                del suspects[name, wanted != STILL]
+                if read is not None:
+                    reads += for_good([read])
+                    suspects |= {(name, wanted != STILL): read} if read.differs else {}
+            for _ in range(0 if change else _TIMES if wanted == moving else 1):
+                for name in STATES:
+                    # A state that differs costs three tries each time.
+                    if not any(one.name == name and (one.broken or one.differs) for one in reads):
+                        reads += compare(robot, subscribers, name, partial(drive.command, wanted), lasted)
         if not suspects:
             break
     return (*reads, *(replace(one, broken="") for one in suspects.values() if one is not None))

@@ -316,7 +316,7 @@ class _Turning:
         ends = answered + self._ends_s
         silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
         while True:
-            drive.glance() if drive.paces and resumed is None else drive.look()
+            drive.glance() if drive.looks_long and resumed is None else drive.look()
             if resumed is None:
                 self._send_refused()
             let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by)

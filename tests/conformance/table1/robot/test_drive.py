@@ -32,6 +32,14 @@ def test_samples_from_within_the_settle_time_say_nothing_of_a_robot_that_was_loo
     assert _judged(SETTLE_S, {50: late_s})
 
 
+def test_one_that_ends_again_and_again_before_it_can_be_renewed_is_not_blamed():
+    clock = SimulatedClock()
+    driven = Drive(Body(clock, SETTLE_S, 0.3), dict.fromkeys(range(400), 0.4), 0.3)
+    driven.tell()
+    assert not driven.reach(WANTED, _CONVERGES)
+    assert driven.judged == {}
+
+
 def test_a_velocity_that_ended_because_it_was_renewed_too_late_has_its_settle_time_again():
     assert _judged(SETTLE_S, {5: 1.6}, hold_s=1.0)
 
@@ -57,7 +65,7 @@ def test_rest_that_no_velocity_brings_about_is_waited_for_as_long():
     assert (driven.judged, driven.trace.commands) == ({"safety/cancel": False}, ())
 
 
-@pytest.mark.parametrize(("usual_s", "judged"), [(0.3, {_CONVERGES: False}), (0.4, {})])
+@pytest.mark.parametrize(("usual_s", "judged"), [(0.2, {_CONVERGES: False}), (0.3, {}), (0.4, {})])
 def test_what_ends_before_it_can_be_read_is_not_held_against_the_robot(usual_s, judged):
     clock = SimulatedClock()
     driven = Drive(Body(clock, 20 * SETTLE_S, 1.0), dict.fromkeys(range(100), 3 * usual_s), 1.0, usual_s)
