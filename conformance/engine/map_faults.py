@@ -79,7 +79,7 @@ def _moves(motion: MotionMap) -> Iterator[_Command]:
     for name, limit in ((name, limit) for name, axis in axes.items() for limit in axis.limits):
         values: dict[str, Any] = {**middle, name: limit, "seconds": goto.seconds}
         for one, turned in axes.items():
-            values |= quaternion_of(one, values[one], turned.angle) if turned.angle else {}
+            values |= quaternion_of(one, values[one], turned)
         yield from _filled("motion.goto", goto.send, goto.body, values)
 
 

@@ -55,7 +55,9 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
         elif value == "not seen" and said.startswith("no: "):
             value, said = "no", said.removeprefix("no: ")
         elif value == "not seen" and said != _NO_LIMITS:
-            said = next((one.reason for one in own if one.reason), "") or said or "nothing was tried"
+            # What could not be tried says more than what the map lacks.
+            tried = sorted(own, key=lambda one: one.value is Value.NOT_CLAIMED)
+            said = next((one.reason for one in tried if one.reason), "") or said or "nothing was tried"
         found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
     return found
 

@@ -13,7 +13,7 @@ from typing import Final
 from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
-from conformance.contract.described import SOAP
+from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.documents.openapi import Operation
 from conformance.scenarios.drawing import drawn
 from conformance.scenarios.scenario import NotPossibleError, scenario
@@ -56,11 +56,13 @@ class Estimate:
         requests: how many are sent.
         drawn: how many of them Hypothesis draws.
         at_once: how many of them are sent by several clients at once.
+        slow: claimed classes whose time depends on how fast the device moves or its graph responds; not included.
     """
 
     requests: int
     drawn: int = 0
     at_once: int = 0
+    slow: tuple[str, ...] = ()
 
     def seconds(self, usual_ms: float) -> float:
         """Return how long the run takes where the device needs so many milliseconds for an answer, s."""
@@ -74,7 +76,10 @@ class Estimate:
             return f"This run sends about {requests}; how long that takes depends on the device's response time."
         seconds = self.seconds(usual_ms)
         long = f"{_rounded(seconds)} s" if seconds < 100 else f"{_rounded(seconds / 60)} minutes"  # noqa: PLR2004 - in one place
-        return f"This run sends about {requests} and takes about {long} (the device answers in {usual_ms:.1f} ms)."
+        more = f"; {' and '.join(self.slow)} as long as the device needs" if self.slow else ""
+        return (
+            f"This run sends about {requests} and takes about {long} (the device answers in {usual_ms:.1f} ms){more}."
+        )
 
 
 def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
@@ -95,7 +100,8 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
         generated = [_generated(one, effort) for one in operations]
         covering, fuzzed = sum(one[0] for one in generated), sum(one[1] for one in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
-    return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once)
+    slow = tuple(name for name in (MOTION, ROS) if name in run.claims)
+    return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow)
 
 
 def _surveyed(operation: Operation, effort: Effort, seed: int) -> int:

@@ -23,6 +23,8 @@ _NO_NAMES: Final[Mapping[str, str]] = MappingProxyType({})
 Pointer = Annotated[str, msgspec.Meta(pattern=r"^(/.*)?$")]
 Call = Annotated[str, msgspec.Meta(pattern=r"^[A-Z]+ /\S*$")]
 Angle = Literal["roll", "pitch", "yaw"]
+#: A whole turn in units of angles.
+_TURNS: Final = {"": math.tau, "rad": math.tau, "deg": 360.0, "degrees": 360.0, "°": 360.0, "h": 24.0}
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,8 +38,8 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         tolerance: how far from its target it may rest; None: that of the move.
         noise: standard deviation of its position as it is read; what a reading shows at rest counts as well.
         rest: how fast it may seem to move at rest, units per second; None: a fifth of its tolerance.
-        angle: it turns freely, in rad: the angle of this name, of a quaternion or as a number; empty: it does not. Its
-            limits say which targets are tried.
+        angle: it turns freely, in rad, or in deg or h by its unit: the angle of this name, of a quaternion or as a
+            number; empty: it does not. Its limits say which targets are tried.
         read: the operation that says where it is; empty: that of the state.
         bound: whether it must stay within its limits on its ways; else they only say which targets are tried.
     """
@@ -54,13 +56,15 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bound: bool = True
 
     def __post_init__(self) -> None:
-        """Check the limits.
+        """Check the limits, and the unit of what turns.
 
         Raises:
-            ValueError: the first is not below the second.
+            ValueError: the first limit is not below the second, or a whole turn is not known in this unit.
         """
         if self.limits[0] >= self.limits[1]:
             raise ValueError(f"limits = {list(self.limits)} must be two numbers, the lesser one first")
+        if self.angle and self.unit not in _TURNS:
+            raise ValueError(f"unit = {self.unit!r} of what turns must be one of {', '.join(filter(None, _TURNS))}")
 
     def well_inside(self, position: float) -> float:
         """Return the position, or the nearest one that is a quarter of the range away from both limits."""
@@ -72,7 +76,19 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def apart(self, one: float, other: float) -> float:
         """Return how far a position is from another one, and by the shorter way for what turns."""
-        return math.remainder(one - other, math.tau) if self.angle else one - other
+        return math.remainder(one - other, _TURNS[self.unit]) if self.angle else one - other
+
+    def moved(self, one: float, other: float) -> float:
+        """Return how far it has moved between two readings: an angle may begin anew after a whole turn."""
+        return abs(math.remainder(one - other, _TURNS.get(self.unit or "none", math.inf)))
+
+    def radians(self, position: float) -> float:
+        """Return a position of what turns in rad."""
+        return position * math.tau / _TURNS[self.unit]
+
+    def of_radians(self, angle: float) -> float:
+        """Return the position of what turns, in its unit, for an angle in rad."""
+        return angle * _TURNS[self.unit] / math.tau
 
     def near(self, position: float, other: float) -> float:
         """Return the position; for what turns, with so many whole turns that it is near another one."""
@@ -133,7 +149,8 @@ class Action(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         read: the operation, a template.
         at: where the word for its state is in the response.
-        running, succeeded, canceled: these words; an empty list: not judged.
+        running, succeeded, canceled: these words, numbers and truth values as JSON writes them ("true"); an empty
+            list: not judged.
     """
 
     read: Call

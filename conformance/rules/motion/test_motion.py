@@ -94,7 +94,7 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         for index, one in enumerate(seen):
             later = next((two for two in seen[index:] if two.sent - one.received > _APART_S), None)
             if later is not None:
-                moved = abs(later.values[name] - one.values[name]) - motion.tolerance(name)
+                moved = motion.state.axes[name].moved(later.values[name], one.values[name]) - motion.tolerance(name)
                 highest = max(highest, moved / (later.received - one.sent))
         yield Case(
             highest <= _FASTER * most,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
@@ -182,9 +183,10 @@ class MappedDevice:
         if action is None or self._answer is None:
             return ""
         try:
-            return str(at(self.get(filled(action.read, {}, self._answer))[1], action.at))
+            word = at(self.get(filled(action.read, {}, self._answer))[1], action.at)
         except NoValueError:
             return ""
+        return word if isinstance(word, str) else json.dumps(word)
 
     def call_of(self, given: Goto | Velocity | Way | Switch | Stop, values: Mapping[str, Any]) -> tuple[str, Any]:
         """Return call and body of a command.
@@ -199,7 +201,7 @@ class MappedDevice:
             }
             values = {**values, **ways, "seconds": given.seconds}
             for name, axis in self.motion.state.axes.items():
-                values |= quaternion_of(name, values[name], axis.angle) if axis.angle else {}
+                values |= quaternion_of(name, values[name], axis)
         elif isinstance(given, Velocity | Way):
             values = {**dict.fromkeys(self.drives.axes, 0.0), **values}
         values = {**values, "lease": self.ready.lease}

@@ -96,11 +96,17 @@ def angle_of(quaternion: Any, angle: Angle) -> float:
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def quaternion_of(name: str, value: Any, angle: Angle) -> dict[str, Any]:
-    """Return the components of a turn by names of templates; what is no number becomes each of them."""
+def quaternion_of(name: str, value: Any, axis: Axis) -> dict[str, Any]:
+    """Return the components of a quaternion by names of templates; nothing if the axis has no ``angle``.
+
+    What is no number, as a pattern in a body, stands for each of them.
+    """
+    if not axis.angle:
+        return {}
     if not isinstance(value, int | float):
         return {f"{name}:/{part}": value for part in _PARTS}
-    turn = {_ABOUT[angle]: math.sin(value / 2), "w": math.cos(value / 2)}
+    half = axis.radians(value) / 2
+    turn = {_ABOUT[axis.angle]: math.sin(half), "w": math.cos(half)}
     return {f"{name}:/{part}": turn.get(part, 0.0) for part in _PARTS}
 
 
@@ -108,15 +114,15 @@ def positions_at(document: Any, pointers: Mapping[str, str], axes: Mapping[str, 
     """Return positions at JSON pointers by axis, and other numbers by their names; empty if one is missing."""
     try:
         found = {name: at(document, pointer) for name, pointer in pointers.items()}
-        angles = {name: axes[name].angle for name in found if name in axes}
-        return {
-            name: angle_of(one, angle)
-            if (angle := angles.get(name)) and isinstance(one, list | Mapping)
-            else float(one)
-            for name, one in found.items()
-        }
+        return {name: _position(one, axes.get(name)) for name, one in found.items()}
     except (NoValueError, TypeError, ValueError):
         return {}
+
+
+def _position(value: Any, axis: Axis | None) -> float:
+    if axis is not None and axis.angle and isinstance(value, list | Mapping):
+        return axis.of_radians(angle_of(value, axis.angle))
+    return float(value)
 
 
 def seconds_of(stamp: Any) -> float | None:

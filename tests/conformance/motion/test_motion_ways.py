@@ -8,7 +8,7 @@ import pytest
 from carriage import Carriage
 from simulated import DEVICES, RULES, cases_of, map_of, played
 
-from conformance.scenarios.motion.templates import NoValueError, angle_of, quaternion_of
+from conformance.scenarios.motion.templates import NoValueError, angle_of, positions_at, quaternion_of
 from conformance.statement.motion_map import Axis
 
 
@@ -53,16 +53,20 @@ def test_at_quick_each_way_has_its_turn(monkeypatch):
     assert found == faults
 
 
+@pytest.mark.parametrize(("unit", "whole"), [("rad", math.tau), ("deg", 360.0), ("h", 24.0)])
 @pytest.mark.parametrize("angle", ["roll", "pitch", "yaw"])
 @pytest.mark.parametrize("value", [-3.0, -1.2, 0.0, 0.7, 1.5, 3.1])
-def test_a_quaternion_that_is_sent_is_the_angle_that_is_read(angle, value):
+def test_a_quaternion_that_is_sent_is_the_angle_that_is_read(angle, value, unit, whole):
     turned = math.remainder(value, math.pi) if angle == "pitch" else value
     if angle == "pitch" and abs(turned) > math.pi / 2:
         turned = math.copysign(math.pi, turned) - turned
-    parts = list(quaternion_of("it", turned, angle).values())
+    axis = Axis("/a", (-3, 3), unit=unit, angle=angle)
+    parts = list(quaternion_of("it", turned * whole / math.tau, axis).values())
     named = dict(zip("xyzw", parts, strict=True))
     for written in (parts, named, [-one for one in parts], {name: 3 * one for name, one in named.items()}):
         assert angle_of(written, angle) == pytest.approx(turned, abs=1e-9)
+        read = positions_at({"a": written}, {"it": "/a"}, {"it": axis})["it"]
+        assert read == pytest.approx(turned * whole / math.tau, abs=1e-7)
 
 
 @pytest.mark.parametrize("wrong", [{}, [0, 0, 0], [0, 0, 0, 0], {"x": 0, "y": 0, "z": 0}, [0, 0, 0, math.nan], "w"])
@@ -78,7 +82,20 @@ def test_what_turns_is_apart_by_the_shorter_way(one, other, apart):
     axis = Axis("/a", (-3, 3), angle="yaw")
     assert axis.apart(one, other) == pytest.approx(apart)
     assert axis.near(one, other) == pytest.approx(other + apart)
+    degrees = Axis("/a", (-170, 170), unit="deg", angle="yaw")
+    assert degrees.apart(math.degrees(one), math.degrees(other)) == pytest.approx(math.degrees(apart))
     assert Axis("/a", (-3, 3)).apart(one, other) == one - other
+
+
+@pytest.mark.parametrize(("unit", "moved"), [("deg", 9.0), ("°", 9.0), ("rad", 351 % math.tau - math.tau), ("m", 351)])
+def test_an_angle_that_begins_anew_has_not_moved_a_whole_turn(unit, moved):
+    """A telescope that goes from 359 degrees to 8 has moved by 9, whether its map says `angle` or not."""
+    assert Axis("/a", (10, 50), unit=unit).moved(8.0, 359.0) == pytest.approx(abs(moved))
+
+
+def test_a_unit_without_a_whole_turn_is_told():
+    with pytest.raises(ValueError, match=r"unit = 'gon' of what turns must be one of rad, deg"):
+        Axis("/a", (10, 50), unit="gon", angle="yaw")
 
 
 @pytest.mark.parametrize(
