@@ -63,7 +63,7 @@ $(VENV)/.demo: pyproject.toml constraints.txt $(INTERFACE_FILES) | $(VENV)/.made
 		echo "== building the ROS 2 interface packages, which stay in $$wheels"; mkdir -p "$${wheels%/*}"; \
 		printf '%s\n' $(INTERFACES) | xargs -P 3 -I {} bash -c "$(call built,./{},'$$wheels.$$$$')" && mv -T "$$wheels.$$$$" "$$wheels"; }
 	@$(call installed,--no-deps --force-reinstall '$(WHEELS)'/*.whl)
-	@$(BIN)/python -m compileall -q conformance loadtests reference_robot reports ros_probe roaas.py roaas_pytest.py
+	@$(BIN)/python -m compileall -q conformance loadtests reference_robot reports ros_probe proof roaas.py roaas_pytest.py
 	@touch $@
 
 $(VENV)/.installed: $(VENV)/.demo

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.selftest.robots import own_domain, stopped
+from proof.selftest.robots import own_domain, stopped
 
 _ROAAS = (sys.executable, "-P", "-m", "roaas")
 _START_S = 60

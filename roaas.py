@@ -1,7 +1,7 @@
 """The command ``roaas``: finds each subcommand in its package ("room") and runs it.
 
-The rooms are the packages conformance, loadtests, reference_robot, reports and ros_probe. A room is imported only when
-its command is used, so that ``roaas certify`` needs neither ROS nor Locust.
+The rooms are the packages conformance, loadtests, proof, reference_robot, reports and ros_probe. A room is imported
+only when its command is used, so that ``roaas certify`` needs neither ROS nor Locust.
 """
 
 import difflib
@@ -42,7 +42,7 @@ _COMMANDS = {
         "reports.cli.registry",
         "Make a static site from signed certificates: which robot passed which classes.",
     ),
-    "selftest": ("conformance.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
+    "selftest": ("proof.cli.selftest", "Test the suite: it must kill mutants, and must not fail a good device."),
     "contract": ("conformance.cli.contract", "Show the requirements, export the contract's files."),
     "explain": ("conformance.cli.explain", "Explain a requirement: why, by which source, how judged, how to fix it."),
 }
@@ -237,6 +237,18 @@ class FrontDoor:
             return [(one.breaking, one.operation, one.text) for one in found]
         except (refused, unreachable) as error:
             raise click.UsageError(str(error)) from error
+
+    @staticmethod
+    def mutants_of(contract: Any) -> tuple[Any, ...]:
+        """Return the hand-written mutants of a contract pack."""
+        mutants: tuple[Any, ...] = import_module("proof.mutation.self_test").self_test_of(contract).mutants
+        return mutants
+
+    @staticmethod
+    def coverage(contract: Any) -> tuple[str, list[str]]:
+        """Return the coverage page of a contract pack, and where its ledger, checks and mutants disagree."""
+        coverage = import_module("proof.selftest.coverage")
+        return coverage.page(contract), coverage.disagreements(contract)
 
     @staticmethod
     def is_installed(pack: str) -> bool:

@@ -2,7 +2,7 @@
 
 ``python benchmarks/inside.py`` certifies the independent robot ``baroque`` with each of its faulty bodies, and once
 without a fault. It prints a line for each and how many faults were detected; ``python benchmarks/inside.py 'goal-*'``
-takes the matching faults. No ROS is needed. ``python -m conformance.packs.table1.independent_robots baroque --fault
+takes the matching faults. No ROS is needed. ``python -m proof.table1.independent_robots baroque --fault
 deadband`` starts such a robot by hand. The exit code is 1 when the robot without a fault does not pass, or no fault has
 such a name.
 """
@@ -15,12 +15,12 @@ from programs import matching
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.contract.pack import Contract
-from conformance.packs.table1.faulty_bodies import FAULTY_BODIES, UNSEEN
-from conformance.packs.table1.selftest import with_fault
-from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Outcome, job_at, run_job
-from conformance.selftest.robots import running
 from conformance.verdict.effort import EFFORTS
+from proof.selftest.at_once import each_at_once
+from proof.selftest.certifying import Outcome, job_at, run_job
+from proof.selftest.robots import running
+from proof.table1.faulty_bodies import FAULTY_BODIES, UNSEEN
+from proof.table1.selftest import with_fault
 
 _NO_FAULT = ""
 _TIMEOUT_S = 300.0

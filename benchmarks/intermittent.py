@@ -18,7 +18,8 @@ from programs import matching
 
 from conformance.contract.classes import Level
 from conformance.contract.pack import Contract
-from conformance.mutation.changes import (
+from conformance.verdict.effort import EFFORTS
+from proof.mutation.changes import (
     Make,
     Where,
     altered,
@@ -33,13 +34,12 @@ from conformance.mutation.changes import (
     text,
     values,
 )
-from conformance.mutation.messages import Forward, Request, Response
-from conformance.packs.table1.mutants.paths import GOAL, PLAN, POSE, SENSORS, VELOCITY, deliveries
-from conformance.packs.table1.selftest import REFERENCE
-from conformance.selftest.at_once import each_at_once
-from conformance.selftest.certifying import Outcome, run_job
-from conformance.selftest.mutant_run import RobotPool, job_for
-from conformance.verdict.effort import EFFORTS
+from proof.mutation.messages import Forward, Request, Response
+from proof.selftest.at_once import each_at_once
+from proof.selftest.certifying import Outcome, run_job
+from proof.selftest.mutant_run import RobotPool, job_for
+from proof.table1.mutants.paths import GOAL, PLAN, POSE, SENSORS, VELOCITY, deliveries
+from proof.table1.selftest import REFERENCE
 
 # What the suite is to reach.
 _CAUGHT_SHARE = 0.95

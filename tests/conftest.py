@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 from conformance.commandline.secrecy import SECRETS
-from conformance.selftest.robots import own_domain
+from proof.selftest.robots import own_domain
 
 # How long an example takes is the machine's affair, which others may use as well. Every run has the same examples.
 settings.register_profile("tests", deadline=None, derandomize=True)

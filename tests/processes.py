@@ -61,7 +61,7 @@ def ended(
 @contextmanager
 def independent_robot(name: str) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
     """Start an independent robot of the pack table1; yield its process, its REST address and its publishers' WSDL."""
-    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", name]
+    command = [sys.executable, "-m", "proof.table1.independent_robots", name]
     command += ["--rest-port=0", "--soap-port=0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:

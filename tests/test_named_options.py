@@ -19,7 +19,7 @@ import pytest
 import roaas
 from conformance.commandline.device_options import advice
 
-ROOMS = ("conformance", "loadtests", "reference_robot", "reports", "ros_probe")
+ROOMS = ("conformance", "loadtests", "reference_robot", "reports", "ros_probe", "proof")
 ROOT = Path(__file__).parents[1]
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 # A text may send its reader to another command.

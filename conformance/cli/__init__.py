@@ -1,1 +1,1 @@
-"""The commands certify, replay, contract and selftest."""
+"""The commands certify, contract, explain, judge and replay."""

@@ -92,17 +92,15 @@ def export(directory: Path, pack: str, *, force: bool) -> None:
 @contract.command()
 @contract_option
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page there.  [default: stdout]")
-def coverage(pack: str, out: Path | None) -> None:
+@click.pass_obj
+def coverage(door: Any, /, pack: str, out: Path | None) -> None:
     """Show which checks and which mutants bind each requirement.
 
     Exit code 1 when ledger, checks and mutants disagree.
     """
     contract = loaded(pack)
-    # Imported here: it imports every check, and with them Schemathesis.
-    from conformance.selftest.coverage import disagreements, page  # noqa: PLC0415
-
     try:
-        text, problems = page(contract), disagreements(contract)
+        text, problems = door.coverage(contract)
     except ContractError as error:
         raise click.UsageError(str(error)) from error
     if out is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import textwrap
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -42,7 +42,8 @@ def _ids(_context: click.Context, _parameter: click.Parameter, begun: str) -> li
     multiple=True,
     help="Only the code for this framework; repeatable.  [default: all]",
 )
-def explain(requirement: str | None, pack: str, frameworks: tuple[str, ...]) -> None:
+@click.pass_obj
+def explain(door: Any, /, requirement: str | None, pack: str, frameworks: tuple[str, ...]) -> None:
     """Explain a requirement: the rule, why it matters, its source, how it is judged, and how to meet it.
 
     REQUIREMENT is an id such as http/head. Without it, the command lists all requirements.
@@ -56,7 +57,7 @@ def explain(requirement: str | None, pack: str, frameworks: tuple[str, ...]) -> 
         # Imported here: it imports every check.
         from conformance.cli.explanation import explained  # noqa: PLC0415
 
-        explanation = explained(contract, item)
+        explanation = explained(contract, item, door.mutants_of(contract))
     except (UnknownRequirementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     if requirement != item.id:

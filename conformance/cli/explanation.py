@@ -1,16 +1,16 @@
 """One requirement with everything that is known about it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import Any
 
 from conformance.contract.classes import Prerequisite
 from conformance.contract.generic import generic_ledger
 from conformance.contract.ledger import Requirement, renamed
 from conformance.contract.pack import Contract
+from conformance.engine.collected_checks import Check, checks_of
 from conformance.explaining.advice import Source, Topic, sources_of, topic_of
-from conformance.mutation.mutant import Mutant
-from conformance.mutation.self_test import self_test_of
-from conformance.selftest.coverage import Check, checks_of
 
 #: At which effort checks run, and with how many cases.
 EFFORTS = (
@@ -38,14 +38,14 @@ class Explanation:
         sources: where it comes from.
         topic: why it matters and how to meet it, or None.
         checks: the checks that judge it.
-        mutants: the hand-written mutants of the pack that it must kill.
+        mutants: the hand-written mutants that it must kill, each with a name and what it `says`.
     """
 
     requirement: Requirement
     sources: tuple[Source, ...]
     topic: Topic | None
     checks: tuple[Check, ...]
-    mutants: tuple[Mutant, ...]
+    mutants: tuple[Any, ...]
 
     @property
     def why(self) -> str:
@@ -53,18 +53,18 @@ class Explanation:
         return " ".join(filter(None, (self.requirement.breaks, self.topic.why if self.topic else None)))
 
 
-def explained(contract: Contract, requirement: Requirement) -> Explanation:
-    """Return the explanation of a requirement.
+def explained(contract: Contract, requirement: Requirement, mutants: Iterable[Any] = ()) -> Explanation:
+    """Return the explanation of a requirement, with those of a pack's mutants that it must kill.
 
     Raises:
-        ContractError: a module with checks or mutants cannot be imported.
+        ContractError: a module with checks cannot be imported.
     """
     return Explanation(
         requirement,
         sources_of(requirement.source),
         topic_of(requirement.id),
         checks_of(contract).get(requirement.id, ()),
-        tuple(mutant for mutant in self_test_of(contract).mutants if requirement.id in mutant.catches),
+        tuple(mutant for mutant in mutants if requirement.id in mutant.catches),
     )
 
 

@@ -10,6 +10,7 @@ from conformance.contract.generic import generic_classes
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, Source, Topic, topics
+from proof.mutation.self_test import self_test_of
 from reports.formats.source_pages import page_of as clause_page
 
 _INDEX = """# Requirements
@@ -55,9 +56,9 @@ _ORIGINS = {
 def pages() -> dict[str, str]:
     """Return the text of each page by its name in the source folder."""
     contract = Contract.load()
-    ledger = known(contract)
+    ledger, mutants = known(contract), self_test_of(contract).mutants
     classes = {**generic_classes(), **contract.classes}
-    found = {id_: explained(contract, item) for id_, item in ledger.items()}
+    found = {id_: explained(contract, item, mutants) for id_, item in ledger.items()}
     by_class: dict[str, list[Requirement]] = defaultdict(list)
     for item in ledger.values():
         by_class[item.class_].append(item)

@@ -3,10 +3,10 @@
 import sys
 from pathlib import Path
 
-from conformance.mutation.changes import inputs, rest
-from conformance.mutation.fields import field, scaled, without
-from conformance.mutation.self_test import GoodDevice, SelfTest
-from conformance.mutation.table import Table
+from proof.mutation.changes import inputs, rest
+from proof.mutation.fields import field, scaled, without
+from proof.mutation.self_test import GoodDevice, SelfTest
+from proof.mutation.table import Table
 
 LAMP = GoodDevice("lamp", lambda _: [sys.executable, str(Path(__file__).with_name("lamp.py")), "0"])
 MUTANTS = Table()

@@ -13,8 +13,8 @@ import yaml
 from processes import ended
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.selftest import PLAIN
-from conformance.selftest.robots import running
+from proof.selftest.robots import running
+from proof.table1.selftest import PLAIN
 from roaas import main
 
 ROOT = Path(__file__).parents[2]

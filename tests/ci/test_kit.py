@@ -18,10 +18,10 @@ import yaml
 from processes import ended
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.mutants import MUTANTS
-from conformance.packs.table1.selftest import REFERENCE
-from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import running
+from proof.selftest.proxy import Proxy
+from proof.selftest.robots import running
+from proof.table1.mutants import MUTANTS
+from proof.table1.selftest import REFERENCE
 from reports.attestation.envelope import ENVELOPE_NAME
 from reports.formats.catalogue import FORMATS
 

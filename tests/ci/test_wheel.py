@@ -15,11 +15,11 @@ from processes import ended
 from conformance.commandline.extras import EXTRAS
 from conformance.contract.pack import Contract
 from conformance.engine.suite import suite_digest
-from conformance.packs.table1.selftest import PLAIN
-from conformance.selftest.robots import running
+from proof.selftest.robots import running
+from proof.table1.selftest import PLAIN
 
 ROOT = Path(__file__).parents[2]
-ROOMS = ("conformance", "reference_robot", "loadtests", "reports", "ros_probe")
+ROOMS = ("conformance", "reference_robot", "loadtests", "reports", "ros_probe", "proof")
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "roaas.py", "roaas_pytest.py", "ci", *ROOMS)
 
 

@@ -22,9 +22,9 @@ from small_device import REFUSED, answers, described, error, reading, small_devi
 import conformance.api.rest.guard
 from conformance.contract.pack import Contract
 from conformance.engine.resending import written
-from conformance.selftest.variants import certificate
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
+from proof.selftest.variants import certificate
 from reports.reading import read_latency
 
 _GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")

@@ -20,11 +20,11 @@ from processes import ended
 from small_device import Handle, constant, described, reading, small_device
 
 import roaas
-from conformance.cli.selftest import _finish
 from conformance.commandline import started
 from conformance.commandline.out_folder import LOCK_NAME
 from conformance.contract.pack import Contract
-from conformance.selftest.report import Report
+from proof.cli.selftest import _finish
+from proof.selftest.report import Report
 
 _OBJECT = {"type": "object"}
 _DESCRIPTION = described({"/state": reading(_OBJECT)})

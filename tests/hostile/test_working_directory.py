@@ -83,7 +83,7 @@ def test_no_conftest_above_the_checks_is_run(place, tmp_path):
 def test_every_python_that_the_product_starts_ignores_the_working_directory():
     """`-m` searches the working directory first, unless `-P` or `-I` stands before it; a script does not."""
     root, started = Path(__file__).parents[2], 0
-    for room in ("conformance", "loadtests", "reference_robot", "reports", "ros_probe"):
+    for room in ("conformance", "loadtests", "reference_robot", "reports", "ros_probe", "proof"):
         for file in sorted((root / room).rglob("*.py")):
             words = file.read_text(encoding="utf-8").split("sys.executable,")
             for before, after in itertools.pairwise(words):

@@ -19,7 +19,7 @@ SHORT = "--rate 100 --duration 2 --warmup 0.1"
 @pytest.fixture
 def robot():
     """Start the robot `plain`, which shares no code with the suite; gives its REST and SOAP addresses."""
-    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", "plain"]
+    command = [sys.executable, "-m", "proof.table1.independent_robots", "plain"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             rest, soap = re.fullmatch(r"ready rest=(\S+) soap=(http://[^/]+)\S*\n", process.stdout.readline()).groups()

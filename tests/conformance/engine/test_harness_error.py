@@ -10,13 +10,13 @@ from conformance.documents.xml_node import Node
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.robot import delivery, delivery_messages
-from conformance.packs.table1.selftest import BAROQUE
 from conformance.packs.table1.statement import Statement
-from conformance.selftest.robots import running
 from conformance.statement.endpoints import Endpoints
 from conformance.transport import raw
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
+from proof.selftest.robots import running
+from proof.table1.selftest import BAROQUE
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,6 @@ from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.packs.table1.independent_robots import plain
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport import raw
@@ -23,6 +22,7 @@ from conformance.transport.incomplete_request import PartialRequest
 from conformance.transport.parallel import send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
+from proof.table1.independent_robots import plain
 
 _READS = "/turtlesim_subscriber_ws"
 _LINE = re.compile(rb"([A-Z]+) (\S+) HTTP/\d")

@@ -1,6 +1,6 @@
 """A robot that takes everything, for what a mutant sends to it."""
 
-from conformance.mutation.messages import Response
+from proof.mutation.messages import Response
 
 
 def sent_by(change, request):

@@ -3,12 +3,12 @@
 import pytest
 
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request, Response
-from conformance.selftest.generated import whens
-from conformance.selftest.generated.adversary import composed, kinds_in_requests
-from conformance.selftest.generated.catalogue import generated_mutants
-from conformance.selftest.generated.mutant import Tally
-from conformance.selftest.generated.reach import unreached
+from proof.mutation.messages import Request, Response
+from proof.selftest.generated import whens
+from proof.selftest.generated.adversary import composed, kinds_in_requests
+from proof.selftest.generated.catalogue import generated_mutants
+from proof.selftest.generated.mutant import Tally
+from proof.selftest.generated.reach import unreached
 
 CONTRACT = Contract.load()
 JSON = [("Content-Type", "application/json")]

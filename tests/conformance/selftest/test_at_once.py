@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from conformance.selftest import at_once
-from conformance.selftest.at_once import each_at_once, run_program
+from proof.selftest import at_once
+from proof.selftest.at_once import each_at_once, run_program
 
 _WAITS = [sys.executable, "-c", "import time; time.sleep(60)"]
 

@@ -6,8 +6,8 @@ import pytest
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.packs.table1.selftest import BAROQUE
-from conformance.selftest.certifying import Job, Outcome, robot_of, run_job
+from proof.selftest.certifying import Job, Outcome, robot_of, run_job
+from proof.table1.selftest import BAROQUE
 
 
 def job(rest="http://127.0.0.1:9", **more):

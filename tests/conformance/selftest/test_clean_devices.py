@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 from processes import free_port
 
-from conformance.cli.selftest import selftest
+from proof.cli.selftest import selftest
 
 _DEVICES = Path(__file__).parents[1] / "described_devices"
 _START_S = 60.0

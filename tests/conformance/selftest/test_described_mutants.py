@@ -8,12 +8,12 @@ import pytest
 
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request, Response
-from conformance.selftest.comparison import Comparison, ToolResult
-from conformance.selftest.generated.api_report import only_theirs, page
-from conformance.selftest.generated.described import described_mutants
-from conformance.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
-from conformance.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.mutation.messages import Request, Response
+from proof.selftest.comparison import Comparison, ToolResult
+from proof.selftest.generated.api_report import only_theirs, page
+from proof.selftest.generated.described import described_mutants
+from proof.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
+from proof.selftest.generated.mutant import GeneratedMutant, Tally
 
 _LAMP = {
     "type": "object",

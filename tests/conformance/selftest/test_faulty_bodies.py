@@ -5,13 +5,13 @@ import json
 import pytest
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.faulty_bodies import FAULTY_BODIES
-from conformance.packs.table1.independent_robots.baroque import BUILD
-from conformance.packs.table1.independent_robots.body import Body, pose
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
-from conformance.packs.table1.selftest import with_fault
-from conformance.selftest.certifying import job_at, run_job
-from conformance.selftest.robots import running
+from proof.selftest.certifying import job_at, run_job
+from proof.selftest.robots import running
+from proof.table1.faulty_bodies import FAULTY_BODIES
+from proof.table1.independent_robots.baroque import BUILD
+from proof.table1.independent_robots.body import Body, pose
+from proof.table1.selftest import with_fault
 
 
 @pytest.mark.parametrize("name", FAULTY_BODIES)

@@ -9,20 +9,20 @@ from taking_robot import sent_by
 from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.openapi import operations_of
-from conformance.mutation.messages import Request, Response
-from conformance.packs.table1.selftest import PLAIN
-from conformance.selftest.certifying import Outcome
-from conformance.selftest.comparison import Comparison, ToolResult
-from conformance.selftest.generated import judging
-from conformance.selftest.generated.adversary import composed, kinds_in_requests
-from conformance.selftest.generated.catalogue import every_change, generated_mutants, open_places
-from conformance.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
-from conformance.selftest.generated.mutant import Tally
-from conformance.selftest.generated.operators import OPERATORS
-from conformance.selftest.generated.report import document, summary
-from conformance.selftest.generated.sampling import Rate, rate_of, rates_by, sample
-from conformance.selftest.mutant_run import RobotPool
-from conformance.selftest.report import Report
+from proof.mutation.messages import Request, Response
+from proof.selftest.certifying import Outcome
+from proof.selftest.comparison import Comparison, ToolResult
+from proof.selftest.generated import judging
+from proof.selftest.generated.adversary import composed, kinds_in_requests
+from proof.selftest.generated.catalogue import every_change, generated_mutants, open_places
+from proof.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
+from proof.selftest.generated.mutant import Tally
+from proof.selftest.generated.operators import OPERATORS
+from proof.selftest.generated.report import document, summary
+from proof.selftest.generated.sampling import Rate, rate_of, rates_by, sample
+from proof.selftest.mutant_run import RobotPool
+from proof.selftest.report import Report
+from proof.table1.selftest import PLAIN
 
 CONTRACT = Contract.load()
 JSON = [("Content-Type", "application/json")]

@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
-from conformance.mutation.wire import IncompleteMessageError
-from conformance.packs.table1.mutants.crowd import later
+from proof.mutation.wire import IncompleteMessageError
+from proof.table1.mutants.crowd import later
 
 
 def test_it_is_done_with_its_arguments():

@@ -58,7 +58,7 @@ class Client:
 
 @pytest.fixture(scope="module", params=["plain", "baroque"])
 def robot(request):
-    rest, soap, stop = import_module(f"conformance.packs.table1.independent_robots.{request.param}").serve(0, 0)
+    rest, soap, stop = import_module(f"proof.table1.independent_robots.{request.param}").serve(0, 0)
     client = Client(rest, soap)
     client.name = request.param
     yield client
@@ -67,7 +67,7 @@ def robot(request):
 
 @pytest.fixture(scope="module")
 def legacy():
-    rest, soap, stop = import_module("conformance.packs.table1.independent_robots.legacy").serve(0, 0)
+    rest, soap, stop = import_module("proof.table1.independent_robots.legacy").serve(0, 0)
     yield Client(rest, soap)
     stop()
 
@@ -247,7 +247,7 @@ def test_legacy_is_as_lenient_as_java(legacy):
 
 
 def test_an_independent_robot_starts_and_stops_as_a_process():
-    command = [sys.executable, "-m", "conformance.packs.table1.independent_robots", "legacy"]
+    command = [sys.executable, "-m", "proof.table1.independent_robots", "legacy"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         line = process.stdout.readline()

@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.selftest import PLAIN
-from conformance.selftest.controls import Case, run_controls
-from conformance.selftest.link import LINKS, Direction, Link, linked
-from conformance.selftest.variants import VARIANTS
+from proof.selftest.controls import Case, run_controls
+from proof.selftest.link import LINKS, Direction, Link, linked
+from proof.selftest.variants import VARIANTS
+from proof.table1.selftest import PLAIN
 
 WIFI, FAR, OUTAGE = LINKS
 NEVER = (float("inf"), float("inf"))

@@ -9,11 +9,11 @@ from conformance.contract.classes import Level
 from conformance.contract.ledger import classes_of
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import unchanged
-from conformance.mutation.mutant import Mutant
-from conformance.mutation.self_test import SelfTest
-from conformance.packs.table1.mutants import MUTANTS
-from conformance.selftest import coverage
+from proof.mutation.messages import unchanged
+from proof.mutation.mutant import Mutant
+from proof.mutation.self_test import SelfTest
+from proof.selftest import coverage
+from proof.table1.mutants import MUTANTS
 
 CONTRACT = Contract.load()
 ROOT = Path(coverage.__file__).parents[2]

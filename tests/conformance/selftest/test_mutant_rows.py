@@ -2,9 +2,9 @@
 
 import pytest
 
-from conformance.mutation import changes, fields
-from conformance.mutation.messages import Request, Response
-from conformance.mutation.table import read_rows
+from proof.mutation import changes, fields
+from proof.mutation.messages import Request, Response
+from proof.mutation.table import read_rows
 
 _WORDS = {"things": vars(changes) | {"GOAL": "/goal/", "fields": fields}}
 _REQUEST = Request("rest", "GET", "/goal/")

@@ -10,9 +10,9 @@ from sprinklers import sprinklers
 
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request, Response
-from conformance.selftest.generated.described import described_mutants
-from conformance.selftest.generated.mutant import Tally
+from proof.mutation.messages import Request, Response
+from proof.selftest.generated.described import described_mutants
+from proof.selftest.generated.mutant import Tally
 
 _JSON, _TAG = {"Content-Type": "application/json"}, {"If-Match": "{tag}"}
 _FILE = {"Content-Type": "application/octet-stream"}

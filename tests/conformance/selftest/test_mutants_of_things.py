@@ -6,9 +6,9 @@ import pytest
 
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request, Response
-from conformance.selftest.generated.described import described_mutants
-from conformance.selftest.generated.mutant import Tally
+from proof.mutation.messages import Request, Response
+from proof.selftest.generated.described import described_mutants
+from proof.selftest.generated.mutant import Tally
 
 _BODY = {"content": {"application/json": {"schema": {"type": "object"}}}}
 _ANSWER = {"responses": {"200": {"description": "", **_BODY}}}

@@ -8,14 +8,14 @@ from taking_robot import sent_by
 from conformance.contract.interfaces import Interface
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.mutation.messages import Request
-from conformance.mutation.self_test import GoodDevice, OpenPlace, SelfTest, self_test_of
-from conformance.packs.table1.selftest import BAROQUE, PLAIN
-from conformance.selftest.controls import controls_of
-from conformance.selftest.generated.catalogue import generated_mutants
-from conformance.selftest.generated.mutant import Tally
-from conformance.selftest.generated.places import classes_of, places
-from conformance.selftest.variants import variants_of
+from proof.mutation.messages import Request
+from proof.mutation.self_test import GoodDevice, OpenPlace, SelfTest, self_test_of
+from proof.selftest.controls import controls_of
+from proof.selftest.generated.catalogue import generated_mutants
+from proof.selftest.generated.mutant import Tally
+from proof.selftest.generated.places import classes_of, places
+from proof.selftest.variants import variants_of
+from proof.table1.selftest import BAROQUE, PLAIN
 
 LAMP = Contract.load(Path(__file__).parents[3] / "examples" / "lamp")
 OPENAPI = """
@@ -89,7 +89,7 @@ def test_a_missing_text_is_filled_by_the_descriptions_example(door):
 
 
 def test_a_hook_is_read_from_the_packs_folder(tmp_path):
-    source = "from conformance.mutation.self_test import *\nSELFTEST = SelfTest(classes={'put.*': ('doors',)})\n"
+    source = "from proof.mutation.self_test import *\nSELFTEST = SelfTest(classes={'put.*': ('doors',)})\n"
     assert classes_of(pack(tmp_path, selftest__py=source), "putDoor", Interface.REST) == ("doors",)
 
 
@@ -123,7 +123,7 @@ def test_the_device_in_a_variant_is_the_quick_one_unless_the_pack_says_more():
 
 def test_controls_are_every_device_with_every_seed_and_once_in_every_variant(monkeypatch):
     contract = Contract.load()
-    monkeypatch.setattr("conformance.selftest.robots.find_spec", lambda _: None)
+    monkeypatch.setattr("proof.selftest.robots.find_spec", lambda _: None)
     controls = controls_of(contract, 2, short=False, variants=True)
     tried = {(case.device.name, case.seed) for case in controls.cases if case.variant is None}
     assert {("plain", 1), ("legacy", 0), ("node", 0)} <= tried

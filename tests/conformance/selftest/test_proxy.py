@@ -12,13 +12,13 @@ from urllib.parse import urlsplit
 import pytest
 from toy_server import serving
 
-from conformance.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
-from conformance.mutation.messages import HangUpError, Response
-from conformance.mutation.self_test import GoodDevice
-from conformance.packs.table1.independent_robots.plain import serve as plain_robot
-from conformance.selftest.proxy import Proxy
-from conformance.selftest.robots import Robot
-from conformance.selftest.variants import VARIANTS, certificate
+from proof.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
+from proof.mutation.messages import HangUpError, Response
+from proof.mutation.self_test import GoodDevice
+from proof.selftest.proxy import Proxy
+from proof.selftest.robots import Robot
+from proof.selftest.variants import VARIANTS, certificate
+from proof.table1.independent_robots.plain import serve as plain_robot
 
 
 @pytest.fixture

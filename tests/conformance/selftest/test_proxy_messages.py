@@ -2,8 +2,8 @@
 
 import pytest
 
-from conformance.mutation.messages import Request, Response
-from conformance.selftest.addresses import Addresses
+from proof.mutation.messages import Request, Response
+from proof.selftest.addresses import Addresses
 
 
 def test_fields_are_found_in_any_case_and_altered_in_a_copy_alone():

@@ -3,11 +3,11 @@
 import json
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.mutants import MUTANTS
-from conformance.selftest.certifying import Outcome
-from conformance.selftest.controls import ControlResult
-from conformance.selftest.mutant_run import MutantResult
-from conformance.selftest.report import Report
+from proof.selftest.certifying import Outcome
+from proof.selftest.controls import ControlResult
+from proof.selftest.mutant_run import MutantResult
+from proof.selftest.report import Report
+from proof.table1.mutants import MUTANTS
 
 CONTRACT = Contract.load()
 

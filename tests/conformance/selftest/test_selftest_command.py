@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from conformance.cli.contract import contract
-from conformance.cli.selftest import selftest
 from conformance.contract.pack import Contract
+from proof.cli.selftest import selftest
 
 
 def run(command, *words):
@@ -38,7 +38,7 @@ def test_what_a_command_says(command, words, code, said):
 
 
 def test_without_ros_it_says_what_to_do(monkeypatch):
-    monkeypatch.setattr("conformance.selftest.robots.find_spec", lambda _: None)
+    monkeypatch.setattr("proof.selftest.robots.find_spec", lambda _: None)
     done = run(selftest, "--faults", "pose-gone", "--seeds", "0", "--no-compare")
     assert (done.exit_code, "--target baroque" in done.output) == (3, True), done.output
 

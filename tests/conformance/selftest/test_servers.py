@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from conformance.contract.pack import Contract
-from conformance.mutation import programs
-from conformance.mutation.self_test import self_test_of
-from conformance.packs.table1.selftest import ON_SERVERS, PLAIN
-from conformance.selftest.controls import Case, run_controls
-from conformance.selftest.servers.fronts import FRONTS
+from proof.mutation import programs
+from proof.mutation.self_test import self_test_of
+from proof.selftest.controls import Case, run_controls
+from proof.selftest.servers.fronts import FRONTS
+from proof.table1.selftest import ON_SERVERS, PLAIN
 
 _CONTRACT = Contract.load()
 _FRONTS = {front.name: front for front in FRONTS}

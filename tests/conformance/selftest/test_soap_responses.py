@@ -3,10 +3,10 @@
 import pytest
 from lxml import etree
 
-from conformance.mutation.changes import SOAP, becomes, page
-from conformance.mutation.messages import Request
-from conformance.mutation.xml_trees import each, named, says, tree
-from conformance.packs.table1.mutants import soap_responses as edits
+from proof.mutation.changes import SOAP, becomes, page
+from proof.mutation.messages import Request
+from proof.mutation.xml_trees import each, named, says, tree
+from proof.table1.mutants import soap_responses as edits
 
 ASKED = Request("soap", "POST", "/")
 

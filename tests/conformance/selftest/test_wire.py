@@ -4,8 +4,8 @@ import socket
 
 import pytest
 
-from conformance.mutation.messages import Request, Response
-from conformance.mutation.wire import ClientConnection, IncompleteMessageError, RobotConnection
+from proof.mutation.messages import Request, Response
+from proof.mutation.wire import ClientConnection, IncompleteMessageError, RobotConnection
 
 OK = b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok"
 GET = Request("rest", "GET", "/", fields=[("Host", "a")])

@@ -12,8 +12,8 @@ from web_messages import delivery_envelope, delivery_path, twist
 from web_robot import eventually, problem, running_robot, usage_error
 
 from conformance.contract.pack import Contract
-from conformance.packs.table1.selftest import REFERENCE
-from conformance.selftest.certifying import Job, run_job
+from proof.selftest.certifying import Job, run_job
+from proof.table1.selftest import REFERENCE
 from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
 from reference_robot.webservices.http.hosts import Address, AllowedHosts, is_loopback

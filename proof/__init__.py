@@ -1,0 +1,1 @@
+"""Show that the suite notices faulty devices and blames no good one: what `roaas selftest` runs."""

@@ -1,0 +1,112 @@
+"""``roaas selftest --api``: mutants by rule before any running device with a description."""
+
+from __future__ import annotations
+
+import fnmatch
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import click
+
+from conformance.api.call_rules import CallRules
+from conformance.contract.toml_file import basic_string
+from conformance.documents.description import DescriptionError
+from conformance.documents.openapi import operations_of
+from conformance.statement.endpoints import Endpoints
+from conformance.target.describing import described_contract
+from conformance.transport.reach import UnreachableError
+from proof.cli.selftest_progress import Progress, compare
+
+if TYPE_CHECKING:
+    from conformance.contract.pack import Contract
+    from proof.selftest.generated.mutant import GeneratedMutant
+    from proof.selftest.report import Report
+
+
+def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
+    """Return the contract of the device's description, and the URL below which its operations are.
+
+    Raises:
+        click.UsageError: there is no usable description.
+    """
+    from conformance.target.connecting import connection_of  # noqa: PLC0415 - see selftest.py
+
+    try:
+        contract, where, _ = described_contract(
+            options["api"], (), options["base_url"], Endpoints(), connection_of(Endpoints()), options["out"]
+        )
+    except (DescriptionError, UnreachableError, OSError) as error:
+        raise click.UsageError(str(error)) from error
+    return contract, str(where.rest)
+
+
+def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) -> tuple[list[GeneratedMutant], int]:
+    """Return the sample of mutants of the operations that may be called, and how many there are.
+
+    Raises:
+        click.UsageError: no mutant has such a name.
+    """
+    from proof.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
+
+    called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
+    every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
+    every = tuple(one for one in every if one.exchange.name in called)
+    if options["adversary"]:
+        every = composed(every, kinds_in_requests(contract))
+    fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+    if not fitting:
+        raise click.UsageError(f"no mutant of an operation that may be called has a name like {', '.join(patterns)}")
+    return sample(fitting, options["generated"] or options["adversary"], options["seed"]), len(every)
+
+
+def callable_operations(contract: Contract, options: dict[str, Any]) -> tuple[str, ...]:
+    """Return the operations that the options allow to be called."""
+    rules = CallRules(options["allow"], options["never"])
+    return tuple(item.label for item in operations_of(contract) if rules.decide(item).may)
+
+
+def run_api(
+    report: Report, base_url: str, chosen: list[GeneratedMutant], options: dict[str, Any], *, compared: bool
+) -> None:
+    """Judge the unchanged device and the mutants, and add the results to the report."""
+    from proof.selftest.comparison import best_settings  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.judging import judge  # noqa: PLC0415 - as above
+    from proof.selftest.generated.reach import Recorder, unreached  # noqa: PLC0415 - as above
+    from proof.selftest.mutant_run import DescribedPool, run_unchanged  # noqa: PLC0415 - as above
+
+    progress = Progress(report, len(chosen))
+    with tempfile.TemporaryDirectory() as folder:
+        statement = Path(folder) / "calls.toml"
+        allow, never = (", ".join(map(basic_string, options[key])) for key in ("allow", "never"))
+        statement.write_text(f"[calls]\nallow = [{allow}]\nnever = [{never}]\n", encoding="utf-8")
+        with DescribedPool(report.contract, base_url, statement, options["parallel"]) as pool:
+            seen = Recorder()
+            unchanged = run_unchanged(pool, "standard", change=seen)
+            report.blamed = {id_: unchanged.reasons.get(id_, "") for id_ in unchanged.not_passed()}
+            for id_, reason in report.blamed.items():
+                click.echo(f"the unchanged device: {id_}: {reason}"[:400], err=True)
+            efforts = ("quick", "standard") if options["effort"] == "quick" else ("standard",)
+            started = time.monotonic()
+            report.generated_results = judge(
+                pool,
+                chosen,
+                efforts=efforts,
+                seed=options["seed"],
+                unreached=unreached(chosen, seen.messages),
+                tell=progress.by_rule,
+            )
+            report.notes.append(
+                f"A run of the unchanged device took {unchanged.seconds:.0f} s at standard effort with "
+                f"{unchanged.requests} requests; the mutants took {time.monotonic() - started:.0f} s."
+            )
+            if compared:
+                operations = callable_operations(report.contract, options)
+                mutants = [one.as_mutant() for one in chosen]
+                as_long = partial(best_settings, pool, operations=operations, seconds=unchanged.seconds)
+                compare(report, pool, mutants, progress, as_long)

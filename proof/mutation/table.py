@@ -1,0 +1,160 @@
+"""A table of mutants: each row names a mutant, the requirement that kills it, its fault, and the change that makes it.
+
+A row ends with an operator that makes the change, or decorates the change if that is a function or a class::
+
+    MUTANTS = Table()
+    _mutant = MUTANTS.of_class("rest-resources", "rest")
+
+    _mutant("goal-none-empty", "goal-none", "Without a goal, GET returns 204.").altered(GET, becomes(204), status(404))
+
+    @_mutant("goal-lingers", "goal-ended", "GET goes on returning a goal that has ended.")
+    class _Lingering: ...
+
+Rows whose change is made of words alone are data: see read_rows().
+"""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+from proof.mutation.changes import Make, When, Where, altered, instead, rewritten, success, values
+from proof.mutation.messages import Request, Response
+from proof.mutation.mutant import Mutant
+from proof.mutation.xml_trees import tree
+
+_Decorated = TypeVar("_Decorated", bound=Callable[..., Any])
+
+
+class Table:
+    """The mutants of one module, in the order of their rows."""
+
+    def __init__(self) -> None:
+        self._rows: list[Row] = []
+
+    def of_class(self, class_: str, interface: str, **common: Any) -> Callable[..., Row]:
+        """Return a function that adds a row: ``row(name, requirements, says, **settings)``.
+
+        Requirements are one or several ids without the class; one of another class has its class before it. ``common``
+        are attributes of Mutant that all these rows share.
+        """
+
+        def row(name: str, requirements: str | tuple[str, ...], says: str, **settings: Any) -> Row:
+            names = (requirements,) if isinstance(requirements, str) else requirements
+            kills = tuple(one if "/" in one else f"{class_}/{one}" for one in names)
+            made = Row(name, says, kills, {"interface": interface, **common, **settings})
+            self._rows.append(made)
+            return made
+
+        return row
+
+    def __iter__(self) -> Iterator[Mutant]:
+        """Yield the mutants.
+
+        Raises:
+            ValueError: a row has no change.
+        """
+        return (row.mutant() for row in self._rows)
+
+
+class Row:
+    """One row. Calling one of its methods gives it the change."""
+
+    def __init__(self, name: str, says: str, kills: tuple[str, ...], settings: dict[str, Any]) -> None:
+        self._parts = {"name": name, "says": says, "catches": kills, **settings}
+
+    def mutant(self) -> Mutant:
+        """Return the mutant.
+
+        Raises:
+            ValueError: the row has no change.
+        """
+        if "make" not in self._parts:
+            raise ValueError(f"mutant {self._parts['name']} has no change")
+        return Mutant(**self._parts)
+
+    def made(self, make: Make) -> None:
+        """Use ``make``, which returns the change for a run."""
+        self._parts["make"] = make
+
+    def __call__(self, change: _Decorated) -> _Decorated:
+        """Decorate the change: a stateless function, or a class that is instantiated for each run."""
+        self.made(change if isinstance(change, type) else lambda: change)
+        return change
+
+    def through(self, maker: Callable[[Any], Make]) -> Callable[[_Decorated], _Decorated]:
+        """Decorate an edit; ``maker`` turns it into the change."""
+
+        def decorate(edit: _Decorated) -> _Decorated:
+            self.made(maker(edit))
+            return edit
+
+        return decorate
+
+    def altered(self, where: Where, edit: Callable[[Response], object], when: When = success, *, nth: int = 1) -> None:
+        """Edit every nth response to ``where`` that fulfils ``when``."""
+        self.made(altered(where, edit, when, nth=nth))
+
+    def json(self, where: Where, edit: Callable[[Any], Any], when: When = success, *, nth: int = 1) -> None:
+        """Edit the JSON value of every nth response to ``where`` that fulfils ``when``."""
+        self.altered(where, values(edit), when, nth=nth)
+
+    def xml(self, where: Where, edit: Callable[[Any], object], when: When = success, *, nth: int = 1) -> None:
+        """Edit the XML tree of every nth response to ``where`` that fulfils ``when``."""
+        self.altered(where, tree(edit), when, nth=nth)
+
+    def rewritten(self, where: Where, edit: Callable[[Request], object]) -> None:
+        """Edit requests before they reach the device."""
+        self.made(rewritten(where, edit))
+
+    def instead(self, where: Where, response: Callable[[Request], Response]) -> None:
+        """Answer requests in place of the device."""
+        self.made(instead(where, response))
+
+
+def read_rows(path: Path, words: Mapping[str, Mapping[str, Any]]) -> Iterator[Mutant]:
+    """Yield the mutants of a TOML file, whose rows name where, which operator, when, and which requirements notice.
+
+    ``goal-none-empty = ["goal-none", "Without a goal, GET returns 204.", "altered(GET, becomes(204), status(404))"]``
+    in the table ``[module.interface.class]``; a fourth part has further attributes of Mutant.
+
+    Args:
+        path: of the file.
+        words: what the changes may name, by module.
+
+    Raises:
+        KeyError: a change names something else.
+        ValueError: a change is made of more than words, calls and literal values.
+    """
+    for module, interfaces in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        for interface, classes in interfaces.items():
+            for class_, rows in classes.items():
+                add = Table().of_class(class_, interface)
+                for name, (requirements, says, change, *more) in rows.items():
+                    named = requirements if isinstance(requirements, str) else tuple(requirements)
+                    row = add(name, named, says, **(more[0] if more else {}))
+                    row.made(_value(ast.parse(change, mode="eval").body, words[module]))
+                    yield row.mutant()
+
+
+def _value(node: ast.expr, words: Mapping[str, Any]) -> Any:
+    """Return the value of an expression of words, calls and literal values."""
+    found: Any
+    match node:
+        case ast.Name():
+            found = words[node.id]
+        case ast.Attribute(value=ast.Name(id=module)) if isinstance(words[module], ModuleType):
+            found = getattr(words[module], node.attr)
+        case ast.Call():
+            named = {one.arg: _value(one.value, words) for one in node.keywords if one.arg}
+            found = _value(node.func, words)(*(_value(one, words) for one in node.args), **named)
+        case ast.Tuple() | ast.List():
+            values = [_value(one, words) for one in node.elts]
+            found = values if isinstance(node, ast.List) else tuple(values)
+        case _:
+            found = ast.literal_eval(node)
+    return found

@@ -1,0 +1,139 @@
+"""List all generated mutants of a contract pack, in an order that depends on the pack's descriptions alone."""
+
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cache
+
+from conformance.contract.pack import Contract
+from proof.mutation.self_test import OpenPlace, self_test_of
+from proof.selftest.generated import bodies, heads, lenience
+from proof.selftest.generated.described import described_mutants
+from proof.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
+from proof.selftest.generated.operators import NUMERIC, OPERATORS, Operator
+from proof.selftest.generated.places import Exchange, Place, exchanges, places
+
+_NULL = next(operator for operator in OPERATORS if operator.name == "null")
+# What happens to whole answers now and then.
+_WHOLE = {"crossed": bodies.crossed, "failing": bodies.failing, "cut": bodies.cut}
+
+
+@cache
+def every_change(contract: Contract) -> tuple[GeneratedMutant, ...]:
+    """Return all generated changes, including those that break no clause of the contract."""
+    found = [*_of_fields(contract), *_of_exchanges(contract)]
+    return tuple({mutant.name: mutant for mutant in found}.values())
+
+
+@cache
+def generated_mutants(contract: Contract) -> tuple[GeneratedMutant, ...]:
+    """Return the generated mutants: the changes that break a clause of the contract."""
+    if not contract.is_claimed:
+        return described_mutants(contract)
+    return tuple(change for change in every_change(contract) if open_place(contract, change) is None)
+
+
+def _of_fields(contract: Contract) -> Iterator[GeneratedMutant]:
+    there = places(contract)
+    members: dict[tuple[object, ...], set[str]] = defaultdict(set)
+    for place in there:
+        members[place.exchange, place.part, place.medium, place.steps[:-1]].add(place.steps[-1])
+    for place in there:
+        for operator in OPERATORS:
+            if operator.fits(place):
+                yield _at(operator, place)
+        if place.part == "answer" and place.medium in {"json", "soap"} and place.kind not in {"object", "array"}:
+            for mode in MODES:
+                yield _at(_NULL, place, mode)
+        if place.part == "request" and place.medium == "json":
+            known = members[place.exchange, place.part, place.medium, place.steps]
+            yield from lenience.of_lenience(place, frozenset(known))
+
+
+def _at(operator: Operator, place: Place, mode: str = "") -> GeneratedMutant:
+    name = f"{operator.name}@{mode}" if mode else operator.name
+    when = f", {MODES[mode]}" if mode else ""
+    return GeneratedMutant(
+        f"{name}:{place.exchange.name}:{place.label}:{place.medium}",
+        f"{place.label} of {place.exchange.name} ({place.medium}) {operator.says}{when}.",
+        name,
+        place.exchange,
+        _classes(place),
+        of_answer(operator, place, mode) if place.part == "answer" else of_request(operator, place),
+    )
+
+
+def _classes(place: Place) -> tuple[str, ...]:
+    """Return the conformance classes whose checks read a field, most likely killer first."""
+    own = place.exchange.classes
+    if place.medium == "xml":
+        return ("rest-formats", "strict-input", *own) if place.part == "request" else ("rest-formats", "http")
+    if place.part == "request":
+        return (*own, "strict-input")
+    if place.medium == "soap":
+        return (*own, "soap-basic-profile")
+    return (*own, "rest-formats", "http")
+
+
+def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
+    numeric = {one.exchange.name for one in places(contract) if one.part == "answer" and one.kind in NUMERIC}
+    for exchange in exchanges(contract):
+        yield from heads.of_statuses(exchange)
+        yield from heads.of_headers(exchange)
+        yield from bodies.of_bodies(exchange, numbers=exchange.name in numeric)
+        for what, make in _WHOLE.items():
+            if what == "cut" and not exchange.formats:
+                continue
+            for mode, when in {"": "every time", **MODES}.items():
+                yield _whole(exchange, what, mode, when, make)
+
+
+def _whole(exchange: Exchange, what: str, mode: str, when: str, make: bodies.Whole) -> GeneratedMutant:
+    name = f"{what}@{mode}" if mode else what
+    return GeneratedMutant(
+        f"{name}:{exchange.name}:answer",
+        f"{exchange.name}'s answer is {what}, {when}.",
+        name,
+        exchange,
+        classes_of_answers(exchange),
+        make(exchange, mode),
+    )
+
+
+_UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
+#: What norms leave open, whatever the contract.
+BY_NORM = (
+    OpenPlace(
+        r"body-bom:[^:]+:body:xml",
+        "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
+        "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"body-bom:[^:]+:body:text",
+        "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); what "
+        "forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"header-(drop|change):[^:]+:Vary",
+        "Vary tells caches which clients a response is fit for: a response that may be cached needs it "
+        "(RFC 9110 12.5.5), and the response to an unsafe method may not (9.2.3).",
+        side="rest",
+        methods=_UNSAFE,
+    ),
+    OpenPlace(
+        r"header-more:[^:]+:Allow",
+        "A method that Allow names in every response is the vendor's own (RFC 9110 10.2.1). The suite does not send "
+        "it, as it may do anything.",
+    ),
+)
+
+
+def open_places(contract: Contract) -> tuple[OpenPlace, ...]:
+    """Return the patterns of changes that break no clause of the norms or of the pack's contract."""
+    return (*self_test_of(contract).open_places, *BY_NORM)
+
+
+def open_place(contract: Contract, change: GeneratedMutant) -> OpenPlace | None:
+    """Return the pattern that says why a change breaks no clause; None for a change that breaks one."""
+    exchange = change.exchange
+    covering = (one for one in open_places(contract) if one.covers(change.name, exchange.side, exchange.method))
+    return next(covering, None)

@@ -1,0 +1,332 @@
+"""Mutants of HTTP itself before a described device: fields, methods, framing."""
+
+import re
+from collections.abc import Callable, Iterator
+
+from conformance.documents.openapi import Operation
+from proof.mutation.messages import Change, Forward, Request, Response
+from proof.selftest.generated.described_failures import Edit, edited, failed
+from proof.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.selftest.generated.places import Exchange
+
+_SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
+# By how many octets a wrong length is wrong.
+_OFF = 7
+
+
+def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants of an operation's resource that break HTTP, whatever the description says."""
+
+    def resource(request: Request) -> bool:
+        return request.side == "rest" and re.fullmatch(exchange.path, request.path) is not None
+
+    def at(*methods: str) -> Callable[[Request], bool]:
+        return lambda request: resource(request) and request.method in methods
+
+    rows: list[tuple[str, str, Callable[[Request], bool], Edit]] = [
+        (name, says, exchange.concerns, edit) for name, (says, edit) in _ANSWERS.items()
+    ]
+    if operation.method == "GET":
+        rows += [(name, says, at("HEAD"), edit) for name, (says, edit) in _HEADS.items()]
+    rows += [(name, says, resource, _allow(edit)) for name, (says, edit) in _allows(operation.method).items()]
+    rows.append(
+        ("unknown-taken", "answers a method that nobody knows with 200 (RFC 9110 9.1)", _unknown(resource), _taken)
+    )
+    rows.append(("unknown-fails", "answers a method that nobody knows with 500", _unknown(resource), _failing))
+    rows.append(("options-fails", "answers OPTIONS with 500", at("OPTIONS"), _failing))
+    for name, says, where, edit in rows:
+        yield GeneratedMutant(
+            f"{name}:{exchange.name}:http",
+            f"{exchange.name} {says}.",
+            name,
+            exchange,
+            exchange.classes,
+            edited(where, edit),
+        )
+
+
+def _changed(change: Callable[[Response], object], when: Callable[[Response], bool]) -> Edit:
+    def edit(_request: Request, answer: Response) -> Response | None:
+        if not when(answer):
+            return None
+        altered = answer.copy()
+        change(altered)
+        return altered
+
+    return edit
+
+
+def _fine(answer: Response) -> bool:
+    return answer.status in _SUCCESS and answer.method != "HEAD"
+
+
+def _with_body(answer: Response) -> bool:
+    return _fine(answer) and bool(answer.body)
+
+
+def _raw(octets: Callable[[bytes, bytes], bytes]) -> Callable[[Response], None]:
+    """Return an edit of the octets of a response, by its head without the last empty line and its body."""
+
+    def edit(answer: Response) -> None:
+        head, _, body = answer.octets().partition(b"\r\n\r\n")
+        answer.raw = octets(head, body)
+
+    return edit
+
+
+def _length(head: bytes, by: int) -> bytes:
+    return re.sub(
+        rb"(?i)(content-length: )(\d+)", lambda found: found[1] + str(max(0, int(found[2]) + by)).encode(), head
+    )
+
+
+def _without_length(head: bytes) -> bytes:
+    return re.sub(rb"(?i)\r\ncontent-length: \d+", b"", head)
+
+
+def _as_part(answer: Response) -> None:
+    answer.status, answer.reason = 206, ""
+    answer.put("Content-Range", "bytes 0-9/99")
+
+
+def _unasked(request: Request, answer: Response) -> Response | None:
+    conditional = any(name.lower().startswith("if-") for name, _ in request.fields)
+    if conditional or not _fine(answer) or request.method != "GET":
+        return None
+    altered = answer.copy()
+    altered.status, altered.reason, altered.body = 304, "", b""
+    return altered
+
+
+def _failing(_request: Request, answer: Response) -> Response | None:
+    altered = answer.copy()
+    failed(altered)
+    return altered
+
+
+# What is done to successful responses, with the clause.
+_ANSWERS: dict[str, tuple[str, Edit]] = {
+    "no-type": (
+        "sends no Content-Type (RFC 9110 8.3)",
+        _changed(lambda answer: answer.drop("Content-Type"), _with_body),
+    ),
+    "half-type": (
+        "sends a malformed Content-Type (RFC 9110 8.3.1)",
+        _changed(lambda answer: answer.put("Content-Type", answer.media_type.partition("/")[0]), _with_body),
+    ),
+    "two-types": (
+        "sends Content-Type twice (RFC 9110 5.3)",
+        _changed(lambda answer: answer.fields.append(("Content-Type", "text/plain")), _with_body),
+    ),
+    "name-twice": (
+        "sends an object with a name twice (RFC 8259 4)",
+        _changed(
+            lambda answer: setattr(answer, "body", re.sub(rb'\{("[^"]+"\s*:)', rb"{\1null,\1", answer.body, count=1)),
+            lambda answer: _with_body(answer) and answer.media_type.endswith("json") and b'{"' in answer.body,
+        ),
+    ),
+    "no-date": (
+        "sends no Date (RFC 9110 6.6.1)",
+        _changed(lambda answer: answer.drop("Date"), lambda answer: _fine(answer) and answer.field("Date") is not None),
+    ),
+    "bad-date": (
+        "sends a Date that is no IMF-fixdate (RFC 9110 5.6.7)",
+        _changed(lambda answer: answer.put("Date", "2026-01-31T12:00:00Z"), _fine),
+    ),
+    "bad-etag": (
+        "sends an ETag without quotes (RFC 9110 8.8.3)",
+        _changed(lambda answer: answer.put("ETag", "abc"), _fine),
+    ),
+    "bad-modified": (
+        "sends a Last-Modified that is no IMF-fixdate (RFC 9110 8.8.2)",
+        _changed(lambda answer: answer.put("Last-Modified", "yesterday"), _fine),
+    ),
+    "long-length": (
+        "sends a Content-Length that is too great (RFC 9112 6.3)",
+        _changed(_raw(lambda head, body: _length(head, _OFF) + b"\r\n\r\n" + body), _with_body),
+    ),
+    "short-length": (
+        "sends a Content-Length that is too small (RFC 9112 6.3)",
+        _changed(
+            _raw(lambda head, body: _length(head, -_OFF) + b"\r\n\r\n" + body),
+            lambda answer: _with_body(answer) and len(answer.body) > _OFF,
+        ),
+    ),
+    "two-lengths": (
+        "sends two Content-Lengths (RFC 9110 8.6)",
+        _changed(_raw(lambda head, body: head + b"\r\nContent-Length: 3\r\n\r\n" + body), _with_body),
+    ),
+    "chunked-and-length": (
+        "sends Transfer-Encoding and Content-Length (RFC 9112 6.2)",
+        _changed(
+            _raw(
+                lambda head, body: (
+                    head + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % len(body) + body + b"\r\n0\r\n\r\n"
+                )
+            ),
+            _with_body,
+        ),
+    ),
+    "bad-chunk": (
+        "sends chunks with a wrong size (RFC 9112 7.1)",
+        _changed(
+            _raw(
+                lambda head, body: (
+                    _without_length(head)
+                    + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % (len(body) + 4)
+                    + body
+                    + b"\r\n0\r\n\r\n"
+                )
+            ),
+            _with_body,
+        ),
+    ),
+    "folded-field": (
+        "folds a field over two lines (RFC 9112 5.2)",
+        _changed(_raw(lambda head, body: head + b"\r\nX-Note: one\r\n two\r\n\r\n" + body), _fine),
+    ),
+    "space-before-colon": (
+        "has a space before a colon (RFC 9112 5.1)",
+        _changed(_raw(lambda head, body: head + b"\r\nX-Note : one\r\n\r\n" + body), _fine),
+    ),
+    "unasked-part": (
+        "answers 206 where no range was asked for (RFC 9110 15.3.7)",
+        _changed(_as_part, lambda answer: answer.status in _SUCCESS and bool(answer.body)),
+    ),
+    "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _unasked),
+}
+
+
+_HEADS: dict[str, tuple[str, Edit]] = {
+    "head-body": (
+        "sends a body in response to HEAD (RFC 9110 9.3.2)",
+        _changed(
+            lambda answer: setattr(answer, "raw", answer.octets() + b'{"roaas": 1}'),
+            lambda answer: answer.status in _SUCCESS,
+        ),
+    ),
+    "head-type": (
+        "sends another Content-Type for HEAD than for GET (RFC 9110 9.3.2)",
+        _changed(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS),
+    ),
+    "head-length": (
+        "sends another Content-Length for HEAD than for GET (RFC 9110 8.6)",
+        _changed(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS),
+    ),
+    "head-fails": ("answers HEAD with 500", _failing),
+}
+
+
+def _taken(_request: Request, answer: Response) -> Response | None:
+    altered = answer.copy()
+    altered.status, altered.reason = 200, ""
+    return altered
+
+
+def _unknown(resource: Callable[[Request], bool]) -> Callable[[Request], bool]:
+    known = {"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "CONNECT"}
+    return lambda request: (
+        resource(request) and bool(re.fullmatch(r"[A-Z]+", request.method)) and request.method not in known
+    )
+
+
+def _allow(edit: Callable[[Response], object]) -> Edit:
+    return _changed(edit, lambda answer: answer.field("Allow") is not None and answer.status == _METHOD_NOT_ALLOWED)
+
+
+def _allows(method: str) -> dict[str, tuple[str, Callable[[Response], object]]]:
+    def less(answer: Response) -> None:
+        words = re.split(r"\s*,\s*", answer.field("Allow") or "")
+        answer.put("Allow", ", ".join(word for word in words if word != method))
+
+    return {
+        "allow-drop": ("answers 405 without Allow (RFC 9110 15.5.6)", lambda answer: answer.drop("Allow")),
+        "allow-less": ("answers 405 with an Allow that lacks a method of the resource (RFC 9110 10.2.1)", less),
+    }
+
+
+def of_resource(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants whose resource says one thing by one request, and another by the next."""
+
+    def at(*methods: str) -> Callable[[Request], bool]:
+        return lambda request: re.fullmatch(exchange.path, request.path) is not None and request.method in methods
+
+    rows: list[tuple[str, str, Callable[[Tally], Change]]] = [
+        (
+            "refused-as-missing",
+            "answers 404 in place of 405 (RFC 9110 15.5.6)",
+            edited(
+                lambda request: re.fullmatch(exchange.path, request.path) is not None,
+                _changed(_missing, lambda answer: answer.status == _METHOD_NOT_ALLOWED),
+            ),
+        )
+    ]
+    if operation.method == "GET":
+        tagged = _changed(
+            lambda answer: answer.put("ETag", '"roaas"'),
+            lambda answer: bool(answer.field("ETag")) and _succeeded(answer),
+        )
+        rows += [
+            ("head-missing", "answers HEAD with 404", edited(at("HEAD"), _changed(_missing, _succeeded))),
+            ("head-tag", "sends another ETag for HEAD (RFC 9110 9.3.2)", edited(at("HEAD"), tagged)),
+            ("tag-kept", "keeps its first ETag (RFC 9110 8.8.1)", _keeping_tags(at("GET", "HEAD"))),
+            (
+                "list-ignored",
+                "knows one tag in If-None-Match, and no list (RFC 9110 13.1.2)",
+                _without("If-None-Match", at("GET"), lambda value: "," in value),
+            ),
+        ]
+    if operation.method in {"PUT", "PATCH", "DELETE"}:
+        ignored = _without("If-Match", at(operation.method), lambda _: True)
+        rows.append(("match-ignored", "ignores If-Match (RFC 9110 13.1.1)", ignored))
+    for name, says, make in rows:
+        yield GeneratedMutant(
+            f"{name}:{exchange.name}:resource", f"{exchange.name} {says}.", name, exchange, exchange.classes, make
+        )
+
+
+def _missing(answer: Response) -> None:
+    answer.status, answer.reason = 404, ""
+
+
+def _succeeded(answer: Response) -> bool:
+    return answer.status in _SUCCESS
+
+
+def _keeping_tags(where: Callable[[Request], bool]) -> Callable[[Tally], Change]:
+    """Return a change that gives each path the strong ETag that it had at first."""
+
+    def make(tally: Tally) -> Change:
+        first: dict[str, str] = {}
+
+        def edit(request: Request, answer: Response) -> Response | None:
+            tag = answer.field("ETag")
+            if not tag or tag.startswith("W/") or first.setdefault(request.path, tag) == tag:
+                return None
+            altered = answer.copy()
+            altered.put("ETag", first[request.path])
+            return altered
+
+        return edited(where, edit)(tally)
+
+    return make
+
+
+def _without(name: str, where: Callable[[Request], bool], when: Callable[[str], bool]) -> Callable[[Tally], Change]:
+    """Return a change that takes a condition out of requests, counted where the device answers 2xx."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            value = request.field(name)
+            if value is None or not where(request) or not when(value):
+                return forward(request)
+            without = request.copy()
+            without.drop(name)
+            response = forward(without)
+            if response.status in _SUCCESS:
+                tally()
+            return response
+
+        return change
+
+    return make

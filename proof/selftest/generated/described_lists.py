@@ -1,0 +1,124 @@
+"""Mutants of the lists of a described device: parameters without effect, and totals that go wrong in time."""
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from conformance.api.rest.listing import COUNTS, TOTALS, Page, listing_of, page_of
+from conformance.documents.json_schema import Schema
+from conformance.documents.openapi import Operation
+from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.representation import flat
+from conformance.transport import exchange as transport
+from proof.mutation.messages import Change, Forward, Request, Response
+from proof.selftest.generated.described_inputs import NOTHING, Input
+from proof.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.selftest.generated.places import Exchange
+
+# A total goes wrong after so many lists, and after that it stays wrong.
+_RIGHT = 10
+_DEPTH = 2
+_Differs = Callable[[Page, Page], bool]
+
+
+def of_lists(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants of an operation's list, which break what its parameters and totals say."""
+    listing = listing_of(operation)
+    if listing is None:
+        return
+    rows: list[tuple[str, Parameter | None, _Differs]] = [
+        ("limit-ignored", listing.limit, lambda right, wrong: len(wrong.items) > len(right.items)),
+        ("order-ignored", listing.sort, _in_another_order),
+        *(("filter-ignored", one, _with_more) for one in listing.filters.values()),
+        *(("page-repeated", one, _with_more) for one in (listing.offset, listing.page, listing.cursor)),
+    ]
+    for operator, parameter, differs in rows:
+        if parameter is not None:
+            name = f"{operator}:{exchange.name}:query.{parameter.name}"
+            says = f"{exchange.name} answers as if {parameter.name} was not sent."
+            make = _ignoring(exchange, parameter, differs)
+            yield GeneratedMutant(name, says, operator, exchange, exchange.classes, make)
+    if _tells_total(operation.shape or {}):
+        says = f"{exchange.name} tells one item too many after {_RIGHT} lists."
+        name, make = f"total-later:{exchange.name}:answer", _counting(exchange)
+        yield GeneratedMutant(name, says, "total-later", exchange, exchange.classes, make)
+
+
+def _tells_total(schema: Schema, depth: int = 0) -> bool:
+    """Return whether a response has a member that tells how many items there are, in an object around the list."""
+    parts = flat(schema).get("properties", {}) if depth <= _DEPTH else {}
+    return any(plain_name(name) in TOTALS | COUNTS or _tells_total(part, depth + 1) for name, part in parts.items())
+
+
+def _with_more(right: Page, wrong: Page) -> bool:
+    return bool(set(wrong.identities) - set(right.identities))
+
+
+def _in_another_order(right: Page, wrong: Page) -> bool:
+    return right.identities != wrong.identities and sorted(right.identities) == sorted(wrong.identities)
+
+
+def _ignoring(exchange: Exchange, parameter: Parameter, differs: _Differs) -> Callable[[Tally], Change]:
+    """Return a change that leaves a parameter out, counted where that changes the list."""
+    item = Input("query", (parameter.name,), parameter.schema, parameter.required)
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            response = forward(request)
+            if not exchange.concerns(request) or item.read(exchange, request) is NOTHING:
+                return response
+            right = _page_in(response)
+            other = forward(item.written(exchange, request, NOTHING)) if right is not None else response
+            wrong = _page_in(other)
+            if right is None or wrong is None or not differs(right, wrong):
+                return response
+            tally()
+            return other
+
+        return change
+
+    return make
+
+
+def _counting(exchange: Exchange) -> Callable[[Tally], Change]:
+    """Return a change that adds one to the totals of later lists."""
+
+    def make(tally: Tally) -> Change:
+        seen = 0
+
+        def change(request: Request, forward: Forward) -> Response:
+            nonlocal seen
+            response = forward(request)
+            page = _page_in(response) if exchange.concerns(request) else None
+            if page is None or not page.totals:
+                return response
+            seen += 1
+            altered = response.copy()
+            if seen <= _RIGHT or not _added(altered, page):
+                return response
+            tally()
+            return altered
+
+        return change
+
+    return make
+
+
+def _added(response: Response, page: Page) -> bool:
+    """Add one to each total of a body; return whether there is one."""
+    value = json.loads(response.body)
+    pending, found = [value], False
+    while pending:
+        inner: Any = pending.pop()
+        for name, one in inner.items() if isinstance(inner, dict) else ():
+            if plain_name(name) in page.totals and type(one) is int:
+                inner[name], found = one + 1, True
+            elif isinstance(one, dict):
+                pending.append(one)
+    response.body = json.dumps(value).encode()
+    return found
+
+
+def _page_in(response: Response) -> Page | None:
+    """Return the list in a message, as the checkers read it."""
+    return page_of(transport.Response(response.status, tuple(response.fields), response.body, 0.0))

@@ -1,0 +1,240 @@
+"""Mutants that treat requests otherwise than the description says: they take, refuse or crash at some values."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+from conformance.api.rest.samples import sample
+from conformance.documents.json_schema import kinds_of
+from conformance.documents.openapi import Operation, is_json
+from proof.mutation.messages import Change, Forward, Request, Response
+from proof.selftest.generated.breaches import valid
+from proof.selftest.generated.described_inputs import NOTHING, Input, inputs_of
+from proof.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.selftest.generated.places import Exchange
+
+_SUCCESS = range(200, 300)
+_LONG, _BIG = 1000, 10**9
+
+
+def _made(
+    operator: str, exchange: Exchange, item: Input, says: str, make: Callable[[Tally], Change]
+) -> GeneratedMutant:
+    name = f"{operator}:{exchange.name}:{item.label}"
+    return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
+
+
+# What a schema says of values, and how a mutant that does not look at it is called. A format is a remark only (JSON
+# Schema 2020-12, Validation 7.2.1).
+_LOOSE: dict[str, tuple[str, ...]] = {
+    "takes-type": ("type",),
+    "takes-any-text": ("enum", "const"),
+    "takes-below": ("minimum", "exclusiveMinimum"),
+    "takes-above": ("maximum", "exclusiveMaximum"),
+    "takes-short": ("minLength", "minItems"),
+    "takes-long": ("maxLength", "maxItems"),
+    "takes-form": ("pattern",),
+}
+
+
+def lenient(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that do not look at one rule of an input: what breaks that rule alone is taken."""
+    for item in inputs_of(operation):
+        good = sample(item.schema)
+        for operator, keys in _LOOSE.items():
+            rules = [key for key in keys if key in item.schema]
+            # Every text of a path or query is a text; null is no value there.
+            textual = "string" in kinds_of(item.schema)
+            if rules and not (operator == "takes-type" and item.where != "body" and textual):
+                yield _made(
+                    operator, exchange, item, "does not look at a rule of", _taking(exchange, item, rules, good)
+                )
+        if item.required and item.where != "path":
+            yield _made("takes-missing", exchange, item, "does not need", _filling(exchange, item, good))
+
+
+def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Callable[[Tally], Change]:
+    free = {key: value for key, value in item.schema.items() if key not in rules}
+
+    def forbidden(value: Any) -> bool:
+        # What the other rules forbid as well is for them; without a type, rules of types that are not there are void.
+        if value is NOTHING or valid(item.schema, value):
+            return False
+        return valid(free, value) or "type" in rules
+
+    return _forwarding(
+        exchange,
+        lambda request: forbidden(item.read(exchange, request)),
+        lambda request: item.written(exchange, request, good),
+    )
+
+
+def _filling(exchange: Exchange, item: Input, good: Any) -> Callable[[Tally], Change]:
+    def missing(request: Request) -> bool:
+        return item.there(request) and item.read(exchange, request) is NOTHING
+
+    return _forwarding(exchange, missing, lambda request: item.written(exchange, request, good))
+
+
+def _forwarding(
+    exchange: Exchange, when: Callable[[Request], bool], edit: Callable[[Request], Request]
+) -> Callable[[Tally], Change]:
+    """Return a change that edits a request, counted where the device takes the edited one."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            if not exchange.concerns(request) or not when(request):
+                return forward(request)
+            response = forward(edit(request))
+            if response.status in _SUCCESS:
+                tally()
+            return response
+
+        return change
+
+    return make
+
+
+def strict(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that refuse what the description allows."""
+    refusal = _refusal(operation)
+    for item in inputs_of(operation):
+        schema = item.schema
+        values = [value for value in schema.get("enum", ()) if value is not None][:6]
+        if kinds_of(schema) == {"boolean"}:
+            values = [True, False]
+        for value in values:
+            yield _refusing("refuses-value", exchange, item, json.dumps(value), refusal, value)
+        for key in ("minimum", "maximum", "default"):
+            if key in schema and schema[key] is not None:
+                yield _refusing(f"refuses-{key}", exchange, item, key, refusal, schema[key])
+        for key in ("minLength", "maxLength"):
+            if (
+                isinstance(schema.get(key), int)
+                and "pattern" not in schema
+                and "format" not in schema
+                and "enum" not in schema
+            ):
+                yield _refusing(f"refuses-{key}", exchange, item, key, refusal, None, schema[key])
+        if not item.required:
+            yield _refusing("refuses-optional", exchange, item, "any value", refusal)
+            yield _needing(exchange, item, refusal)
+
+
+Answer = Callable[[Response], Response]
+
+
+def _refusal(operation: Operation) -> Answer:
+    """Return what makes a response a refusal as the description has it: 422 or 400, whichever is declared."""
+    status = next((code for code in (422, 400) if operation.response_key(code) is not None), 422)
+    content = operation.declared(status) or {}
+    name, schema = next(((name, schema) for name, schema in content.items() if is_json(name)), ("application/json", {}))
+    return _instead(status, name, json.dumps(sample(schema, whole=True) if schema else {}).encode())
+
+
+def _instead(status: int, media_type: str, body: bytes) -> Answer:
+    """Return what replaces status and body of a response, and keeps its other fields, which are right."""
+
+    def answer(response: Response) -> Response:
+        altered = response.copy()
+        altered.status, altered.reason, altered.body = status, "", body
+        altered.put("Content-Type", media_type)
+        return altered
+
+    return answer
+
+
+def _refusing(
+    operator: str, exchange: Exchange, item: Input, says: str, refusal: Answer,
+    value: Any = NOTHING, length: int | None = None,
+) -> GeneratedMutant:  # fmt: skip
+    def fits(given: Any) -> bool:
+        if given is NOTHING or not valid(item.schema, given):
+            return False
+        if length is not None:
+            return isinstance(given, str) and len(given) == length
+        return value is NOTHING or (given == value and isinstance(given, bool) == isinstance(value, bool))
+
+    made = _made(
+        operator,
+        exchange,
+        item,
+        f"refuses {says} of",
+        _answering(exchange, lambda request: fits(item.read(exchange, request)), refusal),
+    )
+    return made if says == "any value" else _named(made, says)
+
+
+def _named(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
+    return replace(mutant, name=f"{mutant.name}:{more}")
+
+
+def _needing(exchange: Exchange, item: Input, refusal: Answer) -> GeneratedMutant:
+    def missing(request: Request) -> bool:
+        return item.there(request) and item.read(exchange, request) is NOTHING
+
+    return _made("needs-optional", exchange, item, "needs the optional", _answering(exchange, missing, refusal))
+
+
+def _answering(
+    exchange: Exchange, when: Callable[[Request], bool], answer: Answer, *, anyway: bool = False
+) -> Callable[[Tally], Change]:
+    """Return a change that answers in the device's place; unless ``anyway``, where the device itself accepts."""
+
+    def make(tally: Tally) -> Change:
+        def change(request: Request, forward: Forward) -> Response:
+            if not exchange.concerns(request) or not when(request):
+                return forward(request)
+            response = forward(request)
+            if response.status not in _SUCCESS and not anyway:
+                return response
+            tally()
+            return answer(response)
+
+        return change
+
+    return make
+
+
+def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
+    """Yield mutants that fail with 500 at a kind of value in one input, or at what is missing."""
+    kinds: dict[str, Callable[[Any], bool]] = {
+        "crash-empty": lambda value: value == "",
+        "crash-letters": lambda value: isinstance(value, str) and not value.isascii(),
+        "crash-long": lambda value: isinstance(value, str) and len(value) > _LONG,
+        "crash-quote": lambda value: isinstance(value, str) and "'" in value,
+        "crash-null-byte": lambda value: isinstance(value, str) and "\x00" in value,
+        "crash-big": lambda value: isinstance(value, int | float) and value > _BIG,
+        "crash-negative": lambda value: isinstance(value, int | float) and value < 0,
+        "crash-null": lambda value: value is None,
+        "crash-type": lambda value: isinstance(value, dict | list),
+    }
+
+    failed = _instead(500, "text/plain", b"Internal Server Error")
+    for item in inputs_of(operation):
+        of = kinds_of(item.schema)
+        for operator, strikes in kinds.items():
+            numeric = operator in {"crash-big", "crash-negative"}
+            if numeric and not of & {"integer", "number"}:
+                continue
+            if not numeric and operator not in {"crash-null", "crash-type"} and "string" not in of:
+                continue
+            if operator in {"crash-null", "crash-type"} and item.where != "body":
+                continue
+            if (item.where == "path" and operator == "crash-empty") or (
+                operator == "crash-type" and of & {"object", "array"}
+            ):
+                continue
+
+            def when(request: Request, item: Input = item, strikes: Callable[[Any], bool] = strikes) -> bool:
+                value = item.read(exchange, request)
+                return value is not NOTHING and strikes(value)
+
+            yield _made(
+                operator,
+                exchange,
+                item,
+                "fails with 500 at a value of",
+                _answering(exchange, when, failed, anyway=True),
+            )

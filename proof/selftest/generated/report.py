@@ -1,0 +1,140 @@
+"""Report the results of generated mutants: in selftest.json, on the terminal, and in docs/coverage.md."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from conformance.contract.pack import Contract
+from proof.selftest.generated.catalogue import every_change, generated_mutants, open_place, open_places
+from proof.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
+from proof.selftest.generated.sampling import Rate, rate_of, rates_by
+
+# The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
+_WRITTEN = {KILLED: "caught"}
+_KEYS = ("class", "clause", "operation", "when", "operator", "effort")
+
+
+def _figures(rate: Rate) -> dict[str, Any]:
+    return {
+        "caught": rate.killed,
+        "survived": rate.survived,
+        "not_reached": rate.not_reached,
+        "rate": round(rate.share, 4),
+        "at_least": round(rate.bound, 4),
+    }
+
+
+def document(exist: int, results: Iterable[GeneratedResult], seed: int) -> dict[str, Any]:
+    """Return the part of selftest.json on generated mutants, of which so many exist.
+
+    ``at_least`` is the lower bound of Wilson's 95 % interval of the kill rate.
+    """
+    results = list(results)
+    return {
+        "exist": exist,
+        "seed": seed,
+        "all": _figures(rate_of(results)),
+        **{f"by_{key}": {name: _figures(rate) for name, rate in rates_by(results, key).items()} for key in _KEYS},
+        "mutants": [
+            {
+                "name": result.mutant.name,
+                "says": result.mutant.says,
+                "outcome": _WRITTEN.get(result.outcome, result.outcome),
+                "by": list(result.by),
+                "not_conformant": result.fails,
+                "effort": result.effort,
+                "altered": result.altered,
+                "runs": result.runs,
+                "seconds": round(result.seconds, 2),
+                "reason": result.reason,
+            }
+            for result in results
+        ],
+    }
+
+
+def summary(exist: int, results: Iterable[GeneratedResult]) -> str:
+    """Return the rates and the list of survivors for the terminal."""
+    results = list(results)
+    lines = [f"Mutants by rule killed: {rate_of(results).words()}; {exist} exist"]
+    if warned := sum(result.outcome == KILLED and not result.fails for result in results):
+        lines.append(f"{warned} of them by a SHOULD alone")
+    for key in _KEYS:
+        lines.append(f"by {key}:")
+        lines += [f"  {name:20} {rate.words()}" for name, rate in rates_by(results, key).items()]
+    for result in results:
+        if result.outcome == SURVIVED:
+            lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) altered {result.altered} times")
+        if result.outcome in {BROKEN, GIVEN_UP}:
+            lines.append(f"{result.outcome.upper()} {result.mutant.name}: {result.reason or 'a run came to no end'}")
+    return "\n".join(lines)
+
+
+def rates_page(
+    command: str, exist: int, results: Iterable[GeneratedResult], theirs: Mapping[str, bool], notes: Iterable[str]
+) -> str:
+    """Return a Markdown page with the rates, for selftest.md and docs/caught.md.
+
+    Args:
+        command: the command that gives this page.
+        exist: how many mutants there are.
+        results: result of each mutant.
+        theirs: by mutant's name, whether plain Schemathesis killed it, for those it was run on.
+        notes: remarks at the end of the page.
+    """
+    results = list(results)
+    about = (
+        f"`{command}`: {len(results)} of the {exist} mutants by rule. The sample takes each operator in each class in "
+        "turn, so that rare ones weigh as much as frequent ones. A mutant is killed when a requirement fails or warns "
+        "of it and passes the good device. A mutant that altered nothing in any run does not count. Bounds are the "
+        "lower end of Wilson's 95 % interval."
+    )
+    lines = ["# Mutants by rule, and how many are killed", "", about, "", f"**{rate_of(results).words()}.**"]
+    for key in _KEYS:
+        lines += ["", f"| {key} | killed | altered something | rate | at least |", "|---|---|---|---|---|"]
+        lines += [
+            f"| `{name}` | {rate.killed} | {rate.reached} | {rate.share:.1%} | {rate.bound:.1%} |"
+            for name, rate in rates_by(results, key).items()
+        ]
+    if theirs:
+        both = [result for result in results if result.mutant.name in theirs and result.outcome != NOT_REACHED]
+        ours, schemathesis = (
+            Rate(killed, len(both) - killed, 0)
+            for killed in (
+                sum(result.outcome == KILLED for result in both),
+                sum(theirs[result.mutant.name] for result in both),
+            )
+        )
+        lines += ["", "Of those over REST that plain Schemathesis was tried on as well:", ""]
+        lines += [f"- this suite: {ours.words()}", f"- plain Schemathesis: {schemathesis.words()}"]
+    lines += ["", "| not killed | what it does | outcome | how often |", "|---|---|---|---|"]
+    lines += [
+        f"| `{_cell(result.mutant.name)}` | {_cell(result.mutant.says)} | {result.outcome} | {result.altered} |"
+        for result in results
+        if result.outcome not in {KILLED, NOT_REACHED}
+    ]
+    return "\n".join([*lines, *(f"\n{note}" for note in notes)]) + "\n"
+
+
+def page_part(contract: Contract) -> list[str]:
+    """Return lines for docs/coverage.md: the number of generated mutants, and the changes that break no clause."""
+    mutants = generated_mutants(contract)
+    operators = Counter(mutant.operator.partition("@")[0] for mutant in mutants)
+    left = Counter(open_place(contract, change) for change in every_change(contract))
+    covering = [place for place in open_places(contract) if left[place]]
+    listed = ", ".join(f"`{name}` {number}" for name, number in sorted(operators.items()))
+    about = (
+        f"{len(mutants)} mutants by rule, at every field, status, header and operation of the pack's descriptions; "
+        "`roaas selftest --generated N --seed S` judges a sample, with `--list` it shows them. "
+        f"By operator: {listed}."
+    )
+    lines = ["", "## Mutants by rule", "", about]
+    if covering:
+        lines += ["", "The rules also make these changes, which break no clause and are not judged:", ""]
+        lines += ["| changes (regular expression) | number | why they break no clause |", "|---|---|---|"]
+        lines += [f"| `{_cell(place.pattern)}` | {left[place]} | {_cell(place.reason)} |" for place in covering]
+    return lines
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")

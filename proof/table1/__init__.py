@@ -1,0 +1,1 @@
+"""The proof for the paper's robot: mutants, independent robots, faulty bodies."""

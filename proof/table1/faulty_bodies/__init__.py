@@ -1,0 +1,17 @@
+"""Faults in a robot's behaviour, which a proxy in front of the robot could not cause.
+
+Each is a class of bodies for the independent robot ``baroque``. A mutant behind a proxy alters messages; these robots
+send consistent messages and behave otherwise.
+"""
+
+from pathlib import Path
+
+from proof.table1.faulty_bodies.missions import MISSIONS
+from proof.table1.faulty_bodies.readings import READINGS
+from proof.table1.faulty_bodies.velocities import VELOCITIES
+
+FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
+#: Statements of faulty bodies that declare something else than ``baroque.toml`` does, by the fault's name.
+STATEMENTS = {path.stem: path for path in Path(__file__).parent.glob("*.toml")}
+#: Faults of which a statement leaves nothing to see: they need not fail, but must not pass.
+UNSEEN = frozenset({"dead-base"})

@@ -1,0 +1,140 @@
+"""Bodies that drive at another velocity than commanded, or for another time."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from proof.table1.independent_robots.body import TICK_S, Body
+
+# What a body makes of the velocity that it was asked for (linear, angular).
+_Driven = Callable[[float, float], tuple[float, float]]
+
+
+def _holding(factor: Callable[[float, float | None], float]) -> type[Body]:
+    """Return a class of bodies that hold a velocity ``factor`` times as long as declared.
+
+    ``factor`` receives the linear and angular part; the angular part is None for a linear PUT.
+    """
+
+    class Holding(Body):
+        def drive(self, v: float, w: float | None) -> float:
+            """Command a velocity, and change its hold time."""
+            with self._lock:
+                kept = super().drive(v, w)
+                self._until = self._tick + round(factor(v, w) * self.build.hold_s / TICK_S)
+                return kept
+
+    return Holding
+
+
+class _WatchdogSometimes(Body):
+    """A body whose watchdog stops every second velocity that is not renewed; the others go on for a minute."""
+
+    _MINUTE = round(60 / TICK_S)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._ended = 0
+
+    def _aim(self) -> tuple[float, float]:
+        if self.goal is None and self._tick == self._until and any(self._command):
+            self._ended += 1
+            if self._ended % 2:
+                self._until += self._MINUTE
+        return super()._aim()
+
+
+class _RenewedByChange(Body):
+    """A body in which repeating the same velocity does not renew it."""
+
+    def drive(self, v: float, w: float | None) -> float:
+        """Command a velocity, unless it is the current one."""
+        with self._lock:
+            self._advance()
+            before, until = self._command, self._until
+            kept = super().drive(v, w)
+            if before == self._command and until > self._tick:
+                self._until = until
+            return kept
+
+
+def _driving(driven: _Driven) -> type[Body]:
+    """Return a class of bodies that drive at the velocity ``driven`` returns, while no goal is active."""
+
+    class Driving(Body):
+        def _aim(self) -> tuple[float, float]:
+            commanded = self.goal is None
+            aim = super()._aim()
+            return driven(*aim) if commanded else aim
+
+    return Driving
+
+
+class _SlowReversal(Body):
+    """A body that brakes very slowly when commanded to reverse."""
+
+    def _aim(self) -> tuple[float, float]:
+        commanded, now = self.goal is None, self._state.v
+        v, w = super()._aim()
+        if commanded and v * now < 0 and abs(v - now) > 0.4:  # noqa: PLR2004 - m/s
+            return now - math.copysign(0.001, now), w
+        return v, w
+
+
+class _DeadBase(Body):
+    """A body that ignores velocities, and whose statement has limits so low that rest is "near" each of them."""
+
+    def __post_init__(self) -> None:
+        """Lower the limits of the build to those of the statement."""
+        self.build = replace(self.build, linear_m_s=0.12, angular_rad_s=0.25, cruise_m_s=0.24, turn_rad_s=0.5)
+        super().__post_init__()
+
+    def _aim(self) -> tuple[float, float]:
+        commanded = self.goal is None
+        aim = super()._aim()
+        return (0.0, 0.0) if commanded else aim
+
+
+class _AxesIgnored(Body):
+    """A body that accepts a velocity along each of six axes, as its statement says, and moves along two of them."""
+
+    further_axes = 0.3
+
+    def __post_init__(self) -> None:
+        """Lower the limit of turning to that of the further axes, as the statement has one figure for all of them."""
+        self.build = replace(self.build, angular_rad_s=self.further_axes, turn_rad_s=0.29)
+        super().__post_init__()
+
+
+_LINEAR, _ANGULAR = 0.25, 1.2  # what is fast for the robot, m/s and rad/s
+_SLOW, _SLOW_TURN = 0.1, 0.6
+_DEAD, _DEAD_TURN = 0.06, 0.25  # what is too slow for its motors
+_STEP = 0.1
+_MOST_BACK, _MOST_TURN = 0.2, 1.3
+
+VELOCITIES: dict[str, type[Body]] = {
+    "hold-long": _holding(lambda _v, _w: 1.7),
+    "hold-short": _holding(lambda _v, _w: 0.7),
+    "hold-long-linear": _holding(lambda v, w: 2.0 if v and w is None else 1.0),
+    "hold-forever-linear": _holding(lambda v, w: 40.0 if v and w is None else 1.0),
+    "hold-long-slow": _holding(lambda v, w: 2.0 if w and abs(w) < _SLOW_TURN and abs(v) < _SLOW else 1.0),
+    "hold-short-fast": _holding(lambda v, _w: 0.5 if abs(v) > _LINEAR else 1.0),
+    "hold-forever-full-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is not None else 1.0),
+    "hold-forever-full-back": _holding(lambda v, w: 40.0 if v < 0 and w is not None else 1.0),
+    "hold-forever-linear-ahead": _holding(lambda v, w: 40.0 if v > 0 and w is None else 1.0),
+    "hold-forever-left": _holding(lambda _v, w: 40.0 if w and w > 0 else 1.0),
+    "watchdog-sometimes": _WatchdogSometimes,
+    "renewed-by-change": _RenewedByChange,
+    "back-capped": _driving(lambda v, w: (max(v, -_MOST_BACK), w)),
+    "left-capped": _driving(lambda v, w: (v, min(w, _MOST_TURN))),
+    "right-capped": _driving(lambda v, w: (v, max(w, -_MOST_TURN))),
+    "both-capped": _driving(lambda v, w: (v, 0.6 * w if abs(v) > _LINEAR and abs(w) > _ANGULAR else w)),
+    "deadband": _driving(lambda v, w: (v if abs(v) > _DEAD else 0.0, w)),
+    "deadband-angular": _driving(lambda v, w: (v, w if abs(w) > _DEAD_TURN else 0.0)),
+    "steps": _driving(lambda v, w: (round(v / _STEP) * _STEP, w)),
+    "mirrored-back": _driving(lambda v, w: (v, -w if v < 0 else w)),
+    "drift": _driving(lambda v, w: (v, 0.12 if v and not w else w)),
+    "slow-reversal": _SlowReversal,
+    "dead-base": _DeadBase,
+    "axes-ignored": _AxesIgnored,
+}

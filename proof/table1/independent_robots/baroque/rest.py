@@ -1,0 +1,173 @@
+"""REST as elaborate as the contract lets it be, and the robot's own descriptions of it."""
+
+import json
+import time
+from email.message import Message
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from proof.table1.independent_robots.baroque.writing import as_json, as_text, as_xml, problem
+from proof.table1.independent_robots.body import Body, Goal, stamp
+from proof.table1.independent_robots.plain import reading, rest
+from proof.table1.independent_robots.plain.reading import RefusedError
+from proof.table1.independent_robots.plain.server import Answer
+from proof.table1.independent_robots.plain.writing import choose
+
+SENSORS = [
+    {"name": "front laser", "topic": "/front/scan", "type": "sensor_msgs/msg/LaserScan"},
+    {"name": "odometry", "topic": "/odom", "type": "nav_msgs/msg/Odometry"},
+    {"name": "battery", "topic": "/battery", "type": "sensor_msgs/msg/BatteryState"},
+]
+SERVICES = [
+    {"name": "compute_path_to_pose", "type": "nav2_msgs/action/ComputePathToPose"},
+    {"name": "navigate_to_pose", "type": "nav2_msgs/action/NavigateToPose"},
+]
+_ACTIVE_S = 0.5
+_DESCRIPTIONS = {"/openapi.json", "/application.wadl"}
+
+
+class Rest(rest.Rest):
+    """The REST interface of one body."""
+
+    sensors, services = SENSORS, SERVICES
+    formats = ("application/json", "text/plain", "application/xml")
+    charsets = dict.fromkeys(formats[1:], ";charset=UTF-8")
+    allow, redirects, foresees, talks = "aLLOW", False, False, True
+
+    def __init__(self, body: Body) -> None:
+        super().__init__(body)
+        self.resources["/robot/app/delivery/"] = {"GET": self._reads("Deliveries", self._deliveries)}
+
+    def options(self, allowed: str) -> Answer:
+        """Return the response to OPTIONS, with a body."""
+        return Answer(200, allowed.encode(), "text/plain; charset=us-ascii", {self.allow: allowed})
+
+    def refuse(self, refused: RefusedError, headers: Message) -> Answer:
+        """Return a problem with every member."""
+        xml = choose(rest.accept_of(headers), self.formats) == "application/xml"
+        return problem(refused.status, str(refused), xml=xml)
+
+    def done(self, headers: Message, root: str, value: Any) -> Answer:
+        """Return the value that was set."""
+        return self.shown(200, value, root, headers)
+
+    def accepted(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
+        """Return the goal, which is created where it is new."""
+        answer = self.shown(201 if new else 200, rest.goal_value(goal), "MoveBaseActionGoal", headers)
+        answer.fields |= {"location": "/robot/navigation/action/goal/"} if new else {}
+        return answer
+
+    def number(self, text: str, name: str, *, integer: bool = False) -> float | int:
+        """Return the number that a text in a target represents; any other text is 400."""
+        try:
+            return reading.number(text, name, integer=integer)
+        except RefusedError as refused:
+            raise RefusedError(400, str(refused)) from None
+
+    def written(self, value: Any, root: str, format_: str) -> bytes:
+        """Return a value in an unusual notation, with fields of the robot's own."""
+        if root == "Odometry":
+            value = {**value, "serial_number": "B-17", "charge": 0.5}
+        elif root == "Twist":
+            value = {**value, "unit": "m/s"}
+        elif root == "Sensors":
+            value = [{**one, "rate": 10.0} for one in value]
+        elif root == "MoveBaseActionGoal":
+            value = {**value, "status": {**value["status"], "mood": "fine"}}
+        if format_ == "application/xml":
+            return as_xml(root, value)
+        return as_json(value) if format_ == "application/json" else as_text(value)
+
+    def _deliveries(self) -> list[dict[str, Any]]:
+        """Return the latest accepted deliveries, newest first."""
+        now = time.time()
+        return [
+            {
+                "request": one.request,
+                "state": "active" if now - one.accepted < _ACTIVE_S else "done",
+                "accepted": stamp(one.accepted),
+                "interface": one.interface,
+            }
+            for one in list(self._body.deliveries)
+        ]
+
+    @property
+    def _described(self) -> dict[str, list[str]]:
+        """The methods of each resource that is described."""
+        found = {path: [*methods] for path, methods in self.resources.items() if path not in _DESCRIPTIONS}
+        return found | {rest.DELIVERY: ["PUT"]}
+
+    def _openapi(self, _headers: Message, _body: bytes, _target: str) -> Answer:
+        """Return an OpenAPI 3.0 description with the parts that the contract requires, and no schemas."""
+        paths = {
+            path: {
+                method.lower(): {
+                    "responses": {"default": {"description": "see the contract"}},
+                    **({"parameters": _parameters(path)} if _parameters(path) else {}),
+                    **({"requestBody": {"content": {"application/json": {}}}} if _has_body(method, path) else {}),
+                }
+                for method in methods
+            }
+            for path, methods in self._described.items()
+        }
+        about = {"openapi": "3.0.3", "info": {"title": "baroque", "version": "1"}, "servers": [{"url": "/"}]}
+        return Answer(200, json.dumps({**about, "paths": paths}, indent=1).encode(), "application/json")
+
+    def _wadl(self, headers: Message, _body: bytes, _target: str) -> Answer:
+        """Return a WADL description whose resources are nested as Jersey nests them."""
+        inner = "".join(
+            _wadl_resource(path.removeprefix("/robot/"), methods) for path, methods in self._described.items()
+        )
+        base = quoteattr(f"http://{headers.get('Host', 'localhost')}")
+        text = (
+            '<application xmlns="http://wadl.dev.java.net/2009/02" xmlns:xsd="http://www.w3.org/2001/XMLSchema">'
+            f"<resources base={base}>"
+            f"<resource path='/robot'>{inner}</resource></resources></application>"
+        )
+        return Answer(200, text.encode(), "application/xml")
+
+
+def _has_body(method: str, path: str) -> bool:
+    return method == "PUT" and "{" not in path
+
+
+def _parameters(path: str) -> list[dict[str, Any]]:
+    number, text = {"type": "number", "format": "double"}, {"type": "string"}
+    if "{" in path:
+        names = [part[1:-1] for part in path.split("/") if part.startswith("{")]
+        whole = {"type": "integer", "format": "int32"}
+        return [
+            {"in": "path", "name": name, "required": True, "schema": whole if name == "code" else number}
+            for name in names
+        ]
+    if not path.endswith("/plan"):
+        return []
+    return [
+        {
+            "in": "query",
+            "name": name.rstrip("?"),
+            "required": not name.endswith("?"),
+            "schema": text if kind == "string" else number,
+        }
+        for name, kind in reading.PLAN.items()
+    ]
+
+
+def _wadl_resource(path: str, methods: list[str]) -> str:
+    types = {"integer": "int", "number": "double", "string": "string"}
+    said = {
+        where: "".join(
+            f"<param style='{style}' name='{one['name']}' type='xsd:{types[one['schema']['type']]}'"
+            f"{' required=' + chr(39) + 'true' + chr(39) if where == 'query' and one['required'] else ''}/>"
+            for one in _parameters("/robot/" + path)
+            if one["in"] == where
+        )
+        for where, style in (("path", "template"), ("query", "query"))
+    }
+    body = "".join(
+        f"<method name='{method}'>"
+        + (f"<request>{said['query']}</request>" if said["query"] else "")
+        + "<response><representation mediaType='application/json'/></response></method>"
+        for method in methods
+    )
+    return f"<resource path='{path}'>{said['path']}{body}</resource>"
