@@ -12,10 +12,11 @@ from click.testing import CliRunner
 from conformance.cli.contract import contract
 from conformance.contract.pack import Contract
 from proof.cli.selftest import selftest
+from roaas import FrontDoor
 
 
 def run(command, *words):
-    return CliRunner().invoke(command, list(words))
+    return CliRunner().invoke(command, list(words), obj=FrontDoor())
 
 
 LAMP = str(Path(__file__).parents[3] / "examples" / "lamp")
