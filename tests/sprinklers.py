@@ -1,5 +1,6 @@
 """A device of irrigation zones, right in several styles, and with faults that show between two exchanges."""
 
+import asyncio
 import copy
 import hashlib
 import itertools
@@ -24,7 +25,13 @@ _WRITABLE = {
     "starts": {"type": "string", "format": "date-time"},
     "valves": {"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 99}, "maxItems": 8},
 }
-_FIRST = {"minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": []}
+_AREAS, _SORTS = ["front", "back"], ["minutes", "-minutes"]
+_WRITABLE["area"] = {"type": "string", "enum": _AREAS}
+_QUERY = [
+    {"name": name, "in": "query", "schema": {"type": "string", "enum": values}}
+    for name, values in (("area", _AREAS), ("sort", _SORTS))
+]
+_FIRST = {"area": "front", "minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": []}
 _SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "additionalProperties": False}
 _PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
 _READ = "description/written-is-read"
@@ -59,7 +66,7 @@ class Sprinklers:
         self.zones, self.maps, self.keys, self.old = {}, {}, {}, {}
         self.issued, self.numbers, self.ticks = set(), itertools.count(1), itertools.count(1)
         self.settings = {"season": "summer", "rain_stop": True, "pressure": 2.5}
-        self.cached = None
+        self.cached, self.made, self.areas = None, 0, {}
         self.since_s = float("-inf")
         for name in ("lawn", "roses"):
             self.add({"name": name})
@@ -67,9 +74,10 @@ class Sprinklers:
     def has(self, fault):
         return fault in self.faults
 
-    def add(self, body):
-        id_ = f"z{next(self.numbers)}"
+    def add(self, body, id_=""):
+        id_ = id_ or f"z{next(self.numbers)}"
         self.zones[id_] = {**_FIRST, **body, "id": id_, "state": "idle", "at": 0.0}
+        self.areas[id_] = self.zones[id_]["area"]
         self.settle(id_)
         return id_
 
@@ -191,12 +199,15 @@ class Sprinklers:
         media_type = self.wants(request, "application/json", "text/csv")
         if not media_type:
             return error(406, "JSON or CSV")
+        area, sort = (request.query.get(one) for one in ("area", "sort"))
+        if area not in {None, *_AREAS} or sort not in {None, *_SORTS}:
+            return error(422, "no such area or order")
         for zone in self.zones.values():
             if request.method == "HEAD" and self.has("HEAD renames"):
                 zone["name"] = "seen"
             if self.has("a list resets") and request.query_string == "":
                 zone["minutes"] = 10
-        found, headers = self.listed(), {"Vary": "Accept"}
+        found, headers = self.chosen(self.listed(), area, sort), {"Vary": "Accept"}
         if self.style.get("caches"):
             headers["Cache-Control"] = f"max-age={self.style['caches']}"
         if media_type == "application/json":
@@ -209,6 +220,14 @@ class Sprinklers:
         lines = [",".join(_quoted(one) for one in row) for row in [["id", "name", "minutes", "state"], *rows]]
         body = "\r\n".join([*lines, ""]).encode()
         return web.Response(body=body, content_type="text/csv", charset="utf-8", headers=headers)
+
+    def chosen(self, found, area, sort):
+        """Return the zones of an area in an order."""
+        by = self.areas if self.has("the filter goes by the first area") else {one["id"]: one["area"] for one in found}
+        found = [one for one in found if area in {None, by[one["id"]]}]
+        as_text = str if self.has("minutes are sorted as texts") else float
+        in_order = sorted(found, key=lambda one: as_text(one["minutes"]), reverse=str(sort).startswith("-"))
+        return found if sort is None else in_order
 
     def listed(self):
         """Return the zones as the list shows them, in one style as it was a while ago."""
@@ -234,10 +253,13 @@ class Sprinklers:
             return body
         if (known := self.answer_of(key, body)) is not None:
             return known
-        value = self.shown(self.add(self.taken(body)))
+        id_ = f"y{self.made}" if self.has("two at once get one id") else ""
+        await asyncio.sleep(0.03 if id_ else 0)
+        self.made += 1
+        value = self.shown(self.add(self.taken(body), id_))
         if key is not None and self.style.get("keys", True):
             self.keys[key] = body, value
-            while len(self.keys) > self.style.get("remembers", 1000):
+            while len(self.keys) > (1 if self.has("the next key ends one") else self.style.get("remembers", 1000)):
                 del self.keys[next(iter(self.keys))]
         return self.again(201, value) if is_acceptable else error(406, "JSON only")
 
@@ -429,7 +451,7 @@ class Sprinklers:
             return error(422, "not these members")
         if not all(rules[name](one) for name, one in value.items()):
             return error(422, "not valid")
-        self.settings = value
+        self.settings = {**value, "season": self.settings["season"]} if self.has("the season stays") else value
         return web.json_response(value)
 
     async def weather(self, request):
@@ -448,7 +470,8 @@ def _forced(octets):
         value = json.loads(octets)
     except ValueError:
         return {}
-    return {name: one for name, one in value.items() if _fits(name, one)} if isinstance(value, dict) else {}
+    found = {name: one for name, one in value.items() if _fits(name, one)} if isinstance(value, dict) else {}
+    return {"name": "forced", **found}
 
 
 def _quoted(text):
@@ -467,6 +490,7 @@ _RULES = {
     "minutes": lambda one: type(one) in (int, float) and 0 <= one <= 600,
     "litres": lambda one: type(one) in (int, float) and one % 1 == 0 and 0 <= one <= 2**60,
     "starts": lambda one: isinstance(one, str) and _is_time(one),
+    "area": lambda one: one in _AREAS,
     "valves": lambda one: (
         isinstance(one, list) and len(one) <= 8 and all(type(part) is int and 0 <= part <= 99 for part in one)
     ),
@@ -508,7 +532,7 @@ def sprinklers(style, faults=()):
     document = described(
         {
             "/zones": {
-                "get": {"responses": {"200": listing, **_BAD}},
+                "get": {"parameters": _QUERY, "responses": {"200": listing, **_BAD}},
                 "post": {
                     "parameters": key,
                     "requestBody": sent,
@@ -640,5 +664,14 @@ FAULTS = [
     ),
     ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
     ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
-    ("as described", {"If-Match takes a weak tag": "description/if-match"}),
+    (
+        "as described",
+        {
+            "If-Match takes a weak tag": "description/if-match",
+            "the filter goes by the first area": "description/list-filter",
+            "minutes are sorted as texts": "description/list-order",
+            "the next key ends one": "description/idempotency-key",
+        },
+    ),
+    ("without conditions", {"two at once get one id": "description/created-is-there", "the season stays": _READ}),
 ]

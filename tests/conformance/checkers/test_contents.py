@@ -12,6 +12,7 @@ from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE, _OCTETS = "http://device:80", "application/octet-stream"
 _FILE = {"description": "", "content": {_OCTETS: {"schema": {}}}}
+_TEXT = {"description": "", "content": {"text/plain": {"schema": {}}}}
 _JSON = {"description": "", "content": {"application/json": {"schema": {}}}}
 _IF = [{"in": "header", "name": name, "schema": {"type": "string"}} for name in ("If-Match", "If-None-Match")]
 _CHANGES = {"parameters": _IF, "responses": {"200": _JSON, "412": _JSON, "428": _JSON}}
@@ -19,6 +20,13 @@ _PATHS = {
     "/map": {
         "get": {"responses": {"200": _FILE, "206": _FILE}},
         "put": {"requestBody": {"content": {_OCTETS: {"schema": {}}}}, "responses": {"200": _JSON}},
+    },
+    **{
+        path: {
+            "get": {"summary": said, "responses": {"200": _TEXT}},
+            "put": {"requestBody": {"content": {"text/plain": {"schema": {}}}}, "responses": {"200": _JSON}},
+        }
+        for path, said in (("/label", "The octets that were stored."), ("/note", "The note."))
     },
     "/state": {"get": {"responses": {"200": _JSON}}, "put": _CHANGES},
     "/free": {"get": {"responses": {"200": _JSON}}, "put": {**_CHANGES, "parameters": []}},
@@ -31,7 +39,7 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, **fields):
     method, target, status = line.split()
     back = [(name[1:].replace("_", "-"), text) for name, text in fields.items() if name.startswith("_")]
     asked = [(name.replace("_", "-"), text) for name, text in fields.items() if not name.startswith("_")]
-    asked += [("Content-Type", _OCTETS)] if sent else []
+    asked += [("Content-Type", "text/plain" if target in {"/label", "/note"} else _OCTETS)] if sent else []
     request = Request(method, _BASE + target, (("Host", "device:80"), *asked), sent)
     return Exchange(request, Response(int(status), tuple([*back, ("Content-Type", kind)] if body else back), body, 1.0))
 
@@ -54,6 +62,16 @@ _PART = _one("GET /map 206", b"2345", range="bytes=2-5", _content_range="bytes 2
 _SHIFTED = _one("GET /map 206", b"3456", range="bytes=2-5", _content_range="bytes 2-5/10")
 _PUT = _one("PUT /map 200", b"{}", _WHOLE, kind="application/json")
 _PUT_NEXT = _one("PUT /map 200", b"{}", b"next", kind="application/json")
+
+
+def _lines(path, *pairs):
+    """Return texts that are stored one after another, and read."""
+    steps = [(_one(f"PUT {path} 200", b"{}", sent, kind="application/json"), got) for sent, got in pairs]
+    return [one for put, got in steps for one in (put, _one(f"GET {path} 200", got, kind="text/plain"))]
+
+
+_CHANGED_ENDS = ((b"a\nb", b"a\r\nb"), (b"c\nd", b"c\r\nd"))
+_CUT = ((b"a\nb c", b"a\nb"), (b"c\nd e", b"c\nd"))
 _IF_RANGE = {"range": "bytes=2-2", "_etag": '"a"', "_content_range": "bytes 2-2/10"}
 _STATE = _one("GET /state 200", b"{}", kind="application/json", _etag='"s"')
 _STATE_NOW = _one("GET /state 200", b"{ }", kind="application/json", _etag='"t"')
@@ -97,6 +115,8 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
         [_STATE, _one("PUT /state 428"), _one("PUT /state 412", if_none_match="*"), _STATE],
         [_STATE, _one("PUT /state 412", if_match='"s"', if_none_match='"s"'), _STATE],
         [_one("GET /free 200", b"{}", _etag='"s"'), _one("PUT /free 200"), _one("PUT /free 200", if_none_match="*")],
+        # Lines of a text may end in several ways where no description says more.
+        _lines("/note", *_CHANGED_ENDS),
         # A problem need not state a status.
         [_one("GET /state 404", b"{}", kind="application/problem+json")],
         [_one("GET /state 404", b'{"status": 404}', kind="application/problem+json")],
@@ -116,6 +136,9 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
         ("http/range", [_GET, _one("GET /map 206", b"0123", range="bytes=-4", _content_range="bytes 0-3/10"), _GET]),
         ("http/range", [_GET, _one("GET /map 206", b"23", range="bytes=2-3", _content_range="bytes 2-3/2"), _GET]),
         ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **_IF_RANGE)]),
+        ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **{**_IF_RANGE, "_etag": 'W/"a"'})]),
+        ("description/written-is-read", _lines("/label", *_CHANGED_ENDS)),
+        ("description/written-is-read", _lines("/note", *_CUT)),
         ("description/entity-tag", [_STATE, _STALE, _STATE]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _repr_digest=_digest(b"other"))]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _content_digest=f"{_digest(_WHOLE)[:-3]}A=:")]),

@@ -20,6 +20,7 @@ _JOB = {"type": "object", "properties": {**_MEMBERS, **_OWN, "kept": {"type": "b
 _UUID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string", "format": "uuid"}}
 _BODY = {"required": True, "content": {"application/json": {"schema": _JOB}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_ONCE = {**_ID, "schema": {"type": "string", "description": "Never given twice."}}
 _OK = {"200": answers(_JOB), "201": answers(_JOB), "204": {"description": "done"}, "4XX": {"description": "refused"}}
 _PATHS = {
     "/jobs": {
@@ -34,8 +35,19 @@ _PATHS = {
         "get": {"responses": _OK},
         "put": {"requestBody": _BODY, "responses": _OK},
         "patch": {"requestBody": _BODY, "responses": _OK},
-        "delete": {"responses": _OK},
+        "delete": {"summary": "Delete a job, and its label with it.", "responses": _OK},
     },
+    **{
+        f"/jobs/{{id}}/{name}": {
+            "parameters": [_ID],
+            "get": {"responses": _OK},
+            "put": {"requestBody": _BODY, "responses": _OK},
+            "delete": {"responses": _OK},
+        }
+        for name in ("label", "report")
+    },
+    "/tags": {"post": {"requestBody": _BODY, "responses": _OK}},
+    "/tags/{id}": {"parameters": [_ONCE], "get": {"responses": _OK}, "delete": {"responses": _OK}},
     "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "ended"}}}},
     "/jobs/{id}/retry": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "not ended"}}}},
     "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
@@ -53,6 +65,14 @@ GONE, THERE, READ, DEFAULTS, KEEPS = (
     for name in ("deleted-is-gone", "created-is-there", "written-is-read", "defaults", "refused-keeps")
 )  # fmt: skip
 PATCH, OWN, STATES = (f"description/{name}" for name in ("patch", "read-only", "states"))
+
+
+def _below(method, status=200, name="label"):
+    return method, f"/jobs/1/{name}", {"name": "a"} if method == "PUT" else None, status, {} if status == 200 else None
+
+
+def _tag():
+    return "POST", "/tags", {"name": "a"}, 201, {"id": "1", "name": "a"}
 
 
 def _job(id_, name="a", rank=1, **more):
@@ -126,9 +146,13 @@ def _mode(**values):
 _CANCELLED = _cancel(phase="cancelled")
 # Another thing whose name and rank read as written for ten seconds.
 _LASTING = [_put("8", rank=5, name="c"), 10.0, _get("8", rank=5, name="c")]
+_LABEL, _NO_LABEL = _below("PUT", 201), _below("DELETE", 204)
 #: What is sent, one second after each other or after so many, and the requirement that is broken.
 BROKEN = {
     "deleted, and read": ([_post("1"), _delete("1"), 5.0, _get("1")], GONE),
+    "a label is deleted, and read": ([_LABEL, _NO_LABEL, 4.0, _below("GET")], GONE),
+    "a label outlives its job": ([_post("1"), _LABEL, _delete("1"), 4.0, _below("GET")], GONE),
+    "an identifier is given twice": ([_tag(), ("DELETE", "/tags/1", None, 204, None), _tag()], THERE),
     "deleted where another one is gone": ([_delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")], GONE),
     "deleted where another one goes": ([_delete("1"), 5.0, _get("1"), _delete("2"), _get("2", 404)], GONE),
     "deleted after an action": ([_post("1"), _CANCEL, _delete("1"), 4.0, _get("1")], GONE),
@@ -205,6 +229,9 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a label that DELETE resets": [_below("PUT", 204), _NO_LABEL, 4.0, _below("GET")],
+    "a label that is put again": [_LABEL, _NO_LABEL, _LABEL, 4.0, _below("GET")],
+    "a report that stays": [_post("1"), _below("PUT", 201, "report"), _delete("1"), 4.0, _below("GET", 200, "report")],
     "refused, and all as before": [_mode(name="home"), _set(422, name="roaas 1"), _mode(name="home")],
     "refused, and another value": [_mode(rank=1), _set(422, rank=7), _mode(rank=2)],
     "refused, and set by another request": [

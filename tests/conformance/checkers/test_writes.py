@@ -54,6 +54,7 @@ _PATHS = {
     "/merge": _item(MERGE, _SCHEMA),
     "/steps": _item(STEPS, _STEPS),
     "/things/{id}": {"parameters": [_ID], **_item(MERGE, _SCHEMA)},
+    "/said": {**_item(MERGE, _SCHEMA), "put": {**_item(MERGE, _SCHEMA)["put"], "summary": "What is not sent is gone."}},
     "/reset": {"post": {"responses": _OK}},
 }
 READ, KEPT, DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
@@ -61,6 +62,7 @@ PATCH, OWN = "description/patch", "description/read-only"
 _FIRST = {"gain": 1.5, "count": 7, "mode": "auto", "loud": True, "note": "a", "zone": {"a": 1, "b": 2}, "built": "2026"}
 
 _WHOLE = {name: one for name, one in _FIRST.items() if name != "built"}
+_LEFT = {name: one for name, one in _WHOLE.items() if name != "note"}
 
 
 def _get(at="/plain", **values):
@@ -121,6 +123,17 @@ BROKEN = {
     ),
     "a merge patch replaces an object": (
         [_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3})], PATCH,
+    ),
+    "a merge patch resets the rest of an object": (
+        [
+            *(_get("/merge", zone={"a": 9, "b": 8}), _patch("/merge", {"zone": {"a": 9}})),
+            _get("/merge", zone={"a": 9, "b": 2}),
+            *(_patch("/merge", {"zone": {"a": 9, "b": 8}}), _get("/merge", zone={"a": 9, "b": 8})),
+            *(_patch("/merge", {"zone": {"b": 8}}), _get("/merge", zone={"a": 1, "b": 8})),
+        ], PATCH,
+    ),
+    "PUT keeps what is gone by the description": (
+        [_get("/said"), _put("/said", **{**_LEFT, "gain": 2.5}), _get("/said", gain=2.5)], DEFAULTS,
     ),
     "null within an object keeps": (
         [_get("/merge"), _patch("/merge", {"zone": {"a": 3, "b": None}}), _get("/merge", zone={"a": 3, "b": 2})], PATCH,
@@ -228,6 +241,12 @@ RIGHT = {
         *(_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3, "b": 2})),
         *(_patch("/merge", {"zone": {"b": None}}), _get("/merge", zone={"a": 3})),
     ],
+    "members of an object that follow each other": [
+        *(_get("/merge"), _patch("/merge", {"zone": {"a": 3}}), _get("/merge", zone={"a": 3, "b": 6})),
+        *(_patch("/merge", {"zone": {"b": 8}}), _get("/merge", zone={"a": 4, "b": 8})),
+        *(_patch("/merge", {"zone": {"b": 8}}), _get("/merge", zone={"a": 4, "b": 8})),
+    ],
+    "PUT keeps what it leaves out": [_get(), _put(**{**_LEFT, "gain": 2.5}), _get(gain=2.5)],
     "plain JSON replaces an object": [_get(), _patch("/plain", {"zone": {"a": 3}}), _get(zone={"a": 3})],
     "what counts by itself": [_get(uptime=1), _get(uptime=2), _patch("/plain", {"uptime": 3}, 422), _get(uptime=3)],
     "another write in between": [

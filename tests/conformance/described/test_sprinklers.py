@@ -5,7 +5,9 @@ from small_device import certified, small_device
 from sprinklers import FAULTS, RIGHT, sprinklers
 
 # What some of the faults bring about beside what they break: what is refused and done is no longer as it was written.
-_FOLLOWS = {f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "digest")}
+_FOLLOWS = {
+    f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "digest", "list-filter")
+}
 
 
 def _blamed(style, faults, tmp_path):

@@ -17,11 +17,13 @@ class _Jobs:
 
     def __init__(self, style, fault):
         self.style, self.fault, self.jobs, self.refusals = style, fault, {}, 0
+        if style.get("fixed"):
+            self.jobs["j0"] = {"id": "j0", "state": "queued", "since": 0.0, "runs": 0}
 
     def shown(self, job):
         if job["state"] == "running" and time.monotonic() - job["since"] > self.style.get("takes", 0.3):
             job["state"] = "done"
-        value = {"id": job["id"], "state": job["state"]}
+        value = {name: one for name, one in job.items() if name != "since"}
         return {"job": value} if self.style.get("wrapped") else value
 
     def answer(self, job, status=200):
@@ -51,6 +53,8 @@ class _Jobs:
         allowed = {"queued", "cancelled"} if self.fault == "cancelled is started" else {"queued"}
         if job["state"] not in allowed:
             self.refusals += 1
+            if self.fault == "a refused start counts":
+                job["runs"] += 1
             if self.fault == "a refused start revives" and job["state"] == "cancelled":
                 job.update(state="running", since=time.monotonic())
             return error(409, f"it is {job['state']}")
@@ -83,21 +87,26 @@ def _jobs(style, fault):
     device = _Jobs(style, fault)
     job = {"type": "object", "properties": {"id": {"type": "string"}, "state": {"enum": _STATES}}}
     shown = {"type": "object", "properties": {"job": job}} if style.get("wrapped") else job
+    job["properties"]["runs"] = {"type": "integer"}
     status = str(style.get("created", 201))
+    said = "In another state it is answered 409, and nothing changes."
     acting = {"200": answers(shown), "204": {"description": "done"}, "409": REFUSED, **_BAD}
     document = described(
         {
             "/jobs": {
                 "get": {"responses": {"200": answers({"type": "array", "items": job})}},
-                "post": {"responses": {status: answers(shown), **_BAD}},
+                **({} if style.get("fixed") else {"post": {"responses": {status: answers(shown), **_BAD}}}),
             },
             "/jobs/{id}": reading(shown, parameters=[_ID]),
-            "/jobs/{id}/start": {"parameters": [_ID], "post": {"responses": acting}},
+            "/jobs/{id}/start": {
+                "parameters": [_ID],
+                "post": {"summary": f"Start a queued job. {said}", "responses": acting},
+            },
             "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": acting}},
         }
     )
     routes = {
-        "/jobs": {"GET": device.every, "POST": device.create},
+        "/jobs": {"GET": device.every, **({} if style.get("fixed") else {"POST": device.create})},
         "/jobs/{id}": {"GET": device.read},
         "/jobs/{id}/start": {"POST": device.start},
         "/jobs/{id}/cancel": {"POST": device.cancel},
@@ -183,6 +192,7 @@ _RIGHT = {
     "jobs that are done at once": (_jobs, {"takes": 0}),
     "jobs without a word": (_jobs, {"silent": True, "wrapped": True}),
     "jobs that are cancelled again": (_jobs, {"again": True, "wrapped": True}),
+    "a job that is always there": (_jobs, {"fixed": True, "takes": 0.1}),
     "racks with what is in them": (_racks, "with what is in it"),
     "racks that may be missing": (_racks, "says nothing"),
 }
@@ -194,6 +204,8 @@ _BROKEN = {
     "done is cancelled": (_jobs, {"takes": 0.02}, _FOLLOWS),
     "a refused cancel acts": (_jobs, {"takes": 0.2, "silent": True}, _FOLLOWS),
     "a refused start revives": (_jobs, {"takes": 30}, _FOLLOWS),
+    "cancelled is started": (_jobs, {"fixed": True, "takes": 30}, _FOLLOWS),
+    "a refused start counts": (_jobs, {"fixed": True, "takes": 30}, _KEEPS),
     "a rack in use is gone": (_racks, "", _GONE),
 }
 

@@ -1,0 +1,89 @@
+"""States that a description names, and what a refusal keeps: what the words leave open is not judged."""
+
+import json
+
+import pytest
+from small_device import REFUSED, answers, described
+
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://device:8000"
+_BELT = {
+    "type": "object",
+    "properties": {"id": {"type": "string"}, "state": {"enum": ["stopped", "running", "paused"]}, "runs": {}},
+}
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_STATES, _KEEPS = "description/states", "description/refused-keeps"
+_ELSE = "In another state it is answered 409, and nothing changes."
+_SAID = {
+    "start": f"Start a stopped belt. {_ELSE}",
+    "resume": f"Let a paused belt run again. {_ELSE}",
+    "pause": "Pause a running belt. 409 if it cannot be done.",
+    "halt": f"Not for a stopped belt. {_ELSE}",
+}
+
+
+@pytest.fixture(name="contract", scope="module")
+def _contract(tmp_path_factory):
+    acted = {"200": answers(_BELT), "409": REFUSED}
+    paths = {
+        f"/belts/{{id}}/{name}": {"parameters": [_ID], "post": {"summary": text, "responses": acted}}
+        for name, text in _SAID.items()
+    }
+    paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}}
+    document = described(paths, "3.1.0")
+    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+
+
+def _broken(contract, steps):
+    checkers, broken = RestCheckers(contract, _BASE), set()
+    for number, (line, *seen) in enumerate(steps):
+        method, path, status = line.split()
+        body = json.dumps(dict(zip(("state", "runs"), seen, strict=False))).encode() if seen else b""
+        request = Request(method, f"{_BASE}/belts/1{path.removeprefix('.')}", (("Host", "device:8000"),), b"")
+        kind = (("Content-Type", "application/json"),) if body else ()
+        exchange = Exchange(request, Response(int(status), kind, body, 1.0, received_s=float(number)))
+        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
+    return broken & {_STATES, _KEEPS}
+
+
+def _refused(action, *runs, change=1):
+    """Return refusals of a running belt with its count before and after each."""
+    pairs = [
+        (("GET . 200", "running", one), (f"POST /{action} 409",), ("GET . 200", "running", one + change))
+        for one in runs
+    ]
+    return [step for pair in pairs for step in pair]
+
+
+_RESUMED = [("GET . 200", "stopped"), ("POST /resume 200", "running")]
+_BROKEN = {
+    "resumed from stopped": (_RESUMED * 2, _STATES),
+    "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
+}
+_RIGHT = {
+    "resumed from stopped once, which may have been paused just then": _RESUMED,
+    "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
+    "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
+    "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
+    "a count that goes on by itself": [
+        *(("GET . 200", "running", 1), ("GET . 200", "running", 2)), *_refused("start", 2, 3, 4),
+    ],
+    "a count of all refusals": [*_refused("start", 1, 2, 3)[:-1], *_refused("resume", 3, 4, 5)],
+    "a refusal of which nothing is said": _refused("pause", 1, 2, 3),
+    "a refusal that keeps": _refused("start", 1, 2, 3, change=0)[:3],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _BROKEN)
+def test_what_a_description_says_is_judged(contract, name):
+    steps, requirement = _BROKEN[name]
+    assert _broken(contract, steps) == {requirement}
+
+
+@pytest.mark.parametrize("name", _RIGHT)
+def test_what_it_leaves_open_is_not(contract, name):
+    assert _broken(contract, _RIGHT[name]) == set()
