@@ -6,7 +6,7 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
 - `publish` (topic, type, values, gap_s, repeat_s, reliability, durability): publish; the first time, become a
   publisher. Without values, only that. The last value is repeated every repeat_s until the next command. Answers
   `sent`: when each was handed to ROS; `subscribers`; `best_effort`: whether one of them may lose messages.
-- `listen` (topic, type): subscribe, as reliably as the publishers that are there.
+- `listen` (topic, type): subscribe, as reliably as the publishers that are there, and answer how many that are.
 - `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
   value]`; waits until so much has come.
 - `serve` (service, type, script): serve. Each call takes the next item of the script, and the last one goes on:

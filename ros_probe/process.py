@@ -1,4 +1,4 @@
-"""Start the probe's process, and ask it in lines of JSON.
+"""Start the probe's process, and tell it what to do in lines of JSON.
 
 So the suite needs no ROS itself. Every wait has a deadline.
 """
@@ -15,7 +15,8 @@ from typing import Any, Final
 
 # Importing rclpy and finding the robot on the graph takes seconds on a small machine, s.
 _START_S: Final = 30.0
-_ANSWER_S: Final = 5.0
+# An answer, on top of what a command waits for itself, s.
+_ANSWER_S: Final = 20.0
 _END_S: Final = 3.0
 _LINES_KEPT: Final = 2000
 
@@ -24,23 +25,18 @@ class ProbeError(Exception):
     """The program cannot be used; the message says why."""
 
 
-class SilentError(ProbeError):
-    """The program says nothing in time."""
-
-
 class RosProcess:
-    """A started probe; call await_ready() before anything else.
+    """A ROS node in a process of its own, which does as told (player.py); call await_ready() before anything else.
 
     Args:
-        role: observe or play.
-        options: its options, beside the domain.
+        name: of the node.
         domain_id: the robot's ROS domain.
 
     Raises:
         ProbeError: the process cannot be started.
     """
 
-    def __init__(self, role: str, *options: str, domain_id: int | None) -> None:
+    def __init__(self, name: str = "roaas_probe", *, domain_id: int | None) -> None:
         # A robot that only looks on its own machine hears no multicast: without a word to it directly, the probe would
         # wait seconds for its next announcement. Robots elsewhere are found as ever.
         peers = ";".join(filter(None, [os.environ.get("ROS_STATIC_PEERS"), "127.0.0.1"]))
@@ -50,7 +46,7 @@ class RosProcess:
         try:
             # In a session of its own: Ctrl-C is for its parent, which then ends it.
             self._process = subprocess.Popen(  # noqa: S603 - our own program
-                [sys.executable, "-P", "-m", "ros_probe", role, "--domain-id", str(domain_id), *options],
+                [sys.executable, "-P", "-m", "ros_probe", "--domain-id", str(domain_id), "--name", name],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -65,42 +61,36 @@ class RosProcess:
         atexit.register(self.close)
 
     def await_ready(self) -> None:
-        """Wait until the program has found the robot on the graph.
+        """Wait until the node is on the graph.
 
         Raises:
-            ProbeError: ROS or the message package is missing, or nothing is there to be found.
+            ProbeError: ROS is missing, or does not start.
         """
         try:
-            self.told(_START_S)
+            self._said(_START_S)
         except ProbeError:
             self.close()
             raise
 
-    def ask(self, line: str, within_s: float = _ANSWER_S) -> dict[str, Any]:
-        """Write a line, and return the answer.
+    def tell(self, what: str, **how: Any) -> dict[str, Any]:
+        """Have a command carried out (player.py has them), and return its answer.
 
         Raises:
-            ProbeError: the program has ended, does not answer in time, or reports a problem.
+            ProbeError: it cannot be, or the process has ended.
         """
         try:
             if self._process.stdin:
-                self._process.stdin.write(line + "\n")
+                self._process.stdin.write(json.dumps({"do": what, **how}) + "\n")
                 self._process.stdin.flush()
         except (OSError, ValueError) as error:
             raise ProbeError(f"it has ended: {error}") from error
-        return self.told(within_s)
+        return self._said(how.get("within_s", 0.0) + _ANSWER_S)
 
-    def told(self, within_s: float) -> dict[str, Any]:
-        """Return what the program says next.
-
-        Raises:
-            SilentError: it says nothing in time.
-            ProbeError: it has ended, or reports a problem.
-        """
+    def _said(self, within_s: float) -> dict[str, Any]:
         try:
             line = self._lines.get(timeout=within_s)
         except queue.Empty as error:
-            raise SilentError(f"it does not answer within {within_s:g} s") from error
+            raise ProbeError(f"it does not answer within {within_s:g} s") from error
         try:
             answer = json.loads(line)
         except ValueError as error:

@@ -27,6 +27,23 @@ ServiceType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/srv/[A-Za-z]\w*$")]
 ActionType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/action/[A-Za-z]\w*$")]
 
 
+#: Time for what a map gives no time for, s.
+_USUAL_S: Final = 5.0
+_PATIENT_S: Final = 30.0
+
+
+class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the body of a 2xx response says that its request failed, or that its message is too old.
+
+    Attributes:
+        at: where.
+        values: any of these values there says so.
+    """
+
+    at: Pointer
+    values: tuple[Any, ...]
+
+
 class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How a message is written in the body of an operation.
 
@@ -36,14 +53,27 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             position goes with it. Without it, all names are those of the message.
         values: values of the parameters in the path, by name.
         body: other members of the body that the operation gets.
-        timeout_s: time that the gateway has for a response, and for what the response stands for, s.
+        failure: how a 2xx response says that its request failed; None: by no value.
+        timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
+            long it waits for a service that does not respond is not judged.
     """
 
     at: Pointer = ""
     fields: dict[Pointer, Pointer] = {}
     values: dict[str, Any] = {}
     body: dict[str, Any] = {}
-    timeout_s: Positive = 5.0
+    failure: Failure | None = None
+    timeout_s: Positive | None = None
+
+    @property
+    def within_s(self) -> float:
+        """The time for a response, and for what it stands for, s."""
+        return self.timeout_s or _USUAL_S
+
+    @property
+    def response_s(self) -> float:
+        """How long a response is waited for, s; without a declared time so long that a busy machine is not blamed."""
+        return self.timeout_s or _PATIENT_S
 
 
 class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -152,7 +182,7 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: Pointer = ""
     type: Pointer | None = None
     hidden: bool | None = None
-    timeout_s: Positive = 5.0
+    timeout_s: Positive = _USUAL_S
 
 
 Operation = Reads | Publishes | Calls | Acts | Lists

@@ -1,7 +1,6 @@
 """The player does as told on a real graph: two processes of it talk to each other."""
 
 import base64
-import json
 import math
 
 import pytest
@@ -22,14 +21,11 @@ FIBONACCI = "test_msgs/action/Fibonacci"
 
 class Player(RosProcess):
     def __init__(self, domain_id, name):
-        super().__init__("play", "--name", name, domain_id=domain_id)
+        super().__init__(name, domain_id=domain_id)
         self.await_ready()
 
-    def do(self, what, **how):
-        return self.ask(json.dumps({"do": what, **how}), 20)
-
     def heard(self, name, count=1):
-        return self.do("heard", name=name, count=count, within_s=15)["events"]
+        return self.tell("heard", name=name, count=count, within_s=15)["events"]
 
 
 @pytest.fixture
@@ -41,11 +37,11 @@ def players(domain_id):
 
 
 def _matched(publisher, listener, topic, kind):
-    listener.do("listen", topic=topic, type=kind)
+    listener.tell("listen", topic=topic, type=kind)
     for _ in range(500):
-        if publisher.do("publish", topic=topic, type=kind, gap_s=0)["subscribers"]:
+        if publisher.tell("publish", topic=topic, type=kind, gap_s=0)["subscribers"]:
             return
-        publisher.do("heard", name="none", count=1, within_s=0.02)
+        publisher.tell("heard", name="none", count=1, within_s=0.02)
     raise AssertionError("nobody subscribed")
 
 
@@ -64,7 +60,7 @@ def test_values_of_each_primitive_type_arrive_to_the_bit_in_order(players):
         "uint8_values": {"b64": "AAECgP8="},
         "basic_types_values": [{"int64_value": 2**62 + 1}],
     }
-    sent = robot.do("publish", topic="/values", type=kind, values=[value, {}, value])["sent"]
+    sent = robot.tell("publish", topic="/values", type=kind, values=[value, {}, value])["sent"]
     first, empty, last = other.heard("/values", 3)
     assert sent[0] < first[0] < last[0]
     for name, wanted in value.items():
@@ -81,31 +77,31 @@ def test_a_large_image_arrives(players):
     kind = "sensor_msgs/msg/Image"
     _matched(robot, other, "/image", kind)
     data = base64.b64encode(bytes(range(256)) * 4096).decode()
-    robot.do("publish", topic="/image", type=kind, values=[{"width": 1024, "data": {"b64": data}}])
+    robot.tell("publish", topic="/image", type=kind, values=[{"width": 1024, "data": {"b64": data}}])
     assert other.heard("/image")[0][2]["data"] == {"b64": data}
 
 
 def test_a_killed_player_leaves_the_graph_and_what_is_no_type_is_told(players, domain_id):
     robot, other = players
-    assert "geometry_msgs/Vector3" in robot.do("describe", type="geometry_msgs/msg/Twist")["types"]
+    assert "geometry_msgs/Vector3" in robot.tell("describe", type="geometry_msgs/msg/Twist")["types"]
     for kind, said in (("nope_msgs/msg/A", "apt install ros-jazzy-nope-msgs"), ("std_msgs/msg/A", "has no msg 'A'")):
         with pytest.raises(ProbeError, match=said):
-            robot.do("describe", type=kind)
+            robot.tell("describe", type=kind)
     with pytest.raises(ProbeError, match="no field 'y'"):
-        robot.do("publish", topic="/a", type="std_msgs/msg/Int8", values=[{"y": 1}])
+        robot.tell("publish", topic="/a", type="std_msgs/msg/Int8", values=[{"y": 1}])
     with pytest.raises(ProbeError, match="not understood: 'dance'"):
-        robot.do("dance")
-    robot.do("publish", topic="/here", type="std_msgs/msg/Int8")
+        robot.tell("dance")
+    robot.tell("publish", topic="/here", type="std_msgs/msg/Int8")
     for _ in range(500):
-        if "/here" in other.do("graph")["topics"]:
+        if "/here" in other.tell("graph")["topics"]:
             break
-        other.do("heard", name="none", count=1, within_s=0.02)
-    assert other.do("graph")["topics"]["/here"] == {"types": ["std_msgs/msg/Int8"], "publishers": 1, "subscribers": 0}
+        other.tell("heard", name="none", count=1, within_s=0.02)
+    assert other.tell("graph")["topics"]["/here"] == {"types": ["std_msgs/msg/Int8"], "publishers": 1, "subscribers": 0}
     robot.kill()
     with pytest.raises(ProbeError, match="has ended"):
-        robot.do("graph")
+        robot.tell("graph")
     again = Player(domain_id, "robot")
-    again.do("publish", topic="/here", type="std_msgs/msg/Int8", values=[{"data": 3}])
+    again.tell("publish", topic="/here", type="std_msgs/msg/Int8", values=[{"data": 3}])
     again.close()
 
 
@@ -130,7 +126,7 @@ def client(domain_id):
 def test_a_service_follows_its_script(players, client):
     robot, (node, done) = players[0], client
     script = [{"answer": {"success": True, "message": "é"}}, {"delay_s": 0.2}, {"never": True}]
-    robot.do("serve", service="/reset", type="std_srvs/srv/SetBool", script=script)
+    robot.tell("serve", service="/reset", type="std_srvs/srv/SetBool", script=script)
     caller = node.create_client(SetBool, "/reset")
     assert caller.wait_for_service(20)
     assert done(caller.call_async(SetBool.Request(data=True))) == SetBool.Response(success=True, message="é")
@@ -140,8 +136,8 @@ def test_a_service_follows_its_script(players, client):
     assert [what for _, what, _ in events] == ["request", "response"] * 2 + ["request"]
     assert events[0][2] == {"data": True}
     assert not never.done()
-    robot.do("forget", name="/reset")
-    robot.do("serve", service="/reset", type="std_srvs/srv/SetBool", script=[{}])
+    robot.tell("forget", name="/reset")
+    robot.tell("serve", service="/reset", type="std_srvs/srv/SetBool", script=[{}])
 
 
 def test_an_action_follows_its_script(players, client):
@@ -154,7 +150,7 @@ def test_an_action_follows_its_script(players, client):
         {"end": "never", "refuse_cancel": True},
         {"end": "never"},
     ]
-    robot.do("act", action="/count", type=FIBONACCI, script=script)
+    robot.tell("act", action="/count", type=FIBONACCI, script=script)
     caller = ActionClient(node, Fibonacci, "/count")
     assert caller.wait_for_server(20)
     heard = []

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from conformance.scenarios.ros.definition import Definition
-from conformance.scenarios.ros.web import differences, document_of
+from conformance.scenarios.ros.web import differences, document_of, succeeded
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
 
@@ -27,6 +27,12 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
     part = msgspec.structs.replace(body, at=at, fields={})
     found = differences(document_of(exchange.response.body), json.loads(value), definition, part, ros)
     return f"{found[0].at} is {found[0].web} in place of {found[0].ros}" if found else ""
+
+
+def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:
+    """Return whether a response reports a failure: by a declared status, any if none is, or as the map says in 2xx."""
+    response = exchange.response
+    return not succeeded(exchange, body) and (response.ok or not declared or response.status in declared)
 
 
 def statuses(declared: Sequence[int]) -> str:

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import differing, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, statuses
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
-from conformance.scenarios.ros.web import changed
+from conformance.scenarios.ros.web import changed, succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap, State
 from conformance.transport.exchange import Exchange
@@ -34,7 +34,7 @@ def once(trace: Goals) -> Iterator[Outcome]:
     for one in trace.probes:
         if one.course not in _ACCEPTED or one.course is Course.SECOND:
             continue
-        if not one.exchange.response.ok:
+        if not one.accepted:
             yield Case(holds=False, exchange=one.exchange, expected=f"2xx for a goal {one.course}", cause="refused")
             continue
         wanted = 2 if one.course is Course.FIRST else 1
@@ -57,17 +57,15 @@ def rejected(trace: Goals) -> Iterator[Outcome]:
     for one in trace.probes:
         if one.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in one.heard):
             continue
-        body, ok = one.body, one.exchange.response.ok
-        if not ok:
-            declared = body.rejected
-            status = one.exchange.response.status
-            holds = not declared or status in declared
+        body, declared = one.body, one.body.rejected
+        if not one.accepted:
+            holds = fails_as(one.exchange, body, declared)
             yield Case(holds, one.exchange, f"{statuses(declared)} for a goal {one.course}", cause="status")
             continue
         last = one.looks[-1] if one.looks else None
         state = body.state
-        if body.rejected or last is None or state is None:
-            expected = f"{statuses(body.rejected)} for a goal {one.course}"
+        if declared or last is None or state is None:
+            expected = f"{statuses(declared)} for a goal {one.course}"
             yield Case(holds=False, exchange=one.exchange, expected=expected, cause="accepted")
             continue
         others = {*state.running, *state.succeeded, *state.canceled}
@@ -89,10 +87,11 @@ def outcomes(trace: Goals) -> Iterator[Outcome]:
         words = _words(state, name)
         if not words:
             continue
-        last = one.looks[-1]
-        expected = (
-            f"the state {' or '.join(words)} within {one.body.timeout_s:g} s after the end of a goal {one.course}"
-        )
+        last, end = one.looks[-1], _end_of(one)
+        if last.word not in words and end is not None and last.sent < end + one.body.within_s:
+            yield NotTested(f"the server ended a goal {one.course} too late to see what becomes of it")
+            continue
+        expected = f"the state {' or '.join(words)} within {one.body.within_s:g} s after the end of a goal {one.course}"
         yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=one.course)
         yield from _steady(one)
 
@@ -150,7 +149,7 @@ def feedback(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
         if one.body.feedback is None:
             yield NotClaimed("the map has no feedback of goals")
             continue
-        if one.course is Course.SUCCEEDS and one.exchange.response.ok and one.looks:
+        if one.course is Course.SUCCEEDS and one.accepted and one.looks:
             yield from _feedback(one, trace, ros)
 
 
@@ -206,7 +205,7 @@ def cancels(trace: Goals) -> Iterator[Outcome]:
 
 def _canceled(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
     asked = [heard for heard in one.heard if heard.what == "cancel"]
-    ok = cancel.response.ok
+    ok = succeeded(cancel, one.body)
     if one.course is Course.GOES_ON:
         words = one.body.state.canceled if one.body.state else ()
         said = next((look for look in one.looks if look.word in words), None)
@@ -229,6 +228,6 @@ def recovers(trace: Goals) -> Iterator[Outcome]:
     """Judge whether goals reach a server that is back."""
     for one in trace.probes:
         if one.course in {Course.REACHED, Course.BACK}:
-            holds = one.exchange.response.ok and bool(one.heard)
+            holds = one.accepted and bool(one.heard)
             expected = f"2xx, and a goal at {one.body.action}, {one.course}"
             yield Case(holds, one.exchange, expected, "none" if not one.heard else "", cause=one.course)

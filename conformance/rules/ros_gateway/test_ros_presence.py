@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import statuses
+from conformance.rules.ros_gateway.judging import fails_as, statuses
 from conformance.scenarios.ros.presence import (
     Absence,
     Growth,
@@ -18,6 +18,7 @@ from conformance.scenarios.ros.presence import (
     publishers_of_each_quality,
     topics_at_first,
 )
+from conformance.scenarios.ros.web import succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.verdict.case import Case
 
@@ -30,9 +31,9 @@ _ALL: Final = "all topics at once"
 def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
     """Judge whether an operation says that there was no message yet."""
     for one in trace:
-        if not one.body.absent:
+        if not one.body.absent and one.body.failure is None:
             yield NotClaimed("the map does not say what a topic without a message returns: `absent`")
-        elif one.exchange.response.ok and one.body.max_age_s is None:
+        elif succeeded(one.exchange, one.body) and one.body.max_age_s is None:
             yield NotTested("the gateway may have a message from before this run, and keeps it as long as it likes")
         else:
             yield _absence(one)
@@ -44,14 +45,14 @@ def stale(trace: Publishers) -> Iterator[Outcome]:
     if not trace.absences:
         yield NotClaimed("the map says of no topic how old a message may be: `max_age_s`")
     for one in trace.absences:
-        if one.first is not None and not one.first.response.ok:
+        if one.first is not None and not succeeded(one.first, one.body):
             yield NotTested("there was no message that could become too old")
         else:
             yield _absence(one)
 
 
 def _absence(one: Absence) -> Case:
-    holds = one.exchange.response.status in one.body.absent if one.body.absent else not one.exchange.response.ok
+    holds = fails_as(one.exchange, one.body, one.body.absent)
     expected = f"{statuses(one.body.absent)} for {one.body.topic}, {one.when}"
     if one.first is not None:
         expected += f" over {one.body.max_age_s:g} s ago"

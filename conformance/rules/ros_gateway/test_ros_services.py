@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import differing, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, statuses
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import ROUNDS, Called, Server, Services, is_held, service_calls
 from conformance.scenarios.ros.web import changed
-from conformance.scenarios.rule import NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.transport.exchange import Exchange
 from conformance.verdict.case import Case
@@ -24,7 +24,7 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
     for one in trace.probes:
         if one.server not in _RESPONDS or not one.answer:
             continue
-        ok = _is_ok(one)
+        ok = one.succeeded
         if not ok and one.server is not Server.RESPONDS:
             # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
             continue
@@ -39,7 +39,7 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
 def once(trace: Services) -> Iterator[Outcome]:
     """Judge whether a call that succeeds has reached the server once, as it was sent."""
     for one in trace.probes:
-        if one.server not in _RESPONDS or not one.answer or not _is_ok(one):
+        if one.server not in _RESPONDS or not one.answer or not one.succeeded:
             continue
         requests = [heard for heard in one.heard if heard.what == "request"]
         yield Case(
@@ -69,12 +69,14 @@ def failures(trace: Services) -> Iterator[Outcome]:
         declared = body.too_late if one.server is Server.SILENT else (*body.unavailable, *body.too_late)
         if one.server is not Server.SILENT and not body.unavailable:
             declared = ()
-        expected = f"{statuses(declared)} within {body.timeout_s:g} s for {body.service}, {one.server}"
+        expected = f"{statuses(declared)} within {body.within_s:g} s for {body.service}, {one.server}"
+        if not isinstance(one.attempt, Exchange) and body.timeout_s is None:
+            yield NotClaimed(f"the map does not say how long a call of {body.service} may take: `timeout_s`")
+            continue
         if not isinstance(one.attempt, Exchange):
             yield Case(holds=False, exchange=one.attempt, expected=expected, cause=f"{one.server} silent")
             continue
-        status = one.attempt.response.status
-        holds = status in declared if declared else not one.attempt.response.ok
+        holds, status = fails_as(one.attempt, body, declared), one.attempt.response.status
         yield Case(holds, one.attempt, expected, cause=f"{one.server} {status}")
 
 
@@ -83,16 +85,19 @@ def others(trace: Services) -> Iterator[Outcome]:
     """Judge whether other resources respond while a call has no response; each must be held up in all rounds."""
     rounds: dict[str, list[Called]] = {}
     for one in trace.probes:
-        if one.server is Server.SILENT and one.heard:
+        # A call that reaches nobody, and is not answered, finds a gateway that an earlier one has stopped for good.
+        is_dead = one.operation in rounds and not isinstance(one.attempt, Exchange)
+        if one.server is Server.SILENT and (one.heard or is_dead):
             rounds.setdefault(one.operation, []).append(one)
     for calls in rounds.values():
         held = [next((beside for beside in one.beside if is_held(one, beside)), None) for one in calls]
         shown = next((beside for beside in (*held, *calls[0].beside) if beside is not None), None)
+        is_held_up = all(beside or not one.heard for beside, one in zip(held, calls, strict=True))
         if shown is None:
             yield NotTested("no other operation was read while a service did not respond")
             continue
         yield Case(
-            not all(held) or len(held) < ROUNDS,
+            not is_held_up or len(held) < ROUNDS,
             shown.attempt,
             f"a response while {calls[0].operation} waits for {calls[0].body.service}",
             observed=f"a response after {shown.took:.1f} s, when that call had ended; usually {shown.usual:.2f} s",
@@ -105,8 +110,4 @@ def recovers(trace: Services) -> Iterator[Outcome]:
     """Judge whether a service is called again that was gone, and whether the gateway goes on after a silent one."""
     for one in trace.probes:
         if one.server in {Server.BACK, Server.AFTER}:
-            yield Case(_is_ok(one), one.attempt, f"2xx for {one.body.service}, {one.server}", cause=one.server)
-
-
-def _is_ok(one: Called) -> bool:
-    return isinstance(one.attempt, Exchange) and one.attempt.response.ok
+            yield Case(one.succeeded, one.attempt, f"2xx for {one.body.service}, {one.server}", cause=one.server)

@@ -19,7 +19,7 @@ from conformance.scenarios.ros.topics import (
     topic_refusals,
     topic_writes,
 )
-from conformance.scenarios.ros.web import Difference, changed, differences, document_of, equal
+from conformance.scenarios.ros.web import Difference, changed, differences, document_of, equal, succeeded
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
 from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange
@@ -27,6 +27,8 @@ from conformance.verdict.case import Case
 
 # So many differing fields say enough.
 _ROWS: Final = 4
+# As many characters of a message.
+_SHOWN: Final = 200
 #: What the link and a busy machine take on top of what the map says, s.
 SLACK_S: Final = 1.0
 
@@ -57,7 +59,9 @@ def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
             for exchange in (one.exchange, *one.later):
                 if exchange.response.cut:
                     yield Note(f"Of {one.what} on {one.topic}, the suite got {exchange.response.cut}: not compared.")
-                elif exchange.response.ok and not any(_is_in(each, exchange, trace, ros) for each in older):
+                elif succeeded(exchange, reads_of(ros, one.operation)) and not any(
+                    _is_in(each, exchange, trace, ros) for each in older
+                ):
                     yield _of_content(one, exchange, trace, ros)
 
 
@@ -76,7 +80,7 @@ def _differences(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> 
 
 
 def _is_in(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> bool:
-    return exchange.response.ok and not _differences(one, exchange, trace, ros)
+    return succeeded(exchange, reads_of(ros, one.operation)) and not _differences(one, exchange, trace, ros)
 
 
 def _of_content(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> Case:
@@ -92,7 +96,7 @@ def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether a new message is returned in time."""
     for one, older in _with_older(trace):
         reads = reads_of(ros, one.operation)
-        within_s, took_s = reads.max_age_s or reads.timeout_s, one.sent - one.published
+        within_s, took_s = reads.max_age_s or reads.within_s, one.sent - one.published
         expected = f"{one.what} on {one.topic} within {within_s:g} s of its publication"
         if one.was_shown:
             # Large messages were repeated just before, and the gateway may still have some to read.
@@ -101,7 +105,7 @@ def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
             yield Case(holds, one.exchange, expected, f"an older one until {took_s:.1f} s after it", one.operation)
         elif not one.reliably:
             yield Note(f"The gateway subscribes to {one.topic} with best effort, and did not get {one.what}.")
-        elif not one.exchange.response.ok:
+        elif not succeeded(one.exchange, reads):
             if one.kind is not Kind.NON_FINITE:
                 yield Case(False, one.exchange, expected, cause=f"{one.operation} {one.exchange.response.status}")
         elif back := next((each for each in older if _is_in(each, one.exchange, trace, ros)), None):
@@ -119,12 +123,15 @@ def read_newest(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
             yield Case(back is None, later, expected, f"{back.what} from before it" if back else "", one.operation)
 
 
-@rule("ros-gateway/write-exact", on=(topic_writes,))
+@rule("ros-gateway/write-exact", on=(topic_writes, topic_refusals))
 def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each field of what is published is that of the request."""
     for burst in trace:
         for one in burst.sent:
-            if not one.accepted:
+            if one.is_wrong and one.accepted and burst.heard:
+                came = f"{one.exchange.came}, and the message {burst.heard[0].value[:_SHOWN]}"
+                yield Case(False, one.exchange, f"an error status for {one.what}", came, f"{one.operation} {one.what}")
+            if not one.accepted or not one.value:
                 continue
             wanted = json.loads(one.value)
             heard = [each.content for each in burst.heard]
@@ -214,5 +221,5 @@ def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
             if one.value:
                 heard = [each for each in heard if equal(each, _mapped(json.loads(one.value), one, ros))]
             expected = f"no message on {one.topic}, as the request was refused ({one.what})"
-            shown = json.dumps(heard[0])[:200] if heard else ""
+            shown = json.dumps(heard[0])[:_SHOWN] if heard else ""
             yield Case(not heard, one.exchange, expected, f"the message {shown}", cause=one.operation)

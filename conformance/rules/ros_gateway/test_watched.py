@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from conformance.rules.ros_gateway.test_topics import SLACK_S, reads_of, rows
 from conformance.scenarios.ros.watching import Look, Watched, topic_watches
-from conformance.scenarios.ros.web import Difference, differences, document_of
+from conformance.scenarios.ros.web import Difference, differences, document_of, succeeded
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.verdict.case import Case
@@ -23,7 +23,7 @@ def _places(one: Watched, ros: RosMap) -> list[tuple[Look, list[int]]]:
     return [
         (look, [index for index, value in enumerate(values) if not _differences(one, look, value, ros)])
         for look in one.looks
-        if look.exchange.response.ok
+        if succeeded(look.exchange, reads_of(ros, one.operation))
     ]
 
 
@@ -58,7 +58,7 @@ def watched_fresh(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether a message is returned no later than declared after the next one came."""
     for one in trace:
         reads = reads_of(ros, one.operation)
-        within_s = (reads.max_age_s or reads.timeout_s) + SLACK_S
+        within_s = (reads.max_age_s or reads.within_s) + SLACK_S
         for look, found in _places(one, ros):
             if not found:
                 continue

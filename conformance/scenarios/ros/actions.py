@@ -17,7 +17,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import document_of
+from conformance.scenarios.ros.web import document_of, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
@@ -34,6 +34,8 @@ _PARTS: Final = ("Goal", "Result", "Feedback")
 # After its end, a goal is read so often.
 _AFTERWARDS: Final = 3
 _MORE_S: Final = 0.3
+# A busy server ends a goal so late, s.
+_LATE_S: Final = 1.0
 
 
 class Course(StrEnum):
@@ -97,6 +99,11 @@ class Goal:
     cancel: Exchange | None = None
     heard: tuple[Heard, ...] = ()
 
+    @property
+    def accepted(self) -> bool:
+        """Whether the gateway took it."""
+        return succeeded(self.exchange, self.body)
+
 
 @dataclass(frozen=True)
 class Goals:
@@ -151,24 +158,23 @@ class _Sender:
 
     def _new(self, part: str) -> dict[str, Any]:
         """Return a message of a part that differs from all others."""
-        kind, value = f"{self._body.type}#{part}", self._makers[part].usual().value
-        found: dict[str, Any] = self._gateway.robot.tell("complete", type=kind, value=value)["value"]
-        return found
+        return self._gateway.complete(f"{self._body.type}#{part}", self._makers[part].usual().value)
 
     def _send(self) -> tuple[dict[str, Any], Exchange]:
         value = self._new("Goal")
-        return value, self._gateway.send(self._gateway.request(self._call, self._body, value), self._body.timeout_s)
+        return value, self._gateway.send(self._gateway.request(self._call, self._body, value), self._body.response_s)
 
     def _reached(self, course: Course) -> Goal:
         """Send goals until one reaches its server, or the gateway's time is over."""
-        robot, until = self._gateway.robot, WALL_CLOCK.now() + 2 * self._body.timeout_s
+        robot, until = self._gateway.robot, WALL_CLOCK.now() + 2 * self._body.within_s
         while True:
             robot.heard(self._body.action)
             value, exchange = self._send()
             heard = robot.heard(self._body.action, 1, _MORE_S)
-            if heard or WALL_CLOCK.now() > until:
+            goal = Goal(self._call, self._body, course, json.dumps(value), exchange, heard=tuple(heard))
+            if (heard and goal.accepted) or WALL_CLOCK.now() > until:
                 WALL_CLOCK.sleep(_MORE_S)
-                return Goal(self._call, self._body, course, json.dumps(value), exchange, heard=tuple(heard))
+                return goal
 
     def _begun(self, course: Course, *steps: dict[str, Any]) -> Goal:
         robot = self._gateway.robot
@@ -187,12 +193,13 @@ class _Sender:
         goal, robot = self._begun(course, step), self._gateway.robot
         looks: list[Look] = []
         cancel: Exchange | None = None
-        if goal.exchange.response.ok and course in {Course.CANCELED, Course.GOES_ON}:
+        if goal.accepted and course in {Course.CANCELED, Course.GOES_ON}:
             looks += self._watched(goal, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
             cancel = self._cancel(goal)
-        if goal.exchange.response.ok:
+        if goal.accepted:
             lasts_s = step.get("gap_s", 0.0) * (len(goal.feedback) + 1)
-            looks += self._watched(goal, WALL_CLOCK.now() + lasts_s + self._body.timeout_s, self._has_ended)
+            until = WALL_CLOCK.now() + lasts_s + self._body.within_s + _LATE_S
+            looks += self._watched(goal, until, self._has_ended)
         heard = tuple(robot.heard(self._body.action, 2, _MORE_S))
         return replace(goal, looks=tuple(looks), cancel=cancel, heard=heard)
 
@@ -203,11 +210,11 @@ class _Sender:
         first = self._begun(Course.FIRST, *steps)
         value, exchange = self._send()
         second = self._goal(Course.SECOND, value, exchange, steps[1])
-        if not (first.exchange.response.ok and exchange.response.ok):
+        if not (first.accepted and second.accepted):
             # A server, or a gateway, may take one goal at a time.
             return
         cancel = self._cancel(first)
-        ended = self._watched(first, WALL_CLOCK.now() + body.timeout_s, self._has_ended)
+        ended = self._watched(first, WALL_CLOCK.now() + body.within_s + _LATE_S, self._has_ended)
         went_on = self._watched(second, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
         heard = tuple(robot.heard(body.action, 4, _MORE_S))
         yield replace(first, looks=tuple(ended), cancel=cancel, heard=heard)
@@ -217,7 +224,7 @@ class _Sender:
 
     def _cancel(self, goal: Goal) -> Exchange | None:
         made = self._of(goal, self._body.cancel)
-        return made and self._gateway.send(made, self._body.timeout_s)
+        return made and self._gateway.send(made, self._body.response_s)
 
     def _of(self, goal: Goal, template: str) -> Any:
         """Return the request of an operation on a goal; None: its response does not name it."""
@@ -232,7 +239,7 @@ class _Sender:
         made = self._of(goal, state.read) if state is not None else None
         while made is not None and state is not None:
             sent = WALL_CLOCK.now()
-            exchange = self._gateway.send(made, self._body.timeout_s)
+            exchange = self._gateway.send(made, self._body.response_s)
             received = WALL_CLOCK.now()
             value = document_of(exchange.response.body).value if exchange.response.ok else None
             word = value_at(value, state.at)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeVar
 
 from conformance.api.rest.interface import RestInterface
+from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.ros.definition import Definition
@@ -21,6 +22,7 @@ from conformance.verdict.run import Run
 _Operation = TypeVar("_Operation")
 # From one look at the gateway to the next, s.
 PACE_S: Final = 0.03
+_DISCOVERY_S: Final = 15.0
 _KEYS: Final[dict[type, str]] = {
     Reads: "topic", Publishes: "publishes", Calls: "service", Acts: "action", Lists: "lists"
 }  # fmt: skip
@@ -65,10 +67,22 @@ class Gateway:
             try:
                 self._robot = Robot(self.ros.domain)
                 self._robot.await_ready()
+                self._await_others(self._robot)
             except ProbeError as error:
-                self._problem = f"the suite's ROS node in domain {self.ros.domain} did not start: {error}"
+                self._problem = f"the suite's ROS node in domain {self.ros.domain}: {error}"
                 raise NotPossibleError(self._problem) from error
         return self._robot
+
+    def _await_others(self, robot: Robot) -> None:
+        """Wait until the node finds another one; without any, a gateway would be blamed for what it never got."""
+        until = WALL_CLOCK.now() + _DISCOVERY_S
+        while not robot.tell("graph")["nodes"]:
+            if WALL_CLOCK.now() > until:
+                raise ProbeError(
+                    "it finds no other node: start the gateway in this domain, with ROS_AUTOMATIC_DISCOVERY_RANGE and "
+                    "ROS_STATIC_PEERS such that it is found on this machine"
+                )
+            WALL_CLOCK.sleep(PACE_S)
 
     def kill(self) -> None:
         """Kill the robot's end, so that its nodes leave the graph without a word; another one starts when needed."""
@@ -113,6 +127,15 @@ class Gateway:
             return self.robot.definition(name)
         except ProbeError as error:
             raise NotPossibleError(f"{name}: {error}") from error
+
+    def complete(self, name: str, value: dict[str, Any]) -> dict[str, Any]:
+        """Return the message of a type with all its fields.
+
+        Raises:
+            ProbeError: the value is none of this type.
+        """
+        found: dict[str, Any] = self.robot.tell("complete", type=name, value=value)["value"]
+        return found
 
     def maker(self, definition: Definition) -> Maker:
         """Return what makes messages of a type, for this run."""

@@ -14,8 +14,6 @@ from conformance.scenarios.ros.definition import Definition
 from ros_probe.process import ProbeError, RosProcess
 
 _NS: Final = 1_000_000_000
-# A command on top of what it waits for itself, s.
-_ANSWER_S: Final = 20.0
 
 
 @dataclass(frozen=True)
@@ -65,16 +63,8 @@ class Robot(RosProcess):
     """
 
     def __init__(self, domain_id: int, name: str = "roaas_robot") -> None:
-        super().__init__("play", "--name", f"{name}_{os.getpid()}", domain_id=domain_id)
+        super().__init__(f"{name}_{os.getpid()}", domain_id=domain_id)
         self._definitions: dict[str, Definition] = {}
-
-    def tell(self, what: str, **how: Any) -> dict[str, Any]:
-        """Have a command carried out, and return its answer.
-
-        Raises:
-            ProbeError: it cannot be, or the process has ended.
-        """
-        return self.ask(json.dumps({"do": what, **how}), how.get("within_s", 0.0) + _ANSWER_S)
 
     def definition(self, name: str) -> Definition:
         """Return the definition of a type, or, with "#Request" or the like after its name, of a part of it.

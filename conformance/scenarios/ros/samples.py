@@ -10,7 +10,7 @@ import itertools
 import math
 import random
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
@@ -194,18 +194,32 @@ class Maker:
     def _non_finite(self) -> Iterator[Sample]:
         """Yield messages of usual values, but for one NaN or infinity."""
         for value in (math.nan, math.inf, -math.inf):
-            seen: list[int] = []
-
-            def leaf(shape: Shape, turn: int | None, value: float = value, seen: list[int] = seen) -> Any:
-                if shape.item in FLOATS:
-                    seen.append(0)
-                    if len(seen) == 1:
-                        return value
-                return self._value(shape, turn)
-
-            made = self._message(None, leaf)
-            if seen:
+            made = self._with_one(dict.fromkeys(FLOATS, value))
+            if made is not None:
                 yield Sample(f"a message with {value}", Kind.NON_FINITE, made)
+
+    def beyond(self) -> Sample | None:
+        """Return a message with an integer that is greater than its type has; None: it has no integers."""
+        made = self._with_one({item: most + 1 for item, (_, most) in INTEGERS.items()})
+        return None if made is None else Sample("a message with an integer beyond its type", Kind.EXTREME, made)
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether messages of the type have numbers or booleans."""
+        return self._with_one(dict.fromkeys((*FLOATS, *INTEGERS, "boolean"), 0)) is not None
+
+    def _with_one(self, values: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Return a message of usual values, but for the first of some types; None: it has none of them."""
+        seen: list[str] = []
+
+        def leaf(shape: Shape, turn: int | None) -> Any:
+            if shape.item in values and not shape.is_octets and not seen:
+                seen.append(shape.item)
+                return values[shape.item]
+            return self._value(shape, turn)
+
+        made = self._message(None, leaf)
+        return made if seen else None
 
 
 def _single(value: float) -> float:

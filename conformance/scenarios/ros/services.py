@@ -16,6 +16,7 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
+from conformance.scenarios.ros.web import succeeded
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
@@ -37,6 +38,8 @@ ROUNDS: Final = 2
 _BESIDE: Final = 4
 # A request is held up if it takes so long, s, and so many times as long as it usually takes.
 _HELD_S, _HELD = 0.8, 5.0
+# What a call held up ends with it: so much before its response arrives, at most, s.
+_TOGETHER_S: Final = 0.25
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 
 
@@ -97,10 +100,16 @@ class Called:
     heard: tuple[Heard, ...] = ()
     beside: tuple[Beside, ...] = ()
 
+    @property
+    def succeeded(self) -> bool:
+        """Whether the gateway says that the service responded."""
+        return succeeded(self.attempt, self.body)
+
 
 def is_held(call: Called, beside: Beside) -> bool:
     """Return whether a request was held up until a call had ended."""
-    return beside.ended >= call.ended and beside.took > max(_HELD_S, _HELD * beside.usual)
+    together = beside.ended >= call.ended - _TOGETHER_S
+    return together and beside.took > max(_HELD_S, _HELD * beside.usual)
 
 
 @dataclass(frozen=True)
@@ -133,6 +142,7 @@ class _Caller:
     def __init__(self, gateway: Gateway, call: str, body: Calls, request: Definition, response: Definition) -> None:
         self._gateway, self._call, self._body = gateway, call, body
         self._requests, self._responses = gateway.maker(request), gateway.maker(response)
+        self._usual_s: list[float] = []
 
     def calls(self, effort: Effort) -> Iterator[Called]:
         """Yield calls of a server in each of its states."""
@@ -145,12 +155,14 @@ class _Caller:
         self._serve([{"answer": {}}])
         yield self._reached(Server.RESPONDS)
         yield from (self._answered(Server.RESPONDS, *pair) for pair in pairs)
-        yield self._answered(Server.SLOW, *self._usual(), self._body.timeout_s * _SLOW)
+        yield self._answered(Server.SLOW, *self._usual(), self._body.within_s * _SLOW)
         yield self._answered(Server.AFTER, *self._usual())
         for _ in range(ROUNDS):
             silent = self._never_answered()
             yield silent
-            yield self._answered(Server.AFTER, *self._usual())
+            if isinstance(silent.attempt, Exchange) or self._body.timeout_s:
+                # Else the gateway may still wait for the first call, and be right to.
+                yield self._answered(Server.AFTER, *self._usual())
             if not any(is_held(silent, one) for one in silent.beside):
                 break
         self._gateway.robot.tell("forget", name=self._body.service)
@@ -162,18 +174,14 @@ class _Caller:
         self._gateway.robot.tell("serve", service=self._body.service, type=self._body.type, script=script)
 
     def _complete(self, part: str, value: dict[str, Any]) -> dict[str, Any]:
-        found: dict[str, Any] = self._gateway.robot.tell("complete", type=f"{self._body.type}#{part}", value=value)[
-            "value"
-        ]
-        return found
+        return self._gateway.complete(f"{self._body.type}#{part}", value)
 
     def _reached(self, server: Server) -> Called:
         """Call until the gateway has found the server, or its time is over."""
-        until = WALL_CLOCK.now() + 2 * self._body.timeout_s
+        until = WALL_CLOCK.now() + 2 * self._body.within_s
         while True:
             called = self._called(server, {}, self._complete("Response", {}))
-            is_there = isinstance(called.attempt, Exchange) and called.attempt.response.ok
-            if is_there or WALL_CLOCK.now() > until:
+            if called.succeeded or WALL_CLOCK.now() > until:
                 return called
             WALL_CLOCK.sleep(PACE_S)
 
@@ -197,7 +205,7 @@ class _Caller:
         request = self._complete("Request", request)
         robot.heard(body.service)
         began = WALL_CLOCK.now()
-        attempt = self._sent(self._gateway.request(self._call, body, request), body.timeout_s + _LATE_S)
+        attempt = self._sent(self._gateway.request(self._call, body, request), body.within_s + _LATE_S)
         ended = WALL_CLOCK.now()
         heard = () if answer is None else tuple(robot.heard(body.service, 3, _MORE_S))
         text = "" if answer is None else json.dumps(answer)
@@ -215,16 +223,17 @@ class _Caller:
         """Call a server that never responds, and read other resources until the gateway gives the call up."""
         robot, body, clock = self._gateway.robot, self._body, WALL_CLOCK
         others = self._others()
-        usual = [self._read(call, read, 0.0) for call, read in others]
+        # Measured once: afterwards, a call may hold all others up for good.
+        self._usual_s = self._usual_s or [self._read(call, read, 0.0).took for call, read in others]
         request = self._complete("Request", self._requests.usual().value)
         robot.tell("script", name=body.service, script=[{"never": True}])
         robot.heard(body.service)
         began = clock.now()
         made = self._gateway.request(self._call, body, request)
-        with meanwhile(self._gateway.api.client, made, body.timeout_s + _LATE_S) as hanging:
-            heard = robot.heard(body.service, 1, body.timeout_s)
+        with meanwhile(self._gateway.api.client, made, body.within_s + _LATE_S) as hanging:
+            heard = robot.heard(body.service, 1, body.within_s)
             beside = tuple(
-                self._read(call, read, one.took) for (call, read), one in zip(others, usual, strict=True) if heard
+                self._read(call, read, took) for (call, read), took in zip(others, self._usual_s, strict=True) if heard
             )
         attempt, ended = hanging.result()
         return Called(
@@ -247,6 +256,6 @@ class _Caller:
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()
         made = self._gateway.binding.made(call, None) if isinstance(read, Lists) else self._gateway.request(call, read)
-        attempt = self._sent(made, self._body.timeout_s + 2 * _LATE_S)
+        attempt = self._sent(made, self._body.within_s + 2 * _LATE_S)
         ended = WALL_CLOCK.now()
         return Beside(call, attempt, ended - began, usual, ended)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
@@ -15,7 +15,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import differences, document_of, equal
+from conformance.scenarios.ros.web import differences, document_of, equal, succeeded
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -41,6 +41,7 @@ _SILENCE_S: Final = 2.0
 _SILENT_S: Final = 10.0
 # A publisher may keep no more messages than that, and need not wait for who is slow.
 _BURST: Final = 8
+_TEXTS: Final = "a message with a text in place of each number"
 _SAMPLES: Final = {"quick": 8, "standard": 16, "deep": 40}
 
 
@@ -125,10 +126,10 @@ class _Reader:
         """Publish a message, and read until it is shown, or surely another one, or its time is over."""
         clock, reads = WALL_CLOCK, self.reads
         repeat_s = _REPEAT_LARGE_S if sample.kind is Kind.LARGE else _REPEAT_S
-        value = self.complete(sample.value)
+        value = self.gateway.complete(reads.type, sample.value)
         published = self.gateway.robot.publish(reads.topic, reads.type, sample.value, repeat_s=repeat_s)
         reliably = published.reliably or sample.kind is not Kind.LARGE
-        until = published.at + (max(reads.max_age_s or 0.0, reads.timeout_s) if reliably else _LARGE_S)
+        until = published.at + (max(reads.max_age_s or 0.0, reads.within_s) if reliably else _LARGE_S)
         wrong: list[tuple[float, str]] = []
         earlier = 0
         while True:
@@ -153,20 +154,16 @@ class _Reader:
             reliably, earlier, later,
         )  # fmt: skip
 
-    def complete(self, value: dict[str, Any]) -> dict[str, Any]:
-        """Return a message with all its fields."""
-        found: dict[str, Any] = self.gateway.robot.tell("complete", type=self.reads.type, value=value)["value"]
-        return found
-
     def read(self) -> Exchange:
-        return self.gateway.send(self.gateway.request(self.call, self.reads), self.reads.timeout_s)
+        return self.gateway.send(self.gateway.request(self.call, self.reads), self.reads.response_s)
 
     def shows(self, exchange: Exchange, value: dict[str, Any], kind: Kind) -> bool:
         """Return whether a response shows a message."""
         if kind is Kind.NON_FINITE and self.gateway.ros.non_finite == "refused":
-            return not exchange.response.ok
+            return not succeeded(exchange, self.reads)
         document = document_of(exchange.response.body)
-        return exchange.response.ok and not differences(document, value, self.definition, self.reads, self.gateway.ros)
+        found = differences(document, value, self.definition, self.reads, self.gateway.ros)
+        return succeeded(exchange, self.reads) and not found
 
     def content(self, exchange: Exchange) -> str:
         """Return what a response has in the message's place, as text."""
@@ -174,7 +171,7 @@ class _Reader:
 
     def is_stale(self, exchange: Exchange) -> bool:
         """Return whether a response shows no message, or one that was shown before."""
-        return not exchange.response.ok or self.content(exchange) in {"None", *self.contents}
+        return not succeeded(exchange, self.reads) or self.content(exchange) in {"None", *self.contents}
 
 
 @dataclass(frozen=True)
@@ -187,8 +184,9 @@ class Sent:
         what: the message as a noun phrase.
         value: JSON of the message; empty: it is none.
         exchange: request and response.
-        sent, answered: when.
+        accepted: whether it was answered 2xx, and not by what the map says is a failure.
         client: who sent it.
+        is_wrong: whether it has values that the message cannot have.
     """
 
     operation: str
@@ -196,14 +194,9 @@ class Sent:
     what: str
     value: str
     exchange: Exchange
-    sent: float
-    answered: float
+    accepted: bool
     client: int = 0
-
-    @property
-    def accepted(self) -> bool:
-        """Whether it was answered 2xx."""
-        return self.exchange.response.ok
+    is_wrong: bool = False
 
 
 @dataclass(frozen=True)
@@ -273,7 +266,7 @@ class _Writer:
         """
         robot, topic = self.gateway.robot, self.body.publishes
         clock = WALL_CLOCK
-        until = clock.now() + 2 * self.body.timeout_s
+        until = clock.now() + 2 * self.body.within_s
         while True:
             self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
             one = self.send(self.usual())
@@ -303,8 +296,7 @@ class _Writer:
 
     def value(self, sample: Sample) -> dict[str, Any]:
         """Return the message as a whole."""
-        found: dict[str, Any] = self.gateway.robot.tell("complete", type=self.body.type, value=sample.value)["value"]
-        return found
+        return self.gateway.complete(self.body.type, sample.value)
 
     def send(self, sample: Sample) -> Sent:
         """Send a message."""
@@ -312,16 +304,18 @@ class _Writer:
 
     def sent(self, what: str, value: str, made: Outgoing) -> Sent:
         """Send a request."""
-        clock = WALL_CLOCK
-        sent = clock.now()
-        exchange = self.gateway.send(made, self.body.timeout_s)
-        return Sent(self.call, self.body.publishes, what, value, exchange, sent, clock.now())
+        return self.sent_as(what, value, self.gateway.send(made, self.body.response_s))
+
+    def sent_as(self, what: str, value: str, exchange: Exchange, client: int = 0) -> Sent:
+        """Return a request that was sent, with what came of it."""
+        accepted = succeeded(exchange, self.body)
+        return Sent(self.call, self.body.publishes, what, value, exchange, accepted, client)
 
     def hear(self, count: int) -> tuple[Heard, ...]:
         """Return what comes of so many accepted requests, and a moment after that."""
         robot, topic = self.gateway.robot, self.body.publishes
-        heard = robot.heard(topic, count, self.body.timeout_s)
-        while len(heard) < count and (more := robot.heard(topic, 1, self.body.timeout_s)):
+        heard = robot.heard(topic, count, self.body.within_s)
+        while len(heard) < count and (more := robot.heard(topic, 1, self.body.within_s)):
             heard += more
         return (*heard, *robot.heard(topic, 1, _MORE_S))
 
@@ -346,7 +340,7 @@ class _Writer:
         if not one.accepted:
             return
         wanted, clock = json.loads(one.value), WALL_CLOCK
-        until = clock.now() + self.body.timeout_s
+        until = clock.now() + self.body.within_s
         while (left_s := until - clock.now()) > 0:
             came = self.gateway.robot.heard(self.body.publishes, 1, left_s)
             yield from came
@@ -365,30 +359,40 @@ class _Writer:
         several: list[Sent] = []
         samples = [self.usual() for _ in range(MOST_CLIENTS)]
         made = [(one, json.dumps(self.value(one)), self.request(one)) for one in samples]
-        began = WALL_CLOCK.now()
         attempts = send_together([[(self.gateway.api.client, request) for _, _, request in made]])[0]
-        ended = WALL_CLOCK.now()
         for client, (attempt, (one, value, _)) in enumerate(zip(attempts, made, strict=True)):
             if isinstance(attempt, Exchange):
-                several.append(Sent(self.call, self.body.publishes, one.what, value, attempt, began, ended, client))
+                several.append(self.sent_as(one.what, value, attempt, client))
         heard = self.hear(sum(one.accepted for one in several))
         yield Burst(self.call, f"messages of {MOST_CLIENTS} clients at once", tuple(several), heard, self.reliable)
 
     def malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, and what came of them."""
         right = self.request(self.usual())
-        wrong = [("half of the body", right.body[: len(right.body) // 2]), ("no body", b"")]
-        if self.binding_is_json:
-            wrong += [("a list in place of the message", b"[]"), ("null", b"null"), ("a text", b'"x"')]
-            wrong += [("a message with a text in place of each value", self._texts(right.body))]
-        for what, body in wrong:
-            # What comes may be the gateway's own word, as of a watchdog: then the request is sent again in silence.
-            for _ in range(2):
-                one = self.sent(what, "", Outgoing(right.method, right.target, right.headers, body))
-                heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)
-                if not heard or not self.is_silent():
-                    break
-            yield Burst(self.call, what, (one,), tuple(heard), self.reliable)
+        wrong = {"no body": b""}
+        is_wrong = {"half of the body": right.body[: len(right.body) // 2]}
+        # Of a map with `fields`, the body may lack what is wrong.
+        is_whole = not self.body.fields
+        if is_whole and self.gateway.plays and (beyond := self.maker.beyond()) is not None:
+            is_wrong[beyond.what] = self.gateway.request(self.call, self.body, beyond.value).body
+        if self.gateway.binding.syntax == "JSON":
+            wrong |= {"a list in place of the message": b"[]", "null": b"null", "a text": b'"x"'}
+            # A gateway may make a text of anything; a number of a text it may not.
+            (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = self._texts(right.body)
+        for what, body in (wrong | is_wrong).items():
+            yield from self.malformed_as(what, replace(right, body=body), is_wrong=what in is_wrong)
+
+    def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
+        """Yield a request that is none, and what came of it; what the gateway publishes by itself, does not."""
+        for _ in range(2):
+            one = replace(self.sent(what, "", made), is_wrong=is_wrong)
+            heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)
+            if not heard:
+                break
+            # It may be the gateway's own word, as of a watchdog: then the request is sent again in silence.
+            if not self.is_silent():
+                return
+        yield Burst(self.call, what, (one,), tuple(heard), self.reliable)
 
     def is_silent(self) -> bool:
         """Wait until nothing comes for a while; return whether that is so."""
@@ -397,11 +401,6 @@ class _Writer:
             if not self.gateway.robot.heard(self.body.publishes, 1, _SILENCE_S):
                 return True
         return False
-
-    @property
-    def binding_is_json(self) -> bool:
-        """Whether bodies are JSON."""
-        return self.gateway.binding.syntax == "JSON"
 
     @staticmethod
     def _texts(body: bytes) -> bytes:

@@ -75,14 +75,14 @@ def topic_watches(gateway: Gateway, effort: Effort) -> tuple[Watched, ...]:
 def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched | None:
     """Return what is read and heard of a topic; None: nothing comes on it."""
     robot, clock = gateway.robot, WALL_CLOCK
-    definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.timeout_s
+    definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.within_s
     best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-    heard = robot.heard(reads.topic, 1, reads.timeout_s)
+    heard = robot.heard(reads.topic, 1, reads.within_s)
     if not heard:
         # Publishers that were found meanwhile may be of best effort, which a reliable subscriber does not hear.
         robot.tell("forget", name=reads.topic)
         best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-        heard = robot.heard(reads.topic, 1, reads.timeout_s)
+        heard = robot.heard(reads.topic, 1, reads.within_s)
     if not heard:
         return None
     # From now on, what the gateway has must be one that was heard.
@@ -92,7 +92,7 @@ def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched 
         # At once, so that one that goes back shows; and for so long that one that stands still does.
         for _ in range(_AT_ONCE):
             sent = clock.now()
-            looks.append(Look(sent, gateway.send(gateway.request(call, reads), reads.timeout_s)))
+            looks.append(Look(sent, gateway.send(gateway.request(call, reads), reads.response_s)))
         clock.sleep((within_s + _LATE_S) / number)
     clock.sleep(_COMES_S)
     heard += robot.heard(reads.topic)

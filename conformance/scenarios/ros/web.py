@@ -22,6 +22,7 @@ from conformance.documents.xml_names import local
 from conformance.documents.xml_values import value_of
 from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, put_at, value_at
 from conformance.statement.ros_map import Body, RosMap
+from conformance.transport.exchange import Attempt, Exchange
 
 _SHOWN: Final = 80
 _UUID: Final = 16
@@ -57,6 +58,14 @@ class Document:
 
     value: Any
     is_xml: bool = False
+
+
+def succeeded(attempt: Attempt, body: Body) -> bool:
+    """Return whether a request was answered 2xx, and not by what the map says is a failure."""
+    if not isinstance(attempt, Exchange) or not attempt.response.ok:
+        return False
+    failure = body.failure
+    return failure is None or value_at(document_of(attempt.response.body).value, failure.at) not in failure.values
 
 
 def document_of(octets: bytes) -> Document:

@@ -112,14 +112,13 @@ class _Moving(threading.Thread):
 
     def __init__(self, domain_id):
         super().__init__(daemon=True)
-        self.process, self.ends = RosProcess("play", "--name", "robot", domain_id=domain_id), threading.Event()
+        self.process, self.ends = RosProcess("robot", domain_id=domain_id), threading.Event()
         self.process.await_ready()
 
     def run(self):
         for number in itertools.count(1):
             value = {"child_frame_id": f"Zürich {number}", "pose": {"pose": {"position": {"x": number / 3}}}}
-            command = {"do": "publish", "topic": "/odom", "type": "nav_msgs/msg/Odometry", "values": [value]}
-            self.process.ask(json.dumps(command))
+            self.process.tell("publish", topic="/odom", type="nav_msgs/msg/Odometry", values=[value])
             if self.ends.wait(0.1):
                 return
 

@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from conformance.contract.toml_file import TomlFileError
-from conformance.statement.ros_map import Acts, Calls, Lists, Publishes, Reads, read_ros_map
+from conformance.statement.ros_map import Acts, Calls, Failure, Lists, Publishes, Reads, read_ros_map
 
 FULL = """
 domain_id = 7
@@ -16,7 +16,7 @@ bytes = "base64"
 [operations]
 "GET /api/v1/pose" = { topic = "/odom", type = "nav_msgs/msg/Odometry", absent = [404, 503], max_age_s = 2.0 }
 "POST /api/v1/velocity" = { publishes = "/cmd_vel", type = "geometry_msgs/msg/Twist", fields = { "/x" = "/linear/x" } }
-"POST /api/v1/reset" = { service = "/reset", type = "std_srvs/srv/SetBool", at = "", result = "/result" }
+"POST /api/v1/reset" = { service = "/reset", type = "std_srvs/srv/SetBool", failure = { at = "/ok", values = [false] } }
 "GET /api/v1/topics" = { lists = "topics", at = "/topics", name = "/name", type = "/type" }
 
 [operations."POST /api/v1/goals"]
@@ -40,6 +40,8 @@ def test_a_full_map():
     assert [type(one) for one in ros.operations.values()] == [Reads, Publishes, Calls, Lists, Acts]
     assert (ros.domain, ros.non_finite, ros.integers, ros.bytes) == (7, "null", "string", "base64")
     assert ros.operations["GET /api/v1/pose"].absent == (404, 503)
+    assert ros.operations["POST /api/v1/reset"].failure == Failure("/ok", (False,))
+    assert {one.timeout_s for one in ros.operations.values() if not isinstance(one, Lists)} == {None}
     assert ros.acts == ("POST /api/v1/velocity", "POST /api/v1/reset", "POST /api/v1/goals")
     assert "POST /api/v1/goals/{id}/cancel" in ros.calls
     assert "GET /api/v1/goals/{id}" in ros.calls
@@ -63,6 +65,7 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
         ("absent = [404, 503]", "absent = [200]", "must be a whole number from 400 to 599"),
         ('topic = "/odom"', 'topics = "/odom"', "one key of topic, publishes, service, action, lists must"),
         ('topic = "/odom"', 'topic = "/odom", service = "/a"', "it has topic and service"),
+        ("values = [false]", "value = [false]", "unknown key 'value'"),
         ("max_age_s", "max_age", "unknown key 'max_age'; known are"),
         ("goals/{id}/cancel", "goals/cancel", "must name the goal by {id}"),
         ('"GET /api/v1/pose"', '"DELETE /api/v1/pose"', "is read by GET"),

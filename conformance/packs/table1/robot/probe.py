@@ -2,7 +2,9 @@
 
 import math
 import threading
-from typing import Final
+import time
+from collections.abc import Callable
+from typing import Any, Final
 
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.robot import Velocity
@@ -17,6 +19,12 @@ ARRIVES_S: Final = 5.0
 # What the probe hears.
 _EYES: Final = ("deliveries", "velocities")
 _NS: Final = 1_000_000_000
+# Until the robot is discovered, at most, and from one look at the graph to the next, s.
+_DISCOVERY_S, _STEP_S = 10.0, 0.05
+# A subscription is of use when both ends know of it, s.
+_MATCHED_S: Final = 0.2
+_DELIVERY: Final = "mybot_delivery_app/msg/DeliveryRequestMsg"
+_TWIST, _STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 __all__ = ["ARRIVES_S", "Probe", "ProbeError", "RosProbe"]
 
@@ -39,31 +47,56 @@ class Probe(RosProcess):
     heard_at = -math.inf
 
     def __init__(self, ros: Ros, recorder: Recorder) -> None:
-        self._recorder = recorder
-        topics = ("--delivery-topic", ros.delivery_topic, "--cmd-vel-topic", ros.cmd_vel_topic)
-        super().__init__("observe", *topics, domain_id=ros.domain_id)
+        self._ros, self._recorder = ros, recorder
+        super().__init__(domain_id=ros.domain_id)
+
+    def await_ready(self) -> None:
+        """Wait until the robot's publishers are there, and subscribe.
+
+        Publishers count as well as nodes, as they may be discovered before their nodes' names.
+
+        Raises:
+            ProbeError: ROS or the message package is missing, or nothing is there to be found.
+        """
+        super().await_ready()
+        wanted, until = {self._ros.delivery_topic, self._ros.cmd_vel_topic}, time.monotonic() + _DISCOVERY_S
+        while not wanted <= self.topics().keys() and time.monotonic() < until:
+            time.sleep(_STEP_S)
+        topics = self.topics()
+        if not wanted & topics.keys() and not self.tell("graph")["nodes"]:
+            self.close()
+            raise ProbeError(f"no ROS node is found in domain {self._ros.domain_id}")
+        velocity = _STAMPED if _STAMPED in topics.get(self._ros.cmd_vel_topic, ()) else _TWIST
+        self.tell("listen", topic=self._ros.delivery_topic, type=_DELIVERY)
+        self.tell("listen", topic=self._ros.cmd_vel_topic, type=velocity)
+        time.sleep(_MATCHED_S)
 
     def deliveries(self) -> list[Delivery]:
         """Return the DeliveryRequestMsg messages received since the last call, in order."""
-        return [Delivery(int(code), *values) for code, *values in self._heard("deliveries")]
+        heard = self._heard("deliveries", self._ros.delivery_topic, lambda message: list(message.values()))
+        return [Delivery(int(code), *values) for code, *values in heard]
 
     def velocities(self) -> list[Velocity]:
         """Return the velocity commands received since the last call, in order."""
-        return [Velocity(*values) for values in self._heard("velocities")]
+        return [Velocity(*values) for values in self._heard("velocities", self._ros.cmd_vel_topic, _axes)]
 
-    def _heard(self, what: str) -> list[list[float]]:
-        """Return and record the messages of one kind since the last call."""
+    def _heard(self, eye: str, topic: str, values_of: Callable[[dict[str, Any]], list[float]]) -> list[list[float]]:
+        """Return and record the messages of one topic since the last call."""
         heard = []
-        for message in self.ask(what)[what]:
-            at_ns, *values = (float.fromhex(one) if isinstance(one, str) else one for one in message)
-            self._recorder.saw(what, at_ns / _NS, values)
+        for at_ns, _, message in self.tell("heard", name=topic)["events"]:
+            values = values_of(message)
+            self._recorder.saw(eye, at_ns / _NS, values)
             heard.append(values)
         return heard
 
     def topics(self) -> dict[str, list[str]]:
         """Return the types of each published topic, by the topic's full name."""
-        topics: dict[str, list[str]] = self.ask("graph")["topics"]
-        return topics
+        return {name: one["types"] for name, one in self.tell("graph")["topics"].items() if one["publishers"]}
+
+
+def _axes(message: dict[str, Any]) -> list[float]:
+    twist = message.get("twist", message)
+    return [twist[part][axis] for part in ("linear", "angular") for axis in "xyz"]
 
 
 class RosProbe:

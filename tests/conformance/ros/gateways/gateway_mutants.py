@@ -33,7 +33,6 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "reversed": _STYLES,
     "float32": _STYLES,
     "6 digits": _STYLES,
-    "-0": _STYLES,
     "NaN as 0": _STYLES,
     "2^53": _STYLES,
     "signed": _STYLES,
@@ -57,7 +56,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "messages mixed": _IN_PYTHON,
     "reliable only": _STYLES,
     "volatile only": _STYLES,
-    "deaf after the first publisher": _STYLES,
+    "deaf after the first publisher": _IN_PYTHON,
     # services
     "call dropped": _STYLES,
     "call doubled": _STYLES,

@@ -132,7 +132,7 @@ class Forms:
             return struct.unpack("<f", struct.pack("<f", value))[0]
         if self.fault == "6 digits":
             return round(value, 6)
-        return value + 0.0 if self.fault == "-0" else value
+        return value
 
     def _number(self, value: float) -> Any:
         if math.isfinite(value):

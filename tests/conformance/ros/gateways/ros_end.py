@@ -71,6 +71,7 @@ class RosEnd:
         self.goals: dict[str, Goal] = {}
         self._busy = threading.Lock()
         self._absent: set[str] = set()
+        self._deaf: set[str] = set()
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node("gateway", context=self._context, start_parameter_services=False, enable_rosout=False)
@@ -283,6 +284,8 @@ class RosEnd:
         goal.status = wrong[1] if wrong[0] == status else status
 
     def _came(self, topic: str, message: Any) -> None:
+        if topic in self._deaf:
+            return
         if self.fault == "first message for ever" and topic in self._last:
             message = self._last[topic][0]
         if self.fault == "messages mixed":
@@ -299,8 +302,8 @@ class RosEnd:
     def _connect(self, topic: str, heard: _Heard) -> None:
         """Subscribe with the reliability and durability of the topic's publishers."""
         found = [one.qos_profile for one in self.node.get_publishers_info_by_topic(topic)]
-        if self.fault == "deaf after the first publisher" and heard.quality and not found:
-            return
+        if self.fault == "deaf after the first publisher" and topic in self._last and not found:
+            self._deaf.add(topic)
         reliable = all(one.reliability == ReliabilityPolicy.RELIABLE for one in found)
         latched = bool(found) and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in found)
         quality = (

@@ -208,6 +208,7 @@ def ros_map(style: Style, domain_id: int) -> str:
         "feedback": style.feedback_at,
         "result": style.outcome_at,
         "cancel": style.cancel.replace("{}", ACTION.name),
+        "rejected": [style.refused] if style.refused else [],
     }
     operations[f"GET {style.topics}"] = {
         "lists": "topics",
