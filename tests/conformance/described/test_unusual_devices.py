@@ -1,100 +1,81 @@
-"""Devices that are right and unusual are not blamed for anything; a fault of theirs is found."""
-
-import json
-import sys
+"""Devices that are right and unusual are not blamed for anything; faults of theirs are found."""
 
 import pytest
 import unusual_devices as devices
-from processes import ended
+from small_device import certified
 
 # Stands for the name of a file in the arguments of a device.
 _FILE = "FILE"
+# Of each device: its arguments, and the faults of each of its runs with the requirements that they break.
 _DEVICES = [
     (
         devices.unions,
         (),
-        {"500 for a name": "robustness/no-server-error", "a text for a number": "description/body-schema"},
+        [{"500 for a name": "robustness/no-server-error", "a text for a number": "description/body-schema"}],
     ),
     (
         devices.openapi_3_0,
         ("--call", "POST /tools"),
-        {"a bound that is taken": "description/invalid-refused", "null that is not allowed": "description/body-schema"},
+        [
+            {
+                "a bound that is taken": "description/invalid-refused",
+                "null that is not allowed": "description/body-schema",
+            }
+        ],
     ),
     (
         devices.swagger,
         ("--call", "POST /say"),
-        {
-            "another basePath": "description/operations",
-            "another separator": "description/examples",
-            "a form without its field": "description/required",
-        },
+        [
+            {"another basePath": "description/operations"},
+            {"another separator": "description/examples", "a form without its field": "description/required"},
+        ],
     ),
-    (devices.guarded, (), {}),
-    (devices.guarded, ("--token-file", _FILE), {"a number for a boolean": "description/body-schema"}),
+    (devices.guarded, (), []),
+    (devices.guarded, ("--token-file", _FILE), [{"a number for a boolean": "description/body-schema"}]),
     (
         devices.streams,
         (),
-        {"frames of another type": "description/media-type", "a member left out": "description/body-schema"},
+        [{"frames of another type": "description/media-type", "a member left out": "description/body-schema"}],
     ),
     (
         devices.behind_a_proxy,
         (),
-        {"no servers": "description/operations", "a status that is not declared": "description/status-declared"},
+        [{"no servers": "description/operations"}, {"a status that is not declared": "description/status-declared"}],
     ),
 ]
 
 
-def _certified(device, arguments, tmp_path, *, fault="", effort="quick", seed=1):
-    """Return the result of a run, and the requirements that failed or warned."""
+def _certified(device, arguments, tmp_path, faults=(), seed=1):
     if device is devices.behind_a_proxy and not devices.HAS_NGINX:
         pytest.fail("nginx is needed: apt-get install nginx-light")
-    token, out = tmp_path / "token", tmp_path / "out"
+    token = tmp_path / "token"
     token.write_text(devices.TOKEN)
-    more = [str(token) if one == _FILE else one for one in arguments]
-    with device(fault, tmp_path) as url:
-        done = ended(
-            sys.executable,
-            "-m",
-            "roaas",
-            "certify",
-            url,
-            "--effort",
-            effort,
-            "--seed",
-            f"{seed}",
-            "--out",
-            str(out),
-            *more,
-        )
-    assert "Traceback" not in done.stdout + done.stderr
-    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    blamed = {
-        one["id"]: one["verdict"] for one in result["requirements"] if one["verdict"] in {"fail", "warn", "error"}
-    }
-    return done, result, blamed
+    more = [token if one == _FILE else one for one in arguments]
+    with device(faults, tmp_path) as url:
+        return certified(url, tmp_path / "out", *more, seed=seed)
 
 
 @pytest.mark.parametrize(("device", "arguments"), [one[:2] for one in _DEVICES])
 def test_a_right_device_is_not_blamed(device, arguments, tmp_path):
-    done, result, blamed = _certified(device, arguments, tmp_path)
-    assert blamed == {}, done.stdout
+    done = _certified(device, arguments, tmp_path)
+    assert done.blamed == {}, done.text
     # Without its token nothing of the guarded device can be judged.
     decided = device is not devices.guarded or bool(arguments)
-    assert done.returncode == (0 if decided else 4), done.stdout
-    passed = [one["id"] for one in result["requirements"] if one["verdict"] == "pass"]
-    assert "description/file-valid" in passed
+    assert done.exit_code == (0 if decided else 4), done.text
+    assert done.requirement("description/file-valid")["verdict"] == "pass"
 
 
 @pytest.mark.parametrize(
-    ("device", "arguments", "fault", "requirement"),
-    [(device, arguments, *one) for device, arguments, faults in _DEVICES for one in faults.items()],
+    ("device", "arguments", "faults"),
+    [(device, arguments, faults) for device, arguments, runs in _DEVICES for faults in runs],
 )
-def test_a_fault_is_found(device, arguments, fault, requirement, tmp_path):
-    done, _, blamed = _certified(device, arguments, tmp_path, fault=fault)
-    assert requirement in blamed, done.stdout
+def test_faults_are_found(device, arguments, faults, tmp_path):
+    done = _certified(device, arguments, tmp_path, faults)
+    assert done.blamed.keys() >= set(faults.values()), done.text
 
 
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_a_crash_now_and_then_is_one_finding(seed, tmp_path):
-    done, _, blamed = _certified(devices.unions, (), tmp_path, fault="500 now and then", seed=seed)
-    assert blamed == {"robustness/no-server-error": "fail"}, done.stdout
+    done = _certified(devices.unions, (), tmp_path, {"500 now and then"}, seed)
+    assert done.blamed == {"robustness/no-server-error": "fail"}, done.text

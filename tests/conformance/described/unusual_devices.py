@@ -5,7 +5,7 @@ import itertools
 import json
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ def _path(name: str, schema: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def unions(fault: str, _: Path) -> Iterator[str]:
+def unions(faults: Collection[str], _: Path) -> Iterator[str]:
     """Cameras by number or name; no operationId, no examples, additionalProperties everywhere (Starlette)."""
     camera = {"type": "object", "required": ["camera"], "properties": {"camera": {"type": "integer"}}}
     parameters = [_path("camera", {"anyOf": [_INTEGER, _TEXT]})]
@@ -42,16 +42,16 @@ def unions(fault: str, _: Path) -> Iterator[str]:
 
     def one(asked: Any) -> Any:
         name = asked.path_params["camera"]
-        if fault == "500 for a name":
+        if "500 for a name" in faults:
             name = str(int(name))
         if name not in {"1", "front"}:
             return PlainTextResponse("no such camera", 404)
-        return JSONResponse({"camera": "1" if fault == "a text for a number" else 1, "more": {"fps": 30}})
+        return JSONResponse({"camera": "1" if "a text for a number" in faults else 1, "more": {"fps": 30}})
 
     turns = itertools.count(1)
 
     def named(_: Any) -> Any:
-        if fault == "500 now and then" and next(turns) % 7 == 0:
+        if "500 now and then" in faults and next(turns) % 7 == 0:
             return PlainTextResponse("out of memory", 500)
         return JSONResponse({"front": 1})
 
@@ -61,7 +61,7 @@ def unions(fault: str, _: Path) -> Iterator[str]:
 
 
 @contextmanager
-def openapi_3_0(fault: str, _: Path) -> Iterator[str]:
+def openapi_3_0(faults: Collection[str], _: Path) -> Iterator[str]:
     """Tools with nullable, discriminator, readOnly, writeOnly and exclusiveMinimum as a boolean (aiohttp's router)."""
     kinds = ("gripper", "drill")
     base = {
@@ -92,11 +92,11 @@ def openapi_3_0(fault: str, _: Path) -> Iterator[str]:
         },
     }
     document = description(paths, "3.0.3", components={"schemas": schemas})
-    force = {"type": "number", "minimum" if fault == "a bound that is taken" else "exclusiveMinimum": 0}
+    force = {"type": "number", "minimum" if "a bound that is taken" in faults else "exclusiveMinimum": 0}
     taken = {"kind": {"enum": list(kinds)}, "secret": _TEXT, "force": force, "owner": {"type": ["string", "null"]}}
     valid = Draft202012Validator({"type": "object", "required": ["kind", "secret", "force"], "properties": taken})
     tools: list[dict[str, Any]] = [{"id": 0, "kind": "drill", "force": 1.5, "owner": None}]
-    if fault == "null that is not allowed":
+    if "null that is not allowed" in faults:
         tools[0]["kind"] = None
 
     async def add(asked: web.Request) -> web.Response:
@@ -159,7 +159,7 @@ def _serving_aiohttp(app: web.Application) -> Iterator[str]:
 
 
 @contextmanager
-def swagger(fault: str, _: Path) -> Iterator[str]:
+def swagger(faults: Collection[str], _: Path) -> Iterator[str]:
     """Speech and joints below a basePath, by forms and piped lists (Flask)."""
     joints = {
         "name": "joints",
@@ -183,7 +183,7 @@ def swagger(fault: str, _: Path) -> Iterator[str]:
     document = {
         "swagger": "2.0",
         "info": {"title": "A device", "version": "1"},
-        "basePath": "/v3" if fault == "another basePath" else "/v2",
+        "basePath": "/v3" if "another basePath" in faults else "/v2",
         "produces": ["application/json"],
         "paths": {
             "/joints": {"get": {"parameters": [joints], "responses": {"200": angles, **bad}}},
@@ -198,7 +198,7 @@ def swagger(fault: str, _: Path) -> Iterator[str]:
 
     @app.get("/v2/joints")
     def read() -> Response:
-        names = request.args.get("joints", "").split("," if fault == "another separator" else "|")
+        names = request.args.get("joints", "").split("," if "another separator" in faults else "|")
         if not set(names) <= {"a", "b"}:
             return Response(status=400)
         return jsonify(dict.fromkeys(names, 0.5))
@@ -209,7 +209,7 @@ def swagger(fault: str, _: Path) -> Iterator[str]:
             int(request.form.get("times", "1"))
         except ValueError:
             return Response(status=400)
-        missing = "text" not in request.form and fault != "a form without its field"
+        missing = "text" not in request.form and "a form without its field" not in faults
         return Response(status=400 if missing else 204)
 
     with serving_app(WSGIMiddleware(app)) as url:
@@ -234,7 +234,7 @@ class _Guarded(Handler):
         elif self.command not in {"GET", "HEAD"}:
             self._refuse(405, "Allow", "GET, HEAD")
         elif f"key={TOKEN}" in query.split("&") or self.headers.get("Authorization") == f"Bearer {TOKEN}":
-            self.send(200, b'{"on": 1}' if self.server.fault == "a number for a boolean" else b'{"on": true}')
+            self.send(200, b'{"on": 1}' if "a number for a boolean" in self.server.faults else b'{"on": true}')
         else:
             self._refuse(401, "WWW-Authenticate", "Bearer")
 
@@ -246,13 +246,13 @@ class _Guarded(Handler):
 
 
 @contextmanager
-def guarded(fault: str, _: Path) -> Iterator[str]:
+def guarded(faults: Collection[str], _: Path) -> Iterator[str]:
     """A state behind an API key in the query or a bearer token."""
     state = responses({"type": "object", "properties": {"on": {"type": "boolean"}}}, _401=_NONE)
     schemes = {"key": {"type": "apiKey", "in": "query", "name": "key"}, "token": {"type": "http", "scheme": "bearer"}}
     document = description({"/state": {"get": {"responses": state}}}, components={"securitySchemes": schemes})
     document["security"] = [{"key": []}, {"token": []}]
-    with server_of(_Guarded, document=document, fault=fault) as server:
+    with server_of(_Guarded, document=document, faults=faults) as server:
         yield server.url
 
 
@@ -268,9 +268,9 @@ async def _poll(_: Any) -> Any:
 
 
 @contextmanager
-def streams(fault: str, _: Path) -> Iterator[str]:
+def streams(faults: Collection[str], _: Path) -> Iterator[str]:
     """Streams that never end, declared and not, a long poll, a websocket, a large file (Starlette)."""
-    frames = "image/jpeg" if fault == "frames of another type" else "multipart/x-mixed-replace"
+    frames = "image/jpeg" if "frames of another type" in faults else "multipart/x-mixed-replace"
     paths = {
         "/events": {"get": {"responses": responses(_TEXT, "text/event-stream")}},
         "/changes": {"get": {"responses": responses()}},
@@ -280,9 +280,9 @@ def streams(fault: str, _: Path) -> Iterator[str]:
         "/log": {"get": {"responses": responses(_TEXT, "application/octet-stream")}},
         "/state": {"get": {"responses": responses({"type": "object", "required": ["on"]})}},
     }
-    if fault:  # Its long poll only takes time then.
+    if faults:  # Its long poll only takes time then.
         del paths["/poll"]
-    state = {} if fault == "a member left out" else {"on": True}
+    state = {} if "a member left out" in faults else {"on": True}
 
     def stream(media_type: str, piece: bytes) -> Any:
         return lambda _: StreamingResponse(_dripping(piece), media_type=media_type)
@@ -301,9 +301,9 @@ def streams(fault: str, _: Path) -> Iterator[str]:
 
 
 @contextmanager
-def behind_a_proxy(fault: str, folder: Path) -> Iterator[str]:
+def behind_a_proxy(faults: Collection[str], folder: Path) -> Iterator[str]:
     """A state below /robot/api behind nginx; the app itself knows nothing of the path (Starlette, nginx)."""
-    servers = {} if fault == "no servers" else {"servers": [{"url": "/robot/api"}]}
+    servers = {} if "no servers" in faults else {"servers": [{"url": "/robot/api"}]}
     paths = {
         "/state": {"get": {"responses": responses({"type": "object"})}},
         "/items/{id}": {"get": {"parameters": [_path("id", _INTEGER)], "responses": responses(_INTEGER, _404=_NONE)}},
@@ -312,7 +312,7 @@ def behind_a_proxy(fault: str, folder: Path) -> Iterator[str]:
     def item(asked: Any) -> Any:
         number = asked.path_params["id"]
         if number == "1":
-            return JSONResponse(1, 203 if fault == "a status that is not declared" else 200)
+            return JSONResponse(1, 203 if "a status that is not declared" in faults else 200)
         return PlainTextResponse("", 404)
 
     routes = [Route("/state", lambda _: JSONResponse({"on": True})), Route("/items/{id}", item)]
