@@ -8,8 +8,8 @@ from typing import Final
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from reference_robot.ending import RosCommand
 from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
-from reference_robot.ros_arguments import RosCommand
 
 _HIGHEST_DOMAIN_ID: Final = 101
 _FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)

@@ -1,8 +1,15 @@
-"""Waiting for the end of a program: a signal such as SIGINT, SIGTERM or SIGHUP, or a call from another thread."""
+"""What the robot's programs share: the wait for their end, and ROS arguments (``--ros-args ... [--]``) to them.
+
+A program ends by a signal such as SIGINT, SIGTERM or SIGHUP, or by a call from another thread.
+"""
 
 import contextlib
 import os
 import signal
+from collections.abc import Iterable
+from typing import Final
+
+import click
 
 from conformance.commandline.endings import ending_signals
 
@@ -30,3 +37,33 @@ class Ending:
         """Make ``wait`` return; may be called from any thread."""
         with contextlib.suppress(BlockingIOError):  # the pipe is full, so `wait` returns anyway
             os.write(self._write_end, b"\0")
+
+
+_BEGIN: Final = "--ros-args"
+_END: Final = "--"
+
+
+class RosCommand(click.Command):
+    """A click command that passes the words of ``--ros-args ...`` to its function as the tuple ``ros_arguments``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the command line after moving the ROS arguments from it into the parameter ``ros_arguments``."""
+        own, ros = divided(args)
+        left = super().parse_args(ctx, own)
+        ctx.params["ros_arguments"] = tuple(ros)
+        return left
+
+
+def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return the program's own words and the ROS words of a command line.
+
+    ROS words reach from each ``--ros-args`` up to the next ``--`` or the end, both included.
+    """
+    own: list[str] = []
+    ros: list[str] = []
+    is_ros = False
+    for word in words:
+        is_ros = is_ros or word == _BEGIN
+        (ros if is_ros else own).append(word)
+        is_ros = is_ros and word != _END
+    return own, ros

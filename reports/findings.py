@@ -7,7 +7,7 @@ Before 1.2 `message` held only what the suite got; then the text is composed her
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 CAUSES = {
     "no-response": "No response",
@@ -90,3 +90,31 @@ def by_cause(found: Sequence[Finding]) -> Iterator[tuple[str, list[Finding]]]:
     """Yield the heading of each kind of cause with its findings, the most urgent kind first."""
     for cause in sorted({finding.cause for finding in found}, key=list(CAUSES).index):
         yield CAUSES[cause], [finding for finding in found if finding.cause == cause]
+
+
+QUESTIONS = {
+    "hurt": "Can it hurt?",
+    "service": "Does it do what it says?",
+    "clients": "Do stock clients work?",
+    "hostile": "Does it withstand hostile input?",
+    "hygiene": "Hygiene",
+}
+"""Topics by key, with the heading that readers see."""
+FOLDED = "hygiene"
+"""The topic that pages fold: good form, which seldom matters."""
+
+
+class _HasTopic(Protocol):
+    @property
+    def topic(self) -> str: ...
+
+
+_Item = TypeVar("_Item", bound=_HasTopic)
+
+
+def by_topic(items: Sequence[_Item]) -> Iterator[tuple[str, list[_Item]]]:
+    """Yield each topic that occurs with its items; those without a topic (before contract 1.2) come first."""
+    for topic in ("", *QUESTIONS):
+        found = [item for item in items if item.topic == topic]
+        if found:
+            yield topic, found

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
 from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.moves_drawn import pictures
-from reports.certificate.page import certificate_html, certificate_print
-from reports.certificate.seal import Seal
+from reports.certificate.page import Seal, certificate_html, certificate_print
 from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS

@@ -134,46 +134,6 @@ class Against:
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The settings of a run, complete.
-
-    Attributes:
-        robot: addresses of the selected interfaces only; a SOAP address that only the WSDL knows is None.
-        load: its rate is None in the closed model.
-        against: None where no other robot takes part.
-        slo: the service levels of the operations that are measured.
-        description: URL or name of the description that the operations come from; None for the paper's robot.
-        notes: what the result should say of the choice of operations.
-        streams: what to listen to.
-        scenario: what the users do; None where requests come at set times, or one after the other.
-    """
-
-    robot: Robot
-    selection: Selection
-    load: Load
-    steps: Steps
-    repeats: Repeats
-    limits: Limits
-    generator: Generator
-    output: Output
-    against: Against | None = None
-    slo: dict[str, ServiceLevel] = field(default_factory=dict)
-    description: str | None = None
-    notes: tuple[str, ...] = ()
-    streams: Streams = field(default_factory=Streams)
-    scenario: Scenario | None = None
-
-    def to_json(self) -> str:
-        """Return the settings for the process that measures."""
-        return msgspec.json.encode(self).decode()
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Return the settings that `to_json` wrote."""
-        return msgspec.json.decode(text, type=cls)
-
-
-@dataclass(frozen=True)
 class Target:
     """What a run calls.
 
@@ -215,6 +175,33 @@ class Target:
             if level.at_rate is not None
         ]
         return max(rates, default=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(Target):
+    """The settings of a run, complete: what it calls, and how.
+
+    Attributes:
+        load: its rate is None in the closed model.
+        against: None where no other robot takes part.
+    """
+
+    load: Load
+    steps: Steps
+    repeats: Repeats
+    limits: Limits
+    generator: Generator
+    output: Output
+    against: Against | None = None
+
+    def to_json(self) -> str:
+        """Return the settings for the process that measures."""
+        return msgspec.json.encode(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Return the settings that `to_json` wrote."""
+        return msgspec.json.decode(text, type=cls)
 
 
 class SettingsError(ValueError):

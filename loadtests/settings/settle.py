@@ -108,8 +108,7 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
     allowed.check(rate, duration_s, options.repeats.number)
     generator = options.generator
     settings = Settings(
-        robot=target.robot,
-        selection=target.selection,
+        **vars(target),
         load=Load(
             rate=rate,
             users=options.users,
@@ -126,11 +125,6 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
             generator, expect=max(generator.expect, generator.processes if generator.processes > 1 else 0)
         ),
         output=Output(options.out, options.command, statement.robot, options.progress),
-        slo=target.slo,
-        description=target.description,
-        notes=target.notes,
-        streams=target.streams,
-        scenario=target.scenario,
     )
     return settings if options.against is None else _compared(settings, options, options.against, target)
 

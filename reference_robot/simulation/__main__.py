@@ -17,11 +17,10 @@ from typing import Final
 import click
 
 from conformance.contract.toml_file import TomlFileError
-from reference_robot.ending import Ending
+from reference_robot.ending import Ending, RosCommand
 from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
-from reference_robot.ros_arguments import RosCommand
 from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 

@@ -8,9 +8,9 @@ import socket
 import ssl
 from dataclasses import dataclass
 
+from reference_robot.webservices.http.hosts import TrustedProxies
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.port import Held, Limits, Port
-from reference_robot.webservices.http.proxies import TrustedProxies
 from reference_robot.webservices.http.server import serve
 
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from reports.certificate.page import page_values
-from reports.findings import findings
+from reports.findings import QUESTIONS, findings
 from reports.pages.page import markdown_page
-from reports.topics import QUESTIONS
 
 MOST_OCTETS = 512 * 1024
 """Limit for the details of single requirements; the number of verdicts, classes and reasons is limited as well."""

@@ -8,12 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import segno
+from markupsafe import Markup
+
 from reports.certificate.described import WORDS, Described, described
 from reports.certificate.moves_drawn import Picture
-from reports.certificate.seal import Seal
-from reports.findings import Finding, by_cause, by_requirement, findings
+from reports.findings import FOLDED, QUESTIONS, Finding, by_cause, by_requirement, by_topic, findings
 from reports.pages.page import html_page
-from reports.topics import FOLDED, QUESTIONS, by_topic
 
 SHOWN_FAILURES = 5
 """Findings shown for each requirement; the rest are counted."""
@@ -47,6 +48,30 @@ VIEWS = {
 _ORDER = ("fail", "error", "warn", "skip", "pass", "not-claimed")
 _COLUMNS = ("pass", "fail", "warn", "error", "skip", "not-claimed")
 _CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
+
+
+@dataclass(frozen=True, slots=True)
+class Seal:
+    """The fingerprints that a certificate page shows.
+
+    Attributes:
+        result: SHA-256 of result.json, in hexadecimal.
+        key: fingerprint of the signing key, or None if the result is not signed.
+    """
+
+    result: str
+    key: str | None = None
+
+    @property
+    def text(self) -> str:
+        """Return both fingerprints as one line of text, as in the QR code; `roaas verify` prints the same two."""
+        return f"RoAAS result sha256:{self.result} key sha256:{self.key}"
+
+    @property
+    def code(self) -> Markup:
+        """Return the QR code of both fingerprints as SVG: dark on white, with the margin that scanners need."""
+        picture = segno.make(self.text, error="m").svg_inline(scale=3, light="#fff", omitsize=True)
+        return Markup(picture)  # noqa: S704 - drawn here, from two digests
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from reports.certificate.markdown import certificate_markdown
-from reports.formats.annotations import annotations
 from reports.formats.badge import badge
 from reports.formats.ctrf import ctrf
-from reports.formats.gitlab import gitlab
+from reports.formats.gitlab import annotations, gitlab
 from reports.formats.junit import junit
 from reports.formats.sarif import sarif
 

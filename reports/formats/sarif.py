@@ -8,13 +8,13 @@ Failures that the baseline accepts are warnings and not suppressed results, beca
 """
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
 from reports.formats.cases import MESSAGE, STOP, Case, Outcome, Place, cases, places_of, worst_first
-from reports.formats.source_pages import page_of
 from reports.pages.untrusted import excerpt, visible
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -105,3 +105,27 @@ def _text(text: str) -> str:
     """Return the text on one line, with placeholders (SARIF 3.11.5) and links (3.11.6) escaped."""
     line = excerpt(text, MESSAGE)
     return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")
+
+
+# Beginning of a source as the ledger writes it, and the page of the clause.
+_PAGES = (
+    (r"RFC (\d+) (\d+(?:\.\d+)*)", "https://www.rfc-editor.org/rfc/rfc{0}#section-{1}"),
+    (r"RFC (\d+) Appendix ([A-Z])", "https://www.rfc-editor.org/rfc/rfc{0}#appendix-{1}"),
+    (r"RFC (\d+)", "https://www.rfc-editor.org/rfc/rfc{0}"),
+    (r"CWE-(\d+)", "https://cwe.mitre.org/data/definitions/{0}.html"),
+    (r"BP (R\d+)", "https://www.ws-i.org/Profiles/BasicProfile-1.1.html#{0}"),
+    (r"SOAP 1\.1", "https://www.w3.org/TR/2000/NOTE-SOAP-20000508/"),
+    (r"WSDL 1\.1", "https://www.w3.org/TR/2001/NOTE-wsdl-20010315"),
+    (r"XML Schema 1\.0 Part 2", "https://www.w3.org/TR/xmlschema-2/"),
+    (r"Namespaces in XML", "https://www.w3.org/TR/xml-names/"),
+    (r"XML 1\.0", "https://www.w3.org/TR/xml/"),
+)
+
+
+def page_of(source: str) -> str | None:
+    """Return the https URL of the first source in a "; "-separated list that has a known web page, or None."""
+    for part in source.split("; "):
+        for pattern, page in _PAGES:
+            if found := re.match(pattern, part):
+                return page.format(*found.groups())
+    return None

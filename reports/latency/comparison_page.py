@@ -5,8 +5,8 @@ from typing import Any
 
 from reports.latency.comparison import Change, Comparison
 from reports.latency.figures.canvas import COLOUR
-from reports.latency.figures.change import change
 from reports.latency.figures.ratios import Ratio, ratios
+from reports.latency.figures.spectrum import change
 from reports.latency.findings import Verdict
 from reports.latency.numbers import NONE, interval, ms, ratio, share
 from reports.pages.page import html_page, markdown_page

@@ -20,11 +20,11 @@ from httptools import HttpParserCallbackError, HttpParserError, HttpParserUpgrad
 
 from reference_robot.webservices.http.answering import FIELD_BYTES
 from reference_robot.webservices.http.crowd import Client
+from reference_robot.webservices.http.hosts import take_forwarded
 from reference_robot.webservices.http.interface import described
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
 from reference_robot.webservices.http.pacing import DRAINED, PacedConnection
 from reference_robot.webservices.http.port import Port
-from reference_robot.webservices.http.proxies import take_forwarded
 from reference_robot.webservices.http.reading import (
     FRAMING_FIELDS,
     FRAMING_LIMIT,

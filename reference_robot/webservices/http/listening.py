@@ -9,8 +9,7 @@ from urllib.parse import urlsplit
 
 from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
-from reference_robot.webservices.http.hosts import AllowedHosts, is_host_pattern, is_loopback, own_names
-from reference_robot.webservices.http.proxies import TrustedProxies
+from reference_robot.webservices.http.hosts import AllowedHosts, TrustedProxies, is_host_pattern, is_loopback, own_names
 
 REST: Final = "rest"
 SOAP: Final = "soap"

@@ -10,8 +10,8 @@ from email.utils import formatdate
 from typing import Any, Final
 
 from reference_robot.webservices.http.crowd import Client, Crowd, address_of
+from reference_robot.webservices.http.hosts import TrustedProxies
 from reference_robot.webservices.http.interface import Interface
-from reference_robot.webservices.http.proxies import TrustedProxies
 
 _AWAKE: Final = 150e-6  # seconds; a client on the same machine needs 20 to 100 µs from a response to its next request
 _TURNS: Final = 5e-3  # seconds for what clients have postponed, before new requests of other clients get their turn

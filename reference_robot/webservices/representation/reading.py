@@ -10,8 +10,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.representation.checking import checked, shown
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, checked, shown
 from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
 from reference_robot.webservices.representation.writing import JSON, XML
 from reference_robot.webservices.representation.xml_input import parsed

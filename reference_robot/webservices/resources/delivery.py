@@ -7,8 +7,7 @@ from urllib.parse import unquote_to_bytes
 from conformance.papers_robot.delivery import PATH_NAMES
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, shown
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, wanted_format
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError

@@ -7,8 +7,7 @@ from urllib.parse import unquote_to_bytes
 
 from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, shown
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.resources.resource import NO_CONTENT, Resource, represented, sent, wanted_format
 from reference_robot.webservices.robot.goals import GOAL, Goals

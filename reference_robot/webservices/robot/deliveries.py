@@ -9,8 +9,7 @@ from conformance.papers_robot.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.problems import Problem, not_yet
+from reference_robot.webservices.representation.problems import Problem, not_yet, shown
 from reference_robot.webservices.robot.missions import MissionTable
 
 _CODES: Final = frozenset({COURIER, COFFEE})

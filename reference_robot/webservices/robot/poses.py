@@ -9,8 +9,7 @@ from typing import Any, Final, TypeAlias
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
 
 from reference_robot.names import Frames
-from reference_robot.webservices.representation.checking import refused, shown
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, refused, shown
 
 _UNIT_TOLERANCE: Final = 1e-3  # contract, fine print
 

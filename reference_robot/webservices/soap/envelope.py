@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import shown
 from reference_robot.webservices.representation.writing import element_of, text_of
 
 SOAP: Final = "http://schemas.xmlsoap.org/soap/envelope/"

@@ -1,4 +1,4 @@
-"""A SOAP service: dispatches a message to its operation and returns the response; and its WSDL and XSD."""
+"""SOAP services: each dispatches a message to its operation and returns the response; their WSDL, XSD and paths."""
 
 import logging
 from collections.abc import Awaitable, Callable, Iterable
@@ -8,11 +8,11 @@ from typing import Any, Final
 from lxml import etree
 
 from conformance.papers_robot.statement import CONTRACT_DIR
+from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Scope
-from reference_robot.webservices.http.interface import awaited
+from reference_robot.webservices.http.interface import Interface, awaited
 from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.representation.checking import shown
-from reference_robot.webservices.representation.problems import Problem
+from reference_robot.webservices.representation.problems import Problem, shown
 from reference_robot.webservices.representation.reading import parsed_content_type
 from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.representation.xml_input import parsed
@@ -124,3 +124,49 @@ class ServiceDescription:
             log: Any = self._schema.error_log
             errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
             raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")
+
+
+_ALLOW: Final = (b"allow", b"POST, OPTIONS")
+_ALLOW_DESCRIPTION: Final = (b"allow", b"GET, HEAD, POST, OPTIONS")
+_READ: Final = frozenset({"GET", "HEAD"})
+
+
+class SoapInterface(Interface):
+    """The SOAP interface: services, each at its own path, and their descriptions."""
+
+    def __init__(
+        self, services: Iterable[SoapService], address: Callable[[Request], str], admission: Admission
+    ) -> None:
+        super().__init__(admission)
+        self._services = {service.path.encode(): service for service in services}
+        self._address = address
+
+    def scope(self, request: Request) -> Scope:
+        """Return the token scope of the service that the request addresses."""
+        service = self._services.get(request.path)
+        return Scope.READ if service is None else service.scope
+
+    def answer(self, request: Request) -> Response | Awaitable[Response]:
+        """Return the response of a service, or its description for ``?wsdl`` and ``?xsd=1``.
+
+        Raises:
+            Problem: 404 for an unknown path, 405 for other methods (WS-I BP R1114), and every problem of the service.
+        """
+        service = self._services.get(request.path)
+        if service is None:
+            raise Problem(404, f"there is no service at {request.path.decode('ascii')[:200]!a}")
+        if request.method == "POST":
+            return service.post(request)
+        description = self._description(service, request)
+        allow = _ALLOW if description is None else _ALLOW_DESCRIPTION
+        if request.method == "OPTIONS":
+            return Response(204, (allow,))
+        if description is not None and request.method in _READ:
+            return content(200, "text/xml", description)
+        raise Problem(405, f"the method is not one of {allow[1].decode()}; send messages by POST", (allow,))
+
+    def _description(self, service: SoapService, request: Request) -> bytes | None:
+        query = request.query.lower()
+        if query in {b"wsdl", b"wsdl=1"}:
+            return service.description.wsdl(self._address(request))
+        return service.description.xsd if query == b"xsd=1" else None

@@ -9,7 +9,7 @@ from lxml import etree
 from reference_robot.webservices.http.authorization import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-from reference_robot.webservices.representation.checking import shown
+from reference_robot.webservices.representation.problems import shown
 from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery

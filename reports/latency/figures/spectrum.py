@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from reports.latency.distributions import AllSeries, Distribution, Floats
-from reports.latency.figures.canvas import COLOUR, MARK, Panel, log_time_axis, picture
+from reports.latency.figures.canvas import COLOUR, MARK, SOFT, Panel, log_time_axis, picture
 
 _POINTS = 220
 _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
@@ -91,3 +91,25 @@ def _differ(service: Distribution | None, response: Distribution) -> bool:
     return service is None or not (
         np.array_equal(service.low_ms, response.low_ms) and np.array_equal(service.counts, response.counts)
     )
+
+
+@picture(
+    "change",
+    "Service time at each percentile, old and new. Where the new curve is higher, requests got slower. "
+    "Thin lines: too few requests for a reliable value.",
+)
+def change(old: AllSeries, new: AllSeries) -> Iterator[Panel]:
+    """Yield a panel for each series that both results hold: service times, old in grey and dashed, new in colour."""
+    for key, after in new.items():
+        before = old.get(key)
+        if before is None or before.service is None or after.service is None:
+            continue
+        operation, client, interface = key
+        name = f"{operation}, {interface.upper()}, {client} client"
+        panel = Panel(name, f"Percentile spectrum of {name}, old and new; the table holds its figures.")
+        curve(panel.axes, before.service, (SOFT, "s"), "old", "--")
+        curve(panel.axes, after.service, (COLOUR[interface], "o"), "new")
+        quantile_axis(panel.axes, max(before.service.total, after.service.total))
+        log_time_axis(panel.axes, "service time, ms")
+        panel.legend()
+        yield panel

@@ -11,7 +11,7 @@ import sys
 import pytest
 from small_device import answers, certified, constant, described, small_device
 
-from reports.formats.annotations import annotations
+from reports.formats.gitlab import annotations
 from reports.formats.sarif import sarif
 
 _SCHEMA = {"type": "object", "required": ["name"]}

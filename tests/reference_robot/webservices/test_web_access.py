@@ -16,9 +16,8 @@ from proof.selftest.certifying import Job, run_job
 from proof.table1.selftest import REFERENCE
 from reference_robot.webservices.http.admission import Admission
 from reference_robot.webservices.http.authorization import Authorization
-from reference_robot.webservices.http.hosts import Address, AllowedHosts, is_loopback
+from reference_robot.webservices.http.hosts import Address, AllowedHosts, TrustedProxies, is_loopback, take_forwarded
 from reference_robot.webservices.http.messages import Request
-from reference_robot.webservices.http.proxies import TrustedProxies, take_forwarded
 from reference_robot.webservices.representation.problems import Problem
 
 GOAL = "/robot/navigation/action/goal/"

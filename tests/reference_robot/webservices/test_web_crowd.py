@@ -7,7 +7,7 @@ import pytest
 from web_protocol import closed, request, runs, statuses
 
 from reference_robot.webservices.http.crowd import Crowd, address_of
-from reference_robot.webservices.http.proxies import TrustedProxies
+from reference_robot.webservices.http.hosts import TrustedProxies
 
 
 class Waiting:

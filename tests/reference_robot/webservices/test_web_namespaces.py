@@ -4,8 +4,8 @@ import pytest
 from web_messages import delivery_path, twist
 from web_robot import RosProcess, eventually, running_robot
 
+from reference_robot.ending import divided
 from reference_robot.ros import RosRuntime
-from reference_robot.ros_arguments import divided
 
 
 @pytest.mark.parametrize(

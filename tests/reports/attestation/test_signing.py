@@ -16,7 +16,7 @@ from vendors import Door, requirement
 
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
 from reports.attestation.policy import Known, Policy, read_policy
-from reports.certificate.seal import Seal
+from reports.certificate.page import Seal
 from reports.cli.attestation import keygen, verify
 from reports.cli.signing import sign
 from reports.errors import KeyUnusableError, PolicyUnusableError, ResultInvalidError

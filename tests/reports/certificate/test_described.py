@@ -8,8 +8,7 @@ from lxml import html
 
 from reports.certificate.described import described
 from reports.certificate.markdown import certificate_markdown
-from reports.certificate.page import certificate_html, certificate_print
-from reports.certificate.seal import Seal
+from reports.certificate.page import Seal, certificate_html, certificate_print
 from reports.formats.badge import badge
 
 
