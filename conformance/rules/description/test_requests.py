@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
+from urllib.parse import parse_qsl, urlsplit
 
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
@@ -23,6 +24,12 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
+# What says that two values have to fit together, which no schema can say.
+_TOGETHER = re.compile(
+    r"[<>≤≥≠]|\b(than|before|after|below|above|between|exceeds?|equal|differ\w*|both|either|together|unless|requires?)\b",
+    re.IGNORECASE,
+)
+_SENTENCE = re.compile(r"(?<=[.;])\s+")
 _SAID_OF_IT = re.compile(r": | is | has | should ")
 _CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
 
@@ -157,7 +164,9 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 @rule("description/valid-accepted", on=(survey, generated_requests))
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
-    trace = replace(trace, probes=tuple(_named(trace, run)))
+    texts = {one.label: one.text for one in operations_of(run.contract)}
+    alone = (one for one in _named(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
+    trace = replace(trace, probes=tuple(alone))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
     # An operation that never accepts anything may need a state; which status it has then, another rule judges.
     works = {one.operation for one in trace.probes if one.ok}
@@ -193,6 +202,20 @@ def _named(trace: Survey, run: Run) -> Iterator[Probe]:
     own = [one for one in trace.probes if one.operation.startswith(f"{one.attempt.request.method} ")]
     known = {_path_of(one) for one in own if one.ok}
     yield from (one for one in own if one.operation not in free or _path_of(one) in known)
+
+
+def _is_of_two(probe: Probe, text: str) -> bool:
+    """Return whether the operation's text, or the refusal, says of two values of the request that they must fit."""
+    request = probe.attempt.request
+    sent = read_json(request.body).value
+    names = {*(sent if isinstance(sent, dict) else ()), *dict(parse_qsl(urlsplit(request.target).query))}
+    refusal = read_json(probe.exchange.response.body).value if probe.exchange else None
+    said = [one for one in refusal.values() if isinstance(one, str)] if isinstance(refusal, dict) else []
+    sentences = [sentence for one in (text, *said) for sentence in _SENTENCE.split(one)]
+    return any(
+        _TOGETHER.search(one) and sum(bool(re.search(rf"\b{re.escape(name)}\b", one)) for name in names) > 1
+        for one in sentences
+    )
 
 
 def _path_of(probe: Probe) -> str:

@@ -209,6 +209,25 @@ def test_what_another_rule_judges_is_not_told_twice(rule, probes, run):
     assert _failed(rule, Survey(tuple(probes)), run) == []
 
 
+_PAIR = b'{"low": 400, "high": 200}'
+
+
+@pytest.mark.parametrize(
+    ("said", "seen"),
+    [
+        ("low must be less than high.", 0),
+        ("Both low and high, or neither.", 0),
+        ("low is wrong", 1),
+        ("The values low and high are wrong", 1),
+        ("low must be less than 100. high is 200", 1),
+    ],
+)
+def test_values_that_must_fit_together_are_the_devices_own_rule(said, seen, run):
+    refused = _probe(422, {"detail": said}, Kind.BOUND, operation=_OTHER, sent=_PAIR, place="body /low", **_PROBLEM)
+    works = _probe(201, b"", operation=_OTHER, sent=b'{"low": 1, "high": 2}')
+    assert len(_failed(requests.valid_accepted, Survey((works, refused)), run)) == seen
+
+
 def test_what_operations_have_in_common_is_told_once(run):
     probes = [_page(418), _page(418, kind=Kind.INVALID, says="x"), _page(418, operation=_OTHER)]
     (finding,) = _failed(answers.status_declared, Survey(tuple(probes)), run)
