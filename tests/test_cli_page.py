@@ -27,7 +27,9 @@ _COMPLETED = _sections(site_commands.completed(_PAGE))
 
 
 def _in_help(command):
-    options = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+    options = [
+        parameter for parameter in command.params if isinstance(parameter, click.Option) and not parameter.hidden
+    ]
     return {name for option in options for name in (*option.opts, *option.secondary_opts)}
 
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
@@ -17,11 +18,12 @@ from toy_server import Handler, server_of
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import current, load_set
 from conformance.papers_robot.statement import CONTRACT_DIR
+from proof.table1 import independent_robots
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, statement_in
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 from reports.attestation.statement import seed_of
 
-_INDEPENDENT_ROBOTS = CONTRACT_DIR / "independent_robots"
+_INDEPENDENT_ROBOTS = Path(independent_robots.__file__).parent
 
 
 def _certify(tmp_path, *arguments):

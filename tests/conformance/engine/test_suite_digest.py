@@ -11,7 +11,7 @@ from conformance.engine.suite import JUDGING, contract_digests, known, suite_dig
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.verdict.verdicts import holds_back
 
-_OTHERS = ("fleet", "selftest", "cli", "explaining", "mutation", "packs", "commandline", "history")
+_OTHERS = ("fleet", "cli", "explaining", "packs", "commandline", "history")
 
 
 @pytest.fixture
