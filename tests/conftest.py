@@ -1,6 +1,7 @@
 """Fixtures for every room's tests, such as a ROS domain of one's own, and the order in which processes share tests."""
 
 import gc
+import itertools
 import os
 import signal
 from collections import Counter
@@ -40,6 +41,14 @@ def pytest_collection_finish() -> None:
 
 
 _FIRST_DOMAIN_ID = 40
+# A node of the test before may still be seen in its domain, so that each test, and each process of pytest, begins its
+# search for a free one elsewhere: in the first forty, as the others are room for those that are taken.
+_STARTS = 40
+_turns = itertools.count(10 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")))
+
+
+def _first_domain_id() -> int:
+    return _FIRST_DOMAIN_ID + next(_turns) % _STARTS
 
 
 @pytest.fixture(autouse=True)
@@ -53,7 +62,7 @@ def _no_secrets() -> Iterator[None]:
 @pytest.fixture
 def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Yield a ROS domain id that no other test of any process on this machine holds."""
-    with own_domain(_FIRST_DOMAIN_ID) as held:
+    with own_domain(_first_domain_id()) as held:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(held))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield held
@@ -62,12 +71,12 @@ def domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 @pytest.fixture(scope="module")
 def module_domain_id() -> Iterator[int]:
     """Yield a domain id for a robot that the tests of one module share."""
-    with own_domain(_FIRST_DOMAIN_ID) as held:
+    with own_domain(_first_domain_id()) as held:
         yield held
 
 
 @pytest.fixture(scope="session")
 def session_domain_id() -> Iterator[int]:
     """Yield a domain id for a robot that many tests share; the environment is the user's affair."""
-    with own_domain(_FIRST_DOMAIN_ID) as held:
+    with own_domain(_first_domain_id()) as held:
         yield held
