@@ -19,10 +19,9 @@ import click
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, undisturbed
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import Group, options_of
+from conformance.commandline.help_pages import Group, inert, options_of
 from conformance.commandline.out_folder import FolderError, command_without_folders, held
 from conformance.commandline.result_command import CommandResult, ResultCommand
-from conformance.commandline.terminal import inert
 from conformance.contract.toml_file import TomlFileError
 from conformance.papers_robot.statement import RobotStatement, load_robot_statement
 from conformance.statement.endpoints import Endpoints

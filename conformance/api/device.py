@@ -6,9 +6,9 @@ from typing import Any
 
 from conformance.contract.pack import Contract
 from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.transport.exchange import Listener
-from conformance.verdict.case import Checker
+from conformance.verdict.evidence import Checker
 from conformance.verdict.run import Run
 
 # A RestInterface, a SoapService and a Question: their modules import this one.

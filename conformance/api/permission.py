@@ -9,8 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 from conformance.api.call_rules import CallRules, Reason
 from conformance.contract.classes import Prerequisite
-from conformance.documents.openapi import Operation
-from conformance.documents.resources import is_normal, matching
+from conformance.documents.openapi import Operation, is_normal, matching
 from conformance.statement.motion_calls import covers
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS

@@ -20,7 +20,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _MOST_OCTETS: Final = 65_536

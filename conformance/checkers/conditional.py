@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from http import HTTPStatus
 
 from conformance.checkers.occasion import Occasion
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _PART = re.compile(r"bytes (?P<first>\d+)-(?P<last>\d+)/", re.IGNORECASE)
 _TAG = re.compile(r'"[^"]*"')

@@ -18,7 +18,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, is_json
 from conformance.documents.parameters import plain_name
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _PART: Final = re.compile(r"bytes (\d+)-(\d+)/(\d+|\*)", re.IGNORECASE)
 # Digests in structured fields (RFC 9530 2, 3), and in the field before them (RFC 3230 4.3.2).

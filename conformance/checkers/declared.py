@@ -13,11 +13,10 @@ from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_shape import Shape, shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.openapi import Operation, is_json, is_xml, resource_at
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, flat, read
-from conformance.documents.resources import resource_at
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing, likeness
 
 # RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.

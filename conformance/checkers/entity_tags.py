@@ -9,7 +9,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import SAFE_METHODS, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
 _LIST: Final = re.compile(rf"\s*{_TAG.pattern}(?:\s*,\s*{_TAG.pattern})*\s*")

@@ -9,10 +9,9 @@ from typing import Final
 
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import is_json, is_xml
-from conformance.documents.resources import resource_at
+from conformance.documents.openapi import is_json, is_xml, resource_at
 from conformance.transport.exchange import Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 WELL_FRAMED: Final = "well-framed HTTP"
 # Fields that clients act on, and that several values make meaningless (RFC 9110 5.3).

@@ -14,7 +14,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # So many identifiers of a run are remembered.
 _REMEMBERED: Final = 50_000

@@ -17,7 +17,7 @@ from conformance.documents.openapi import SAFE
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # So many values that items had, and that a filter was asked for, are remembered; so many items are compared.
 _REMEMBERED: Final = 50_000

@@ -36,7 +36,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # A device that writes later has so long, s.
 _SETTLES_S: Final = 3.0

@@ -11,7 +11,7 @@ from conformance.api.rest.validity import VALID, Validity, validity
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 #: Methods that every server knows: a request with another one may never reach a resource.
 METHODS: Final = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS"})

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 
 from conformance.api.rest.problem import JSON, XML, members_of
 from conformance.checkers.occasion import METHODS, Occasion
+from conformance.documents.openapi import inside_prefix, is_normal
 from conformance.documents.representation import UnreadableError, parse_xml
-from conformance.documents.resources import inside_prefix, is_normal
 from conformance.documents.traceback import inside_shown, path_shown
 from conformance.transport.exchange import Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _NAMESPACE = "urn:ietf:rfc:7807"
 # Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its field.

@@ -9,10 +9,9 @@ from conformance.api.rest.statuses import CRASHES
 from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import is_json
-from conformance.documents.resources import Resource, resource_at, resources_of
+from conformance.documents.openapi import Resource, is_json, resource_at, resources_of
 from conformance.transport.exchange import SAFE_METHODS
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Statuses that say nothing of the resource; a crash, whatever the method, is a finding of its own.
 _NOT_NOW: Final = frozenset({401, 403, 429, 503}) | CRASHES

@@ -18,7 +18,7 @@ from conformance.checkers.transitions import Transitions
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Those that judge any response; those that judge what the description may say of it.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)

@@ -10,10 +10,9 @@ from lxml import etree
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, read_root
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import Wsdl, WsdlError
-from conformance.documents.xml import NotXmlError, elements, has_doctype, parse
-from conformance.documents.xml_names import ENVELOPE, clark, local, namespace
+from conformance.documents.xml import ENVELOPE, NotXmlError, clark, elements, has_doctype, local, namespace, parse
 from conformance.transport.exchange import Attempt, Exchange, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # BP 1.1 R1012; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})

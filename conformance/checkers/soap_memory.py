@@ -16,12 +16,10 @@ from urllib.parse import urlsplit
 
 from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
 from conformance.documents.wsdl import Wsdl
-from conformance.documents.xml import NotXmlError, elements, parse
-from conformance.documents.xml_names import local
-from conformance.documents.xsd_lexical import INTEGERS, NUMBERS, is_alike, number_in
-from conformance.documents.xsd_shapes import Simple
+from conformance.documents.xml import NotXmlError, elements, local, parse
+from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, Simple, is_alike, number_in
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 if TYPE_CHECKING:
     from lxml import etree

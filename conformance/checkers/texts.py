@@ -12,7 +12,7 @@ from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import is_json
 from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.transport.reach import joined
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # So many URLs are remembered.
 _MOST: Final = 1000

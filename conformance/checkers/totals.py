@@ -10,7 +10,7 @@ from typing import Final
 from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, number_of
 from conformance.checkers.occasion import Occasion
 from conformance.documents.parameters import plain_name
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 #: A total may be kept apart from the list, and be late after a change, s. Wrong so often while nothing changes, it is
 #: wrong.

@@ -26,7 +26,7 @@ from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000

@@ -21,10 +21,9 @@ from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import Group, options_of
+from conformance.commandline.help_pages import Group, inert, options_of
 from conformance.commandline.out_folder import command_without_folders
 from conformance.commandline.result_command import CommandResult, FrontDoor, ResultCommand
-from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.places import places
@@ -338,8 +337,11 @@ def _places(contract: Contract, statement: Path | None, source: str | None) -> d
 
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     """Return the run that the options describe."""
-    from conformance.verdict.run import Run, seed_of_nonce  # noqa: PLC0415 - see _certify
-    from conformance.verdict.selection import Selection  # noqa: PLC0415 - same
+    from conformance.verdict.run import (  # noqa: PLC0415 - see _certify
+        Run,
+        Selection,
+        seed_of_nonce,
+    )
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}

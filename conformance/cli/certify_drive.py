@@ -12,9 +12,8 @@ import click
 import msgspec
 from click.core import ParameterSource
 
-from conformance.commandline.atomic_write import write_atomically
-from conformance.commandline.help_pages import Group, options_of
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import Group, inert, options_of
+from conformance.commandline.out_folder import write_atomically
 from conformance.contract.described import MOTION
 from conformance.contract.toml_file import basic_string
 from conformance.documents.openapi import operations_of

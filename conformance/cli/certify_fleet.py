@@ -10,9 +10,9 @@ from click.core import ParameterSource
 
 from conformance.cli.certify_options import CertifyOptions
 from conformance.cli.summary import warning
+from conformance.commandline.endings import Started
+from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult
-from conformance.commandline.started import Started
-from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity

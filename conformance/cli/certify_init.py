@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult
-from conformance.commandline.terminal import inert
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Api, Calls, Statement, StatementError

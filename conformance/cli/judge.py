@@ -8,8 +8,8 @@ import click
 
 from conformance.cli.stored_contract import contract_of
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult, ResultCommand
-from conformance.commandline.terminal import inert
 from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
 from conformance.statement.statement import StatementError, empty_statement, load_statement
 from conformance.verdict.finding import counted
@@ -101,7 +101,7 @@ def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None,
     # Imported here, so that --help stays quick.
     from conformance.engine.judging import judge_stored  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
-    from conformance.history.reading import HistoryError  # noqa: PLC0415
+    from conformance.history.events import HistoryError  # noqa: PLC0415
     from conformance.scenarios.stored import TracesError  # noqa: PLC0415
     from conformance.verdict.run import Run  # noqa: PLC0415
 

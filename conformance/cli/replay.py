@@ -15,8 +15,8 @@ from conformance.cli.summary import warning
 from conformance.commandline.device_options import client_certificate_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult, ResultCommand
-from conformance.commandline.terminal import inert
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.engine.stored_result import MALFORMED, StoredResultError, findings, not_well_made, read_result

@@ -19,7 +19,7 @@ def contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Con
     Raises:
         click.UsageError: the pack named by the user cannot be used.
     """
-    from conformance.documents.unreadable_parts import without_unreadable  # noqa: PLC0415 - --help stays quick
+    from conformance.documents.description_faults import without_unreadable  # noqa: PLC0415 - --help stays quick
     from conformance.target.describing import FOLDER  # noqa: PLC0415 - --help stays quick
 
     described, named = folder / FOLDER, pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))

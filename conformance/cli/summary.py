@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.terminal import columns, inert, wrapped
+from conformance.commandline.help_pages import columns, inert, wrapped
 from conformance.contract.classes import QUESTIONS
 from conformance.verdict.finding import counted
 

@@ -4,10 +4,12 @@ Each of them raises KeyboardInterrupt in the main thread, so that what stops a r
 does so after all of them.
 """
 
+import datetime as dt
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
@@ -76,3 +78,19 @@ def as_parent(environment: Mapping[str, str]) -> dict[str, str]:
 def ended_by(number: int) -> str:
     """Return what ended the process, for a sentence."""
     return "the end of its parent process" if _parent_ended.is_set() else signal.Signals(number).name
+
+
+class Started:
+    """A moment, and what the time is since then by a clock that is never set.
+
+    Attributes:
+        at: the moment in UTC.
+    """
+
+    def __init__(self) -> None:
+        self.at, self._began = dt.datetime.now(dt.UTC), time.monotonic()
+
+    @property
+    def ended(self) -> dt.datetime:
+        """What the time is now, if the clock was right at the start."""
+        return self.at + dt.timedelta(seconds=time.monotonic() - self._began)

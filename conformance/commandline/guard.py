@@ -16,8 +16,8 @@ except ImportError:  # no POSIX system
     resource = None  # type: ignore[assignment]
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import inert
 from conformance.commandline.secrecy import SECRETS
-from conformance.commandline.terminal import inert
 
 _SHOWN = 300
 # What Python and the loader of its modules say where the memory of a process is limited, beside MemoryError.

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple, Protocol
 import click
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import GroupedCommand
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import GroupedCommand, inert
 
 
 class CommandResult(NamedTuple):

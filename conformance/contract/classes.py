@@ -5,7 +5,17 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from conformance.contract.interfaces import EVERY, Interface
+
+class Interface(StrEnum):
+    """A kind of interface: REST, the SOAP service that acts, or the SOAP service that only reads."""
+
+    REST = "rest"
+    PUBLISHERS = "publishers"
+    SUBSCRIBERS = "subscribers"
+
+
+EVERY = tuple(Interface)
+
 
 #: The profile that every pack has: all of its classes.
 FULL = "full"

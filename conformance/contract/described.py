@@ -9,9 +9,8 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.given_files import read_json, read_octets
-from conformance.commandline.out_folder import own_folder
+from conformance.commandline.out_folder import own_folder, write_atomically, write_json
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 

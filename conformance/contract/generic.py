@@ -4,8 +4,7 @@ from functools import cache
 
 import msgspec
 
-from conformance.contract.classes import ConformanceClass, Topic
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import ConformanceClass, Interface, Topic
 from conformance.contract.ledger import Requirement, load_ledger
 from conformance.contract.locating import GENERIC_RULES, ContractError
 from conformance.contract.toml_file import Text, read_toml

@@ -20,11 +20,10 @@ from typing import Any, NamedTuple
 import msgspec
 
 from conformance.commandline.guard import is_of_memory
-from conformance.contract.classes import FULL, ConformanceClass, Topic
+from conformance.contract.classes import FULL, ConformanceClass, Interface, Topic
 from conformance.contract.described import DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.document_text import parsed
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
-from conformance.contract.interfaces import Interface
 from conformance.contract.ledger import LedgerError, Requirement, load_ledger, renamed
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.toml_file import Text, read_toml

@@ -1,8 +1,12 @@
-"""The operations of a contract, from its OpenAPI description."""
+"""The operations of a contract, from its OpenAPI description: which one is for a path and a method."""
 
+from __future__ import annotations
+
+import re
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 from typing import Any, Final
+from urllib.parse import unquote
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
@@ -14,6 +18,7 @@ from conformance.documents.json_schema import (
     changed_alike,
     modern,
     opened,
+    pointed,
     resolved,
 )
 from conformance.documents.parameters import (
@@ -24,6 +29,7 @@ from conformance.documents.parameters import (
     read_encoding,
     read_parameter,
 )
+from conformance.transport.exchange import sendable
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
@@ -274,3 +280,194 @@ def _headers(response: dict[str, Any]) -> dict[str, tuple[bool, Schema]]:
         # OpenAPI 3.1, 4.8.17.1: a Content-Type header in this place is ignored.
         if name.lower() != "content-type"
     }
+
+
+# A parameter in a path.
+PARAMETER = re.compile(r"\{([^{}]*)\}")
+
+
+@dataclass(frozen=True)
+class Resource:
+    """All operations of one path, by method."""
+
+    template: str
+    operations: dict[str, Operation]
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """A regular expression that matches the paths of the template."""
+        parts = PARAMETER.split(self.template)
+        parts[::2] = map(sendable, parts[::2])
+        return re.compile("".join(re.escape(part) if i % 2 == 0 else "[^/]*" for i, part in enumerate(parts)))
+
+    @cached_property
+    def methods(self) -> frozenset[str]:
+        """The methods that the description declares, and HEAD if it declares GET."""
+        given = frozenset(self.operations)
+        return given | {"HEAD"} if "GET" in given else given
+
+    @property
+    def optional(self) -> bool:
+        """Whether a robot need not implement it."""
+        return all(operation.optional for operation in self.operations.values())
+
+
+@lru_cache(maxsize=8)
+def resources_of(contract: Contract) -> tuple[Resource, ...]:
+    """Return the resources of a contract, in the description's order.
+
+    Raises:
+        ContractError: as operations_of().
+    """
+    by_path: dict[str, dict[str, Operation]] = {}
+    for operation in operations_of(contract):
+        by_path.setdefault(operation.template, {})[operation.method] = operation
+    return tuple(Resource(template, operations) for template, operations in by_path.items())
+
+
+@lru_cache(maxsize=8)
+def _by_place(contract: Contract) -> dict[tuple[int, str], list[Resource]]:
+    """Return the resources by how many slashes they have and by their first segment; empty: that is a template."""
+    found: dict[tuple[int, str], list[Resource]] = {}
+    for item in resources_of(contract):
+        found.setdefault(_place(sendable(item.template)), []).append(item)
+    return found
+
+
+def _place(path: str) -> tuple[int, str]:
+    first = path.split("/", 2)[1] if "/" in path else path
+    return path.count("/"), "" if "{" in first else first
+
+
+@lru_cache(maxsize=512)
+def resource_at(contract: Contract, path: str) -> Resource | None:
+    """Return the resource of a path, or None; literal paths precede templates (OpenAPI 3.1, 4.8.8.2)."""
+    path, index = sendable(path), _by_place(contract)
+    slashes, first = _place(path)
+    near = [*index.get((slashes, first), ()), *(index.get((slashes, ""), ()) if first else ())]
+    found = [item for item in near if item.pattern.fullmatch(path)]
+    return min(found, key=lambda item: item.template.count("{"), default=None)
+
+
+def matching(contract: Contract, method: str, path: str) -> Operation | None:
+    """Return the operation of a request, or None; HEAD counts as GET. ``path`` is below the base URL, without query."""
+    resource = resource_at(contract, path)
+    return resource.operations.get("GET" if method == "HEAD" else method) if resource else None
+
+
+def known_path(contract: Contract, path: str) -> bool:
+    """Return whether the contract has a resource with this path."""
+    return resource_at(contract, path) is not None
+
+
+@lru_cache(maxsize=512)
+def is_normal(path: str) -> bool:
+    """Return whether a path has no segment that servers may remove: empty, ``.`` or ``..``."""
+    segments = [unquote(segment) for segment in path.split("/")]
+    return "" not in segments[1:-1] and not {".", ".."} & set(segments)
+
+
+def inside_prefix(contract: Contract, path: str) -> bool:
+    """Return whether a path begins like one of the contract's paths; another server may serve other paths."""
+    return path.lstrip("/").split("/", 1)[0] in {
+        item.template.lstrip("/").split("/", 1)[0] for item in resources_of(contract)
+    }
+
+
+# Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
+_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
+# By these a server takes another method or target than the request line's, or sees another end of the request: they
+# would make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
+_STEERING: Final = re.compile(
+    r"x-(?:http-?)?(?:method|verb)(?:-?override)?|(?:http-?)?method-?override"
+    r"|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"
+    r"|x-host|forwarded|host|content-length|transfer-encoding|te|trailer|connection|keep-alive|upgrade|expect"
+    r"|proxy-(?:connection|authorization)",
+    re.IGNORECASE,
+)
+_METHOD_IN_QUERY: Final = re.compile(r"_method|_?x?-?http-?method(?:-?override)?|x-method-override", re.IGNORECASE)
+_FORM_TYPE: Final = "application/x-www-form-urlencoded"
+
+
+def with_sent(value: Any, document: Schema, ignored: frozenset[str] = _IGNORED) -> Any:
+    """Return a part of an OpenAPI 3 document with the parameters that are sent, each by its own name.
+
+    The specification ignores some header parameters. Those by which a request becomes another one are not sent either.
+    A query string is written as the parameters in it.
+
+    Args:
+        value: the part.
+        document: the document.
+        ignored: names of header parameters that the specification ignores; Swagger 2.0 ignores none.
+    """
+    if isinstance(value, list):
+        return [with_sent(item, document, ignored) for item in value]
+    if not isinstance(value, dict):
+        return value
+    found = {key: with_sent(item, document, ignored) for key, item in value.items()}
+    if isinstance(value.get("parameters"), list):
+        found["parameters"] = [sent for one in found["parameters"] for sent in _sent(one, document, ignored)]
+        if _unwritten(value["parameters"], document):
+            found["x-roaas-never"] = True
+    return found
+
+
+def _unwritten(parameters: Any, document: Schema) -> str:
+    """Return the media type of a required query string that the suite does not write; empty if it writes all."""
+    for given in parameters if isinstance(parameters, list) else ():
+        one = _followed(given, document)
+        if isinstance(one, dict) and one.get("in") == "querystring" and one.get("required") is True:
+            content = one.get("content")
+            names = " or ".join(content) if isinstance(content, dict) else ""
+            return "" if _in_query(one, document) else names or "not described"
+    return ""
+
+
+def not_called(document: Schema) -> tuple[str, ...]:
+    """Return a remark for each operation that the suite cannot call."""
+    return tuple(
+        f"{method} {path} is not called: its query string is {unwritten}, which the suite does not write."
+        for path, item in document["paths"].items()
+        if isinstance(whole := _followed(item, document), dict)
+        for method, one in methods_of(whole).items()
+        if isinstance(one, dict) and (unwritten := _unwritten(one.get("parameters"), document))
+    )
+
+
+def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
+    parameter = _followed(given, document)
+    if not isinstance(parameter, dict):
+        return [given]
+    if parameter.get("in") == "querystring":
+        return _in_query(parameter, document)
+    name, where = str(parameter.get("name")).lower(), parameter.get("in")
+    steers = {"header": _STEERING, "query": _METHOD_IN_QUERY}.get(str(where))
+    # Many servers take _ and - for the same in the name of a field.
+    same = name.replace("_", "-") if where == "header" else name
+    is_left_out = (where == "header" and name in ignored) or (steers and steers.fullmatch(same))
+    return [] if is_left_out else [given]
+
+
+def _in_query(parameter: Schema, document: Schema) -> list[Schema]:
+    """Return the query parameters that a query string consists of (OpenAPI 3.2, 4.12); none if it is no form."""
+    content = parameter.get("content")
+    media = _followed(content.get(_FORM_TYPE), document) if isinstance(content, dict) else None
+    schema = _followed(media.get("schema"), document) if isinstance(media, dict) else None
+    properties = schema.get("properties") if isinstance(schema, dict) else None
+    required = schema.get("required", ()) if isinstance(schema, dict) and parameter.get("required") is True else ()
+    given = media.get("encoding") if isinstance(media, dict) else None
+    encoding = given if isinstance(given, dict) else {}
+    return [
+        {
+            "name": name,
+            "in": "query",
+            "required": name in required,
+            "schema": part,
+            **{key: one for key, one in encoding.get(name, {}).items() if key in {"style", "explode", "allowReserved"}},
+        }
+        for name, part in (properties.items() if isinstance(properties, dict) else ())
+    ]
+
+
+def _followed(given: Any, document: Schema) -> Any:
+    return pointed(document, given["$ref"]) if isinstance(given, dict) and isinstance(given.get("$ref"), str) else given

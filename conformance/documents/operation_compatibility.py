@@ -1,14 +1,16 @@
-"""Compare two operations: parameters, body, statuses, headers and media types."""
+"""Compare two descriptions of an API by operations: what breaks clients of the older one, and what else changed."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import Schema, kinds_of, modern, pointed
+from conformance.documents.openapi import PARAMETER, methods_of
 from conformance.documents.parameters import Parameter, by_media_type, read_encoding, read_parameter
-from conformance.documents.resources import PARAMETER
 from conformance.documents.schema_compatibility import schema_changes
 from conformance.documents.schema_sides import Side
 
@@ -282,3 +284,189 @@ def _kinds(schema: Any, described: Described) -> frozenset[str]:
 
 def _called(parameter: Parameter) -> str:
     return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
+
+
+# What a client has to know of a scheme of each type.
+_KNOWN: Final = {"apiKey": ("in", "name"), "http": ("scheme",), "openIdConnect": ("openIdConnectUrl",)}
+# A credential as a client knows it, with its scopes; several are needed together.
+_Alternative = dict[tuple[str, ...], frozenset[str]]
+
+
+def security_changes(old: tuple[Schema, Schema], new: tuple[Schema, Schema]) -> Iterator[tuple[bool, str]]:
+    """Yield what changed in the credentials that an operation needs, and whether it breaks a client.
+
+    Args:
+        old: the document and the operation.
+        new: likewise.
+    """
+    before, after = _alternatives(*old), _alternatives(*new)
+    if all(one in after for one in before) and all(one in before for one in after):
+        yield from _flows(old[0], new[0], before)
+        return
+    # A client with credentials that sufficed before must be let in.
+    breaking = any(not any(_suffices(had, needed) for needed in after) for had in before)
+    yield breaking, f"needs {_text(*new)}, before {_text(*old)}"
+
+
+def _suffices(had: _Alternative, needed: _Alternative) -> bool:
+    return all(scheme in had and scopes <= had[scheme] for scheme, scopes in needed.items())
+
+
+def _demanded(document: Schema, operation: Schema) -> list[Schema]:
+    """Return the alternatives of an operation: without one, no credentials are needed."""
+    return operation.get("security", document.get("security")) or [{}]
+
+
+def _schemes(document: Schema) -> Schema:
+    found: Schema = document.get("components", {}).get("securitySchemes", {})
+    return found
+
+
+def _alternatives(document: Schema, operation: Schema) -> list[_Alternative]:
+    schemes = _schemes(document)
+    return [
+        {_known(name, schemes.get(name)): frozenset(scopes) for name, scopes in one.items()}
+        for one in _demanded(document, operation)
+    ]
+
+
+def _known(name: str, scheme: Any) -> tuple[str, ...]:
+    """Return a scheme as a client knows it, whatever its name is; the name where it is not described."""
+    kind = scheme.get("type") if isinstance(scheme, dict) else None
+    if kind not in {*_KNOWN, "oauth2", "mutualTLS"}:
+        return (name,)
+    known = tuple(str(scheme.get(key, "")) for key in _KNOWN.get(kind, ()))
+    # Header fields and the names of schemes are the same in any case (RFC 9110, 5.1 and 11.1).
+    blind = kind == "http" or known[:1] == ("header",)
+    return (kind, *(one.lower() if blind else one for one in known))
+
+
+def _flows(old: Schema, new: Schema, demanded: list[_Alternative]) -> Iterator[tuple[bool, str]]:
+    """Yield the ways to an OAuth token that are gone or lead elsewhere."""
+    if not any(("oauth2",) in one for one in demanded):
+        return
+    before, after = (
+        {
+            (kind, key, str(flow[key]))
+            for scheme in _schemes(document).values()
+            if isinstance(scheme, dict) and scheme.get("type") == "oauth2"
+            for kind, flow in scheme.get("flows", {}).items()
+            for key in ("tokenUrl", "authorizationUrl")
+            if key in flow
+        }
+        for document in (old, new)
+    )
+    for kind, key, url in sorted(before - after):
+        yield True, f"the {key} {url} of the OAuth flow {kind} is gone"
+    for kind, key, url in sorted(after - before):
+        yield False, f"the {key} {url} of the OAuth flow {kind} is new"
+
+
+def _text(document: Schema, operation: Schema) -> str:
+    return " or ".join(
+        " with ".join(f"{name} ({', '.join(scopes)})" if scopes else name for name, scopes in one.items())
+        or "no credentials"
+        for one in _demanded(document, operation)
+    )
+
+
+_VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
+# An operation below one of its servers, by what a client sends.
+_Key = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of a description.
+
+    Attributes:
+        breaking: whether a client of the older description may fail; None if it is not known.
+        operation: method and path, or the whole if empty.
+        text: what changed.
+    """
+
+    breaking: bool | None
+    operation: str
+    text: str
+
+
+def changes(old: Schema, new: Schema) -> list[Change]:
+    """Return what changed between two OpenAPI 3 documents: what breaks clients, what may, and the rest.
+
+    Raises:
+        UnresolvedError, AttributeError, TypeError, KeyError: a document is malformed.
+    """
+    both = Documents(old, new)
+    found = list(_of_operations(both, *(_operations(document, "paths") for document in (old, new))))
+    webhooks = [_operations(document, "webhooks") for document in (old, new)]
+    found += _of_operations(both, *webhooks, by_client=False)
+    order = {True: 0, None: 1, False: 2}
+    return sorted(dict.fromkeys(found), key=lambda change: order[change.breaking])
+
+
+def _of_operations(
+    both: Documents, before: dict[_Key, Described], after: dict[_Key, Described], *, by_client: bool = True
+) -> Iterator[Change]:
+    what = "operation" if by_client else "message"
+    for key, item in before.items():
+        if key not in after:
+            yield Change(breaking=True, operation=_label(key, item), text=f"the {what} is gone")
+    known = {id(item.operation) for key, item in after.items() if key in before}
+    for key, item in after.items():
+        if id(item.operation) not in known:
+            yield Change(breaking=False, operation=_label(key, item), text=f"the {what} is new")
+    compared = set()
+    for key, item in before.items():
+        other = after.get(key)
+        if other is not None and (id(item.operation), id(other.operation)) not in compared:
+            compared.add((id(item.operation), id(other.operation)))
+            for breaks, text in _of_operation(both, item, other, by_client=by_client):
+                yield Change(breaks, _label(key, item), text)
+
+
+def _label(key: _Key, item: Described) -> str:
+    return f"{key[0]} {item.path}"
+
+
+def _of_operation(both: Documents, old: Described, new: Described, *, by_client: bool) -> Iterator[Found]:
+    if by_client:
+        yield from security_changes((both.old, old.operation), (both.new, new.operation))
+    yield from operation_changes(both, old, new, by_client=by_client)
+    # What the API calls in the other direction.
+    callbacks = _callbacks(old), _callbacks(new)
+    for change in _of_operations(both, *callbacks, by_client=not by_client):
+        yield change.breaking, f"callback {change.operation}: {change.text}"
+
+
+def _operations(document: Schema, section: str) -> dict[_Key, Described]:
+    """Return the operations by method and path below each server, in which the names of parameters do not count."""
+    whole = Described(document, "", {}, {})
+    found: dict[_Key, Described] = {}
+    for path, given in (document.get(section) or {}).items():
+        if not isinstance(given, dict):
+            raise TypeError(f"the path {path} has no object")
+        item = whole.followed(given)
+        for method, operation in methods_of(item).items():
+            servers = operation.get("servers") or item.get("servers") or document.get("servers")
+            bases = [_base(server) for server in servers or [Schema()]] if section == "paths" else [""]
+            for base in bases:
+                found[method, base + PARAMETER.sub("{}", path)] = Described(document, path, item, operation)
+    return found
+
+
+def _callbacks(described: Described) -> dict[_Key, Described]:
+    return {
+        (method, str(expression)): Described(described.document, str(expression), item, operation)
+        for callback in described.operation.get("callbacks", {}).values()
+        for expression, given in described.followed(callback).items()
+        if not str(expression).startswith("x-")
+        for item in (described.followed(given),)
+        for method, operation in methods_of(item).items()
+    }
+
+
+def _base(server: Schema) -> str:
+    """Return the path of a server's URL, with the defaults of its variables."""
+    variables = server.get("variables", {})
+    url = _VARIABLE.sub(lambda found: str(variables.get(found[1], {}).get("default", "")), str(server.get("url", "")))
+    return urlsplit(url).path.rstrip("/")

@@ -12,8 +12,7 @@ from urllib.parse import urlsplit
 from lxml import etree
 
 from conformance.commandline.device_options import advice
-from conformance.documents.xml import NotXmlError, parse
-from conformance.documents.xml_names import WSDL, XSD, clark, namespace
+from conformance.documents.xml import WSDL, XSD, NotXmlError, clark, namespace, parse
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_assembly import SchemaDocument, resolved
 

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from conformance.commandline.atomic_write import write_atomically, write_json
-from conformance.commandline.out_folder import own_folder
+from conformance.commandline.out_folder import own_folder, write_atomically, write_json
 from conformance.contract.described import SOAP, TITLE, WEB_SERVER
 from conformance.contract.locating import MANIFEST
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, read_services
-from conformance.documents.xml_names import local
+from conformance.documents.xml import local
 from conformance.documents.xsd_shapes import Element
 
 #: The documents of the WSDL, by location, and which of them comes first.

@@ -12,9 +12,9 @@ from typing import Any, TextIO
 
 import pytest
 
+from conformance.commandline.endings import Started
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
 from conformance.commandline.secrecy import SECRETS
-from conformance.commandline.started import Started
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
@@ -33,8 +33,7 @@ from conformance.transport.client import Connection
 from conformance.verdict.baseline import Accepted, Expectation, accepted_until, apply_baseline, stale_entries
 from conformance.verdict.causes import Cause, by_cause
 from conformance.verdict.evidence import Evidence
-from conformance.verdict.run import Run
-from conformance.verdict.selection import UNSELECTED, WITHHELD, Selection
+from conformance.verdict.run import UNSELECTED, WITHHELD, Run, Selection
 from conformance.verdict.verdicts import (
     ClassValue,
     Overall,

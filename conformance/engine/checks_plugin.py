@@ -12,8 +12,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.commandline.secrecy import SECRETS
-from conformance.contract.classes import Level
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface, Level
 from conformance.contract.ledger import expanded
 from conformance.contract.pack import Contract
 from conformance.engine.robot_under_test import RobotUnderTest

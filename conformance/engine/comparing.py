@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from conformance.commandline.given_files import read_json, read_octets
-from conformance.documents.compatibility import Change, changes
 from conformance.documents.description import Description, DescriptionError, read_description
 from conformance.documents.json_schema import UnresolvedError
+from conformance.documents.operation_compatibility import Change, changes
 from conformance.target.describing import FOLDER, fetch_description
 from conformance.transport.client import Connection
 

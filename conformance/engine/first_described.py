@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.api.call_rules import CallRules, Reason
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.out_folder import write_atomically
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
 from conformance.documents.json_schema import UnresolvedError, kinds_of

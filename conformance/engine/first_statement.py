@@ -5,9 +5,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from conformance.commandline.atomic_write import write_atomically
-from conformance.commandline.terminal import inert
-from conformance.contract.interfaces import Interface
+from conformance.commandline.help_pages import inert
+from conformance.commandline.out_folder import write_atomically
+from conformance.contract.classes import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.engine.robot_under_test import RobotUnderTest

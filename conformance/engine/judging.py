@@ -11,13 +11,12 @@ from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import SoapCheckers, answers_of
 from conformance.checkers.soap_memory import SoapMemory
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.documents.wsdl_pack import services_of
 from conformance.engine.certification import draw_verdicts
 from conformance.engine.planning import collected
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.history.events import Began, Ended, Sent, Span, Withdrawn
-from conformance.history.reading import HistoryError, read_history
+from conformance.history.events import Began, Ended, HistoryError, Sent, Span, Withdrawn, read_history
 from conformance.history.writing import HISTORY_NAME
 from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
@@ -28,9 +27,7 @@ from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
 from conformance.transport.raw import tell
 from conformance.transport.reach import split
-from conformance.verdict.case import Checker
-from conformance.verdict.evidence import Judge
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Checker, Judge, Observers
 from conformance.verdict.verdicts import Verdict
 
 

@@ -12,8 +12,7 @@ from typing import Final
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import operations_of
-from conformance.documents.resources import matching
+from conformance.documents.openapi import matching, operations_of
 from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.credentials import is_shown

@@ -32,7 +32,7 @@ from conformance.target.connecting import connection_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeLimit
 

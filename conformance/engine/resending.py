@@ -16,7 +16,7 @@ from conformance.api.rest.stops import stop_device
 from conformance.api.rest.variations import Kind
 from conformance.commandline.secrecy import SECRETS
 from conformance.contract.pack import Contract
-from conformance.documents.resources import matching
+from conformance.documents.openapi import matching
 from conformance.documents.traceback import unreadable
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
@@ -34,8 +34,7 @@ from conformance.transport.exchange import (
     Response,
     Unanswered,
 )
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
 

@@ -10,9 +10,8 @@ from typing import Any
 from msgspec import to_builtins
 from msgspec.json import encode
 
-from conformance.commandline.atomic_write import write_json
-from conformance.commandline.out_folder import without_folders
-from conformance.contract.interfaces import Interface
+from conformance.commandline.out_folder import without_folders, write_json
+from conformance.contract.classes import Interface
 from conformance.documents.openapi import operations_of
 from conformance.engine.resending import written
 from conformance.engine.robot_under_test import RobotUnderTest

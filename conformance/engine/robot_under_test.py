@@ -20,8 +20,8 @@ from conformance.api.rest.operation_log import OperationLog
 from conformance.api.rest.stops import stop_device
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
+from conformance.contract.classes import Interface
 from conformance.contract.described import SOAP
-from conformance.contract.interfaces import Interface
 from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener

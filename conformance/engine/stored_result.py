@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 import msgspec
 
 from conformance.commandline.given_files import read_json, read_octets
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import inert
 from conformance.contract.generic import generic_ledger
 
 _FORMAT: Final = "roaas-result/1"

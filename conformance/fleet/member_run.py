@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from conformance.commandline.atomic_write import write_atomically
 from conformance.commandline.endings import as_parent
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.out_folder import own_folder
+from conformance.commandline.out_folder import own_folder, write_atomically
 from conformance.contract.toml_file import basic_string
 
 if TYPE_CHECKING:

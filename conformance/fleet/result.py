@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from conformance.commandline.atomic_write import write_json
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.out_folder import write_json
 from conformance.engine.result import rfc3339
 from conformance.engine.suite import suite_version
 from conformance.fleet.member_run import EXIT_CODES, MemberResult, Outcome

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TextIO
 
 from conformance.commandline.endings import ending_signals
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
 
 # Who runs is told this often, s.

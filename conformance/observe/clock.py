@@ -1,7 +1,10 @@
 """The clock for observing a device: real in a run, simulated in tests."""
 
 import time
+from collections.abc import Callable, Iterator
 from typing import Final, Protocol
+
+from conformance.transport.pace import Pace
 
 
 class Clock(Protocol):
@@ -47,3 +50,52 @@ class SimulatedClock:
     def sleep(self, seconds: float) -> None:
         """Advance the time."""
         self.time_s += max(0.0, seconds)
+
+
+# A device that is always late does not get all the time in the world, s.
+_MOST_GIVEN_BACK_S = 5.0
+
+
+class Patience:
+    """A time limit for a device that does not count delays of its responses.
+
+    Args:
+        pace: response times of the device.
+        seconds: time that the device has from now on, s.
+        clock: measures it.
+    """
+
+    def __init__(self, pace: Pace, seconds: float, clock: Clock = WALL_CLOCK) -> None:
+        self._pace, self._clock = pace, clock
+        self._until = clock.now() + seconds
+        self._lateness_s = pace.lateness_s
+
+    @property
+    def over(self) -> bool:
+        """Whether the device has had its time."""
+        given_back = min(self._pace.lateness_s - self._lateness_s, _MOST_GIVEN_BACK_S)
+        return self._clock.now() > self._until + given_back
+
+
+def poll(clock: Clock, every_s: float, is_over: Callable[[], bool]) -> Iterator[None]:
+    """Yield at once and then every ``every_s`` until ``is_over()``, and once more after that.
+
+    Args:
+        clock: the clock.
+        every_s: interval from the start of one turn to the start of the next, s; a longer turn delays the next.
+        is_over: called before each turn. One last turn follows a true value, to observe what happened during a delay of
+            the caller.
+    """
+    while True:
+        begun = clock.now()
+        last = is_over()
+        yield
+        if last:
+            return
+        clock.sleep(begun + every_s - clock.now())
+
+
+def poll_for(clock: Clock, every_s: float, seconds: float) -> Iterator[None]:
+    """Yield at once and then every ``every_s`` for ``seconds``, and once more at the end."""
+    until = clock.now() + seconds
+    return poll(clock, every_s, lambda: clock.now() >= until)

@@ -30,8 +30,7 @@ from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import RosMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
-from conformance.verdict.case import Checker
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Checker, Observers
 from conformance.verdict.run import Run
 
 # So long the modules that later checks need are awaited, s.

@@ -10,7 +10,7 @@ from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.variations import Kind
 from conformance.scenarios.rule import NotSeen
 from conformance.scenarios.survey import Probe
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 
 _LESS_PLAIN = frozenset({Kind.GENERATED, Kind.OTHER})

@@ -14,18 +14,14 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
 from conformance.commandline.device_options import advice
-from conformance.documents.addressing import addressing_blocks
-from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
+from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, addressing_blocks
 from conformance.documents.wsdl_pack import services_of
-from conformance.documents.xml import parse
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
-from conformance.documents.xsd_lexical import INTEGERS, STRINGS
-from conformance.documents.xsd_shapes import Element
+from conformance.documents.xml import Node, clark, parse
+from conformance.documents.xsd_shapes import INTEGERS, STRINGS, Element
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import Headers
+from conformance.transport.credentials import UsernameToken
 from conformance.transport.reach import split
-from conformance.transport.username_token import UsernameToken
 
 _NONE: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
 # Types whose values may refer to something, and names of numbers that do.

@@ -19,9 +19,8 @@ from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import matching, operations_of
 from conformance.documents.representation import flat
-from conformance.documents.resources import matching
 from conformance.documents.writing import json_text
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario

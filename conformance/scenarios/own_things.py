@@ -24,9 +24,8 @@ from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.contents import keeps_octets
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
 from conformance.documents.representation import flat
-from conformance.documents.resources import resources_of
 from conformance.documents.security import demands
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG

@@ -7,8 +7,7 @@ from typing import Any
 
 from conformance.scenarios.scenario import NotPossibleError, Scenario
 from conformance.transport.exchange import NoAnswerError
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Case, Judge
 
 
 @dataclass(frozen=True)

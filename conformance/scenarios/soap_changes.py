@@ -18,9 +18,8 @@ from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
-from conformance.documents.xml_node import Node
-from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, is_alike
-from conformance.documents.xsd_shapes import Element, Simple
+from conformance.documents.xml import Node
+from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Element, Simple, bounds, is_alike
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, usual_message

@@ -16,9 +16,7 @@ from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
-from conformance.documents.xml import NotXmlError, elements
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, NotXmlError, clark, elements
 from conformance.documents.xsd_shapes import Element
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario

@@ -12,8 +12,8 @@ from typing import Any
 
 import msgspec
 
-from conformance.commandline.atomic_write import write_octets
 from conformance.commandline.given_files import read_octets, unzipped
+from conformance.commandline.out_folder import write_octets
 from conformance.commandline.secrecy import SECRETS
 from conformance.scenarios.scenario import Recording, Recordings, Scenario
 

@@ -18,9 +18,8 @@ from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
-from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
-from conformance.documents.resources import known_path
 from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
 from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario

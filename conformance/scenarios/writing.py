@@ -16,7 +16,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.observe.polling import Patience
+from conformance.observe.clock import Patience
 from conformance.transport.exchange import Exchange, Outgoing
 
 # A device that writes later has so long, s; and it is read so often meanwhile.

@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.contract.toml_file import Positive, Text
 
 

@@ -6,7 +6,7 @@ from typing import Any, Self
 
 import msgspec
 
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.contract.pack import Contract
 from conformance.contract.toml_file import Text, TomlFileError, fit, read_toml
 from conformance.statement.endpoints import Auth, Endpoints, beside

@@ -17,10 +17,10 @@ from conformance.documents.json_text import read_json
 from conformance.statement.endpoints import Auth, Endpoints
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.connections import CertificateError, ClientCertificate
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.reach import Trust
-from conformance.transport.tls import CertificateError, ClientCertificate
 
 # Places in which a description may want an API key (OpenAPI 3.1, Security Scheme Object).
 _PLACES: Final = frozenset({Kind.HEADER, Kind.QUERY, Kind.COOKIE})

@@ -261,7 +261,7 @@ def _check_messages(motion: MotionMap, contract: Contract) -> None:
     """
     # xmlschema and lxml take a third of a second, which other devices need not pay.
     from conformance.documents.wsdl_pack import messages_of  # noqa: PLC0415
-    from conformance.documents.xml_values import NoElementError, node_of  # noqa: PLC0415
+    from conformance.documents.xsd_shapes import NoElementError, node_of  # noqa: PLC0415
 
     declared = messages_of(contract)
     for call, body in motion.bodies:

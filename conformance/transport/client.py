@@ -16,7 +16,16 @@ from urllib.parse import urlsplit
 import h11
 
 from conformance.commandline.secret_file import IN_URL, names_user
-from conformance.transport.connections import ClosedError, Connections, Deadline, HttpConnection, NoConnectionError
+from conformance.transport.connections import (
+    ClientCertificate,
+    ClosedError,
+    Connections,
+    Deadline,
+    HttpConnection,
+    NoConnectionError,
+    explained,
+    tls_context,
+)
 from conformance.transport.credentials import Credential, Credentials, bearer
 from conformance.transport.exchange import (
     OF_GATEWAY,
@@ -35,7 +44,6 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import Pace, time_to_arrive
 from conformance.transport.passage import Heard, Passage, Recorder
 from conformance.transport.reach import Trust
-from conformance.transport.tls import ClientCertificate, explained, tls_context
 
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.

@@ -4,17 +4,24 @@ A secret never leaves this module but in a request: ``str()`` and ``repr()`` of 
 the name of a shell variable (``$ROAAS_TOKEN``) where the secret was.
 """
 
+from __future__ import annotations
+
 import base64
 import contextlib
+import datetime as dt
+import hashlib
+import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from email.utils import parsedate_to_datetime
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 from urllib.parse import quote
 
 from conformance.commandline.secrecy import SECRETS
+from conformance.commandline.secret_file import read_secret
 
 if TYPE_CHECKING:
     from conformance.transport.digest import DigestUser
@@ -96,7 +103,7 @@ class Credential:
         return forms.get(self.kind, f"{self.name}={text}")
 
     @property
-    def wrong(self) -> "Credential":
+    def wrong(self) -> Credential:
         """The same credential with a secret that no robot knows; the scheme of an Authorization header is kept."""
         secret = f"{_WRONG}:x" if self.kind in {Kind.BASIC, Kind.DIGEST} else _WRONG
         if self.kind is Kind.HEADER and self.name.lower() == "cookie":
@@ -133,7 +140,7 @@ class Credential:
         return (("header", self.header.lower()),)
 
     @cached_property
-    def digest(self) -> "DigestUser":
+    def digest(self) -> DigestUser:
         """The user of a ``digest`` credential, who keeps the device's challenge."""
         # Imported late: requests takes a twentieth of a second.
         from conformance.transport.digest import DigestUser  # noqa: PLC0415
@@ -242,7 +249,7 @@ class Credentials:
         return tuple(place for item in self.items for place in item.places)
 
     @property
-    def wrong(self) -> "Credentials":
+    def wrong(self) -> Credentials:
         """The same credentials with secrets that no robot knows."""
         return Credentials(tuple(item.wrong for item in self.items))
 
@@ -265,3 +272,67 @@ def quoted(word: str) -> str | None:
     # An interactive shell replaces "!" in double quotes.
     escaped = [part if odd % 2 else re.sub(r'([\\"$`])', r"\\\1", part) for odd, part in enumerate(parts)]
     return '"' + "".join(part.replace("!", "\"'!'\"") for part in escaped) + '"'
+
+
+# What stands in a request for the texts that each message has of its own, and where they are.
+_VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
+_TOKEN: Final = re.compile(rb"(:Password [^>]*>)[^<]*(<.*?:Nonce [^>]*>)[^<]*(<.*?:Created>)[^<]*", re.DOTALL)
+
+
+@dataclass
+class UsernameToken:
+    """A user whose token each message carries.
+
+    Attributes:
+        user: name.
+        password: never sent, only a digest of it.
+        ahead: how far the device's clock is ahead of ours.
+    """
+
+    user: str
+    password: str = field(repr=False)
+    ahead: dt.timedelta = dt.timedelta()
+
+    def __post_init__(self) -> None:
+        SECRETS.keep(self.password, "$ROAAS_USERNAME_TOKEN")
+
+    @classmethod
+    def of(cls, path: str | None) -> UsernameToken | None:
+        """Return the user in a file with ``user:password``; None without a file.
+
+        Raises:
+            OSError, ValueError: the file cannot be read, or has no such line.
+        """
+        if path is None:
+            return None
+        user, colon, password = read_secret(path).partition(":")
+        if not colon:
+            raise ValueError(f"{path}: expected one line user:password")
+        return cls(user, password)
+
+    def set_clock(self, date: str | None) -> None:
+        """Take the device's time from a Date header: a device that is an hour off refuses tokens of another time."""
+        if date is not None:
+            self.ahead = parsedate_to_datetime(date) - dt.datetime.now(dt.UTC)
+
+    def fresh(self) -> tuple[str, str, str]:
+        """Return the texts of a token that no message has carried: password digest, nonce, and time of creation."""
+        nonce = os.urandom(16)
+        created = (dt.datetime.now(dt.UTC) + self.ahead).strftime("%Y-%m-%dT%H:%M:%SZ")
+        digest = hashlib.sha1(nonce + created.encode() + self.password.encode(), usedforsecurity=False).digest()
+        return _text(digest), _text(nonce), created
+
+    def revealed(self, octets: bytes) -> bytes:
+        """Return a request with a fresh token where hidden() has left variables; its length stays as it was."""
+        for variable, text in zip(_VARIABLES, self.fresh(), strict=True):
+            octets = octets.replace(variable, text.encode())
+        return octets
+
+
+def hidden(octets: bytes) -> bytes:
+    """Return a request with variables in place of what is fresh in each token."""
+    return _TOKEN.sub(b"".join(b"\\%d%b" % (part, name) for part, name in enumerate(_VARIABLES, 1)), octets, count=1)
+
+
+def _text(octets: bytes) -> str:
+    return base64.b64encode(octets).decode()

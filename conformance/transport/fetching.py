@@ -21,11 +21,11 @@ from click.globals import push_context
 
 from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
+from conformance.transport.connections import explained
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Request, Response
 from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
-from conformance.transport.tls import explained
 
 _REDIRECTS: Final = 4
 # Of one document, and of all that one description refers to.

@@ -5,16 +5,16 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Final
 
 from conformance.contract.classes import CauseKind, Level
 from conformance.contract.ledger import Requirement, renamed, twins
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Unanswered
-from conformance.verdict.case import Case
+from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
 from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
 
 # Findings of one requirement that are kept: further causes share one more. And how many have all of their requests.
@@ -36,6 +36,47 @@ _SILENT = {
     NoAnswer.REFUSED: "a response",
 }
 _SILENCES = frozenset({CauseKind.HANG, CauseKind.NO_RESPONSE})
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One case of a requirement.
+
+    Attributes:
+        holds: whether the device meets the requirement in this case.
+        exchange: the evidence, or None.
+        expected: what the requirement demands here, as a noun phrase.
+        observed: what was seen instead; empty: a description of the response.
+        cause: failures of the same cause are one finding; empty: derived from the texts.
+        subject: what was tested; empty: method and target of the request.
+        operations: how each operation shows it, that of the exchange first, if not only that of the request.
+        requirement: its id or an alias; empty where a rule is bound to one.
+    """
+
+    holds: bool
+    exchange: Attempt | None
+    expected: str
+    observed: str = ""
+    cause: str = ""
+    subject: str = ""
+    operations: tuple[Showing, ...] = ()
+    requirement: str = ""
+
+
+def case(
+    requirement: str,
+    holds: bool,  # noqa: FBT001 - reads as a sentence: case(id, answer.status == 200, ...)
+    exchange: Attempt | None,
+    expected: str,
+    found: str = "",
+    cause: str = "",
+) -> Case:
+    """Return a case of a requirement; the arguments are as in Case."""
+    return Case(holds, exchange, expected, found, cause, requirement=requirement)
+
+
+#: Judges the exchanges of a run one after another, in the order in which they ended.
+Checker = Callable[[Attempt], Iterator[Case]]
 
 
 class RefutedError(AssertionError):
@@ -426,3 +467,45 @@ def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
     method = exchange.request.method.replace("HEAD", "GET")
     said = "" if isinstance(exchange, Unanswered) else likeness(exchange)
     return f"{method} {said}"
+
+
+_SHOWN: Final = 100
+
+
+class Observers(Listener):
+    """Calls checkers with every exchange. What they judge holds for every response, errors included.
+
+    Args:
+        judge: records their cases.
+        checkers: the checkers.
+        by_rule: whether a server error that they judge is a broken rule of its own (see Judge.by_rule).
+    """
+
+    def __init__(self, judge: Judge, checkers: Iterable[Checker], *, by_rule: bool = True) -> None:
+        self._judge, self._by_rule = judge, by_rule
+        self._checkers = tuple(checkers)
+
+    def answered(self, exchange: Exchange) -> None:
+        """Judge an exchange."""
+        self._check(exchange)
+
+    def unanswered(self, request: Unanswered) -> None:
+        """Judge a request without a response."""
+        self._check(request)
+
+    def acted_by_hand(self, *, deletes: bool) -> None:
+        """Tell the checkers that know what was written before."""
+        for checker in self._checkers:
+            if (forget := getattr(checker, "forget", None)) is not None:
+                forget(deletes=deletes)
+
+    def _check(self, attempt: Attempt) -> None:
+        """Call each checker; what one cannot judge is no reason not to judge the rest of the run."""
+        with self._judge.by_rule() if self._by_rule else nullcontext():
+            for checker in self._checkers:
+                try:
+                    for case in checker(attempt):
+                        self._judge.record(case)
+                except Exception as error:  # noqa: BLE001 - whatever it is, it is told
+                    request = attempt.request
+                    self._judge.fault(f"{request.method} {request.target.partition('?')[0][:_SHOWN]}", error)

@@ -7,7 +7,7 @@ from conformance.api.device import Device as AnyDevice
 from conformance.api.device import Soap
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, Checker, case
+from conformance.verdict.evidence import Case, Checker, case
 
 
 def every_put(attempt: Attempt) -> Iterator[Case]:

@@ -7,10 +7,9 @@ from typing import Any, Self
 
 from conformance.commandline.secrecy import SECRETS
 from conformance.papers_robot.statement import Ros
-from conformance.transport.credentials import Credential, Credentials, Kind
+from conformance.transport.connections import ClientCertificate
+from conformance.transport.credentials import Credential, Credentials, Kind, UsernameToken
 from conformance.transport.reach import Trust
-from conformance.transport.tls import ClientCertificate
-from conformance.transport.username_token import UsernameToken
 from loadtests.clients.endpoint import Endpoint, tls_context
 from loadtests.clients.failures import Declared, Reply
 from loadtests.clients.payloads import BUILDERS, CATALOGUE, VARIANTS, Values, variants

@@ -19,8 +19,7 @@ import gevent.socket
 import httptools
 from gevent.hub import Waiter, get_hub
 
-from conformance.transport.credentials import Credentials
-from conformance.transport.username_token import UsernameToken
+from conformance.transport.credentials import Credentials, UsernameToken
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, Declared, Reply, connect_error, require_good
 

@@ -23,9 +23,9 @@ from conformance.target.connecting import connection_of
 from conformance.target.describing import is_wsdl, soap_contract, trusting
 from conformance.target.naming import DeviceOptions, named_or_usual, told_apart, what_is_judged
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.credentials import UsernameToken
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.reach import UnreachableError
-from conformance.transport.username_token import UsernameToken
 from conformance.verdict.run import Run
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Secrets

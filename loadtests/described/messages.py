@@ -5,13 +5,12 @@ from collections.abc import Iterator
 from conformance.documents.openapi import Operation
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
-from conformance.documents.xml_names import local
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, local
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.credentials import hidden
 from conformance.transport.exchange import NoAnswerError, Request
 from conformance.transport.reach import is_same
-from conformance.transport.username_token import hidden
 from loadtests.clients.failures import CallError, Reply
 from loadtests.clients.payloads import VARIANTS
 from loadtests.clients.robot import Described

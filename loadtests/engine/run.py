@@ -4,8 +4,8 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
+from conformance.commandline.endings import Started
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.started import Started
 from conformance.documents.wsdl import WsdlError
 from loadtests.clients.failures import CallError
 from loadtests.clients.robot import Robot

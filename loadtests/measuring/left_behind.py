@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from conformance.commandline.atomic_write import write_json
+from conformance.commandline.out_folder import write_json
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.recorder import Recorder
 

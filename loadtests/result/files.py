@@ -12,10 +12,10 @@ from typing import Any
 
 from hdrh.histogram import HdrHistogram
 
-from conformance.commandline.atomic_write import write_atomically, write_json
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.help_pages import inert
+from conformance.commandline.out_folder import write_atomically, write_json
 from conformance.commandline.result_command import CommandResult
-from conformance.commandline.terminal import inert
 
 FORMAT = "roaas-latency/1"
 _NO_NAME = re.compile(r"[^A-Za-z0-9.-]+")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from conformance.commandline.started import Started
+from conformance.commandline.endings import Started
 from loadtests.clients.robot import Robot
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.machine import Moment

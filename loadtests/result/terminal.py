@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import inert
 
 _JUDGED = {
     "differs": "a difference",

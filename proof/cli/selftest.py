@@ -13,7 +13,7 @@ import click
 from conformance.cli.contract import contract_option, loaded
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.extras import lacking_soap
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import inert
 from conformance.contract.locating import ContractError
 from proof.cli.selftest_progress import Progress, compare
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from conformance.commandline.atomic_write import write_atomically, write_json
+from conformance.commandline.out_folder import write_atomically, write_json
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.verdict.finding import counted
 from proof.selftest.comparison import Comparison

@@ -20,7 +20,7 @@ from processes import ended
 from small_device import Handle, constant, described, reading, small_device
 
 import roaas
-from conformance.commandline import started
+from conformance.commandline import endings
 from conformance.commandline.out_folder import LOCK_NAME
 from conformance.contract.pack import Contract
 from proof.cli.selftest import _finish
@@ -150,7 +150,7 @@ def test_links_in_the_folder_are_replaced_and_not_followed(tmp_path):
 
 
 def test_a_clock_that_is_set_back_makes_no_run_end_before_it_began(monkeypatch):
-    begun = started.Started()
+    begun = endings.Started()
 
     class SetBack(dt.datetime):
         @classmethod

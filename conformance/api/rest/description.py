@@ -6,9 +6,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import UnresolvedError
-from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.openapi import PARAMETER, Operation, read_operations
 from conformance.documents.parameters import Parameter
-from conformance.documents.resources import PARAMETER
 from conformance.documents.wadl import read_wadl
 
 

@@ -10,13 +10,11 @@ from urllib.parse import unquote
 
 from conformance.api.rest.samples import fits
 from conformance.contract.pack import Contract
-from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, operations_of
-from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.openapi import PARAMETER, Operation, matching, operations_of
+from conformance.documents.parameter_reading import decoded_query, pairs_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.documents.resources import PARAMETER, matching
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 
 # As many values of one name are remembered, and as many requests are made of them for one stop.

@@ -9,7 +9,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.snapshot import flatten
 from conformance.documents.openapi import operations_of
 from conformance.documents.representation import flattened
-from conformance.observe.polling import Patience
+from conformance.observe.clock import Patience
 
 _PAUSE_S = 0.01
 

@@ -23,7 +23,7 @@ from schemathesis.generation.feedback import NO_FEEDBACK
 from schemathesis.generation.overrides import Override
 
 from conformance.contract.pack import Contract
-from conformance.documents.pattern_python import with_python_patterns
+from conformance.documents.patterns import with_python_patterns
 from conformance.documents.schema_budget import unrolls
 from conformance.transport.exchange import Outgoing
 

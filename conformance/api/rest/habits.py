@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.request_context import RequestContext
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # An operation that took so long once is asked less often, ms.
 _SLOW_MS = 1000.0

@@ -8,8 +8,8 @@ from typing import Any, Final
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import validity_by
 from conformance.api.rest.values import Values
-from conformance.documents.field_reading import is_binary
 from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.parameter_reading import is_binary
 from conformance.documents.parameters import Parameter
 from conformance.documents.writing import (
     form_body,

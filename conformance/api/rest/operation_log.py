@@ -16,8 +16,7 @@ from conformance.api.rest.branches import branches_in, branches_of
 from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.statuses import need_of
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation, is_json, operations_of
-from conformance.documents.resources import matching, resource_at
+from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
 from conformance.documents.wsdl_pack import label_in, services_of
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding

@@ -8,11 +8,10 @@ from itertools import pairwise
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
-from conformance.documents.field_reading import pairs_of
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
-from conformance.documents.parameter_reading import decoded_query
+from conformance.documents.parameter_reading import decoded_query, pairs_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of

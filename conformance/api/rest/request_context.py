@@ -8,8 +8,7 @@ from functools import cached_property
 
 from conformance.api.rest.formats import accept_of, quality
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation
-from conformance.documents.resources import is_normal, matching
+from conformance.documents.openapi import Operation, is_normal, matching
 from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import Request, Response
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of
-from conformance.documents.pattern_python import for_python
+from conformance.documents.patterns import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6

@@ -9,7 +9,7 @@ from typing import Any, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError
-from conformance.transport.put_off import until_taken
+from conformance.transport.parallel import until_taken
 
 # Answers to a client that has given too many wrong credentials (RFC 6585 4, RFC 4918 11.3).
 _SHUT_OUT: Final = frozenset({423, 429})

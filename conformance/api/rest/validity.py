@@ -5,16 +5,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conformance.contract.pack import Contract
-from conformance.documents.field_reading import multipart_verdict, query_verdicts, text_verdict, urlencoded_verdict
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Body, Operation, is_json, is_xml
-from conformance.documents.parameter_reading import INVALID, UNCLEAR, VALID, decoded_path, judged, judged_json
+from conformance.documents.openapi import Body, Operation, is_json, is_normal, is_xml, matching
+from conformance.documents.parameter_reading import (
+    INVALID,
+    UNCLEAR,
+    VALID,
+    decoded_path,
+    judged,
+    judged_json,
+    multipart_verdict,
+    query_verdicts,
+    text_verdict,
+    urlencoded_verdict,
+)
 from conformance.documents.parameters import Parameter
 from conformance.documents.patterns import PatternError, SlowPatternError
 from conformance.documents.representation import UnreadableError, from_element, local_name, parse_xml
-from conformance.documents.resources import is_normal, matching
 from conformance.transport.exchange import media_type_of
 from conformance.verdict.evidence import HarnessError
 

@@ -8,9 +8,9 @@ from conformance.api.device import device_of
 from conformance.api.soap.calls import SoapResponse, call
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 

@@ -8,9 +8,9 @@ from lxml import etree
 from conformance.api.expectation import Expectation
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, envelope, read
 from conformance.api.soap.service import SoapService
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.transport.exchange import Exchange
-from conformance.transport.put_off import until_taken
+from conformance.transport.parallel import until_taken
 from conformance.verdict.evidence import Judge
 
 _SHOWN = 200

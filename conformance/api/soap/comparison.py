@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from conformance.documents.wsdl import SoapOperation, Wsdl
-from conformance.documents.xml_names import local
+from conformance.documents.xml import local
 from conformance.documents.xsd import SchemaError
 from conformance.documents.xsd_shapes import Complex, Element, Simple
 

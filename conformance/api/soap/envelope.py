@@ -6,9 +6,7 @@ from typing import Final
 
 from lxml import etree
 
-from conformance.documents.xml import NotXmlError, elements, parse, text_of
-from conformance.documents.xml_names import ENVELOPE, clark, local
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ENVELOPE, Node, NotXmlError, clark, elements, local, parse, text_of
 
 # A message that asks for nothing: whatever answers it handles SOAP, and does nothing.
 EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'

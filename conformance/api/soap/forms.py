@@ -7,8 +7,7 @@ from typing import Any, Final
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from conformance.documents.xsd_lexical import FLOATS, INTEGERS, STRINGS, bounds, plain
-from conformance.documents.xsd_shapes import Simple
+from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Simple, bounds, plain
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")

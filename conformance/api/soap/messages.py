@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from conformance.api.soap import forms
-from conformance.documents import xsd_lexical as lexical
-from conformance.documents.xml_names import local
-from conformance.documents.xml_node import Node
+from conformance.documents import xsd_shapes as lexical
+from conformance.documents.xml import Node, local
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
 
 # A schema that demands more of one element cannot be met.

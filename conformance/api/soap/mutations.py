@@ -10,10 +10,8 @@ from typing import Final
 
 from conformance.api.mutations import Member, Mutation, broken_members
 from conformance.api.soap.messages import declarations, sequences, simple_leaves, with_text
-from conformance.documents import xsd_lexical as lexical
-from conformance.documents.xml import parse
-from conformance.documents.xml_names import XSI, clark, local, namespace
-from conformance.documents.xml_node import Node
+from conformance.documents import xsd_shapes as lexical
+from conformance.documents.xml import XSI, Node, clark, local, namespace, parse
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_shapes import Element, Simple
 

@@ -12,7 +12,7 @@ from lxml import etree
 
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of
-from conformance.documents.xml_names import local
+from conformance.documents.xml import local
 from conformance.documents.xsd_shapes import Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")

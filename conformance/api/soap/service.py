@@ -9,10 +9,9 @@ from functools import cached_property
 from pathlib import Path
 
 from conformance.api.soap.published_wsdl import PublishedWsdl, fetch, get, obtain
-from conformance.contract.interfaces import Interface
-from conformance.documents.addressing import is_http
-from conformance.documents.wsdl import SoapOperation, Wsdl, WsdlError, describe, read_file, unread, unusable
-from conformance.documents.xml_node import Node
+from conformance.contract.classes import Interface
+from conformance.documents.wsdl import SoapOperation, Wsdl, WsdlError, describe, is_http, read_file, unread, unusable
+from conformance.documents.xml import Node
 from conformance.statement.statement import StatementError
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError

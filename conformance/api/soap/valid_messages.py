@@ -12,11 +12,8 @@ from conformance.api.soap.envelope import NotSoapError, read_root
 from conformance.api.soap.messages import ordinary, simple_leaves, with_text
 from conformance.api.soap.service import SoapService
 from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml import NotXmlError, parse
-from conformance.documents.xml_names import XSD, XSI, clark, namespace
-from conformance.documents.xml_node import Node
-from conformance.documents.xsd_lexical import FLOATS, INTEGERS, bounds
-from conformance.documents.xsd_shapes import Element
+from conformance.documents.xml import XSD, XSI, Node, NotXmlError, clark, namespace, parse
+from conformance.documents.xsd_shapes import FLOATS, INTEGERS, Element, bounds
 from conformance.verdict.evidence import HarnessError
 
 # Whole numbers tried where a contract takes only some, such as codes.

@@ -7,8 +7,7 @@ from typing import Final
 from lxml import etree
 
 from conformance.documents.wsdl import Wsdl, name, qname
-from conformance.documents.xml import elements
-from conformance.documents.xml_names import WSDL, WSDL_SOAP, XSD, clark, local, namespace
+from conformance.documents.xml import WSDL, WSDL_SOAP, XSD, clark, elements, local, namespace
 from conformance.documents.xsd import SchemaError
 
 _HTTP: Final = "http://schemas.xmlsoap.org/soap/http"

@@ -7,8 +7,7 @@ from xml.sax.saxutils import escape
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from conformance.documents.xml_names import ENVELOPE, XSI, clark, local, namespace
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ENVELOPE, XSI, Node, clark, local, namespace
 
 DECLARATIONS: Final = (
     "",

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from conformance.api import device
 from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.examples import Examples
 from conformance.packs.table1.statement import Statement, StatementFile, said_of
 from conformance.transport.exchange import Listener
-from conformance.verdict.case import Checker
+from conformance.verdict.evidence import Checker
 
 if TYPE_CHECKING:
     from conformance.packs.table1.checkers.deliveries import Deliveries

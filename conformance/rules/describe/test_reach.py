@@ -5,7 +5,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.interfaces import Interfaces
 from conformance.api.soap.envelope import EMPTY
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.transport.exchange import Attempt, NoAnswerError
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run

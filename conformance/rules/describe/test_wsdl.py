@@ -14,9 +14,8 @@ from conformance.api.soap.envelope import EMPTY
 from conformance.api.soap.published_wsdl import get
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.wsdl_rules import RULES
-from conformance.documents.addressing import is_http
-from conformance.documents.wsdl import Wsdl, WsdlError, describe, name, unusable
-from conformance.documents.xml_names import WSDL_SOAP, clark
+from conformance.documents.wsdl import Wsdl, WsdlError, describe, is_http, name, unusable
+from conformance.documents.xml import WSDL_SOAP, clark
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError
 from conformance.transport.reach import Trust, is_same, split

@@ -8,13 +8,12 @@ from typing import Any
 
 from conformance.api.rest.statuses import CRASHES
 from conformance.api.rest.variations import Kind
-from conformance.documents.field_reading import parts_of
 from conformance.documents.json_schema import Schema, kinds_of
-from conformance.documents.json_shape import shape_of
+from conformance.documents.json_shape import shape_of, wrong_formats
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.parameter_reading import parts_of
 from conformance.documents.patterns import SlowPatternError
-from conformance.documents.value_formats import wrong_formats
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.anonymous import anonymous_requests
 from conformance.scenarios.neighbours import neighbours
@@ -23,7 +22,7 @@ from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotSeen, Outcome, rule
 from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Exchange, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from conformance.documents import description_faults as faults
-from conformance.documents.unreadable_parts import without_large
+from conformance.documents.description_faults import without_large
 from conformance.verdict.evidence import Judge
 from conformance.verdict.run import Run
 

@@ -21,7 +21,7 @@ from conformance.scenarios.safe_reads import Watched, safe_reads
 from conformance.scenarios.tables import Table, tables
 from conformance.scenarios.whole_list import read_items
 from conformance.scenarios.writing import Writer
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _DONE = frozenset({HTTPStatus.OK, HTTPStatus.NO_CONTENT})
 

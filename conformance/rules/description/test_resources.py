@@ -11,7 +11,7 @@ from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 def _played(name: str, scenario: Scenario) -> Rule:

@@ -10,8 +10,7 @@ from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import allowed, reads
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.openapi import SAFE
-from conformance.documents.resources import Resource, resources_of
+from conformance.documents.openapi import SAFE, Resource, resources_of
 from conformance.transport import raw
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.verdict.evidence import Judge

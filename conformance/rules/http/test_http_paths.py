@@ -11,7 +11,7 @@ from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import usual_status
-from conformance.documents.resources import inside_prefix, known_path, resources_of
+from conformance.documents.openapi import inside_prefix, known_path, resources_of
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError

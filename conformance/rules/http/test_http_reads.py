@@ -21,8 +21,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.scenarios.scenario import NoOccasionError
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, Unanswered
-from conformance.transport.parallel import is_busy
-from conformance.transport.put_off import put_off_s
+from conformance.transport.parallel import is_busy, put_off_s
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]

@@ -13,7 +13,7 @@ from conformance.scenarios.motion.measuring import measured
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # A velocity is seen to be renewed over so long, s.
 _RENEWED_S = 0.35

@@ -15,7 +15,7 @@ from conformance.scenarios.motion.several import several_clients, several_driver
 from conformance.scenarios.motion.trace import Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Readings that are so far apart tell a speed, s.
 _APART_S = 0.15

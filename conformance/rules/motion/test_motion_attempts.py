@@ -14,7 +14,7 @@ from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Tried, is_refu
 from conformance.scenarios.motion.velocities import clamped_velocities
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 def _moved(quiet: Quiet, motion: MotionMap) -> str | None:

@@ -11,7 +11,7 @@ from conformance.scenarios.motion.states import agreement, switched
 from conformance.scenarios.motion.trace import Leg, Reading, Switched, Told
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _NO_ACTION = NotClaimed("the map has no [motion.action]")
 

@@ -13,7 +13,7 @@ from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Of the hold time: within that part the device must still drive, and at least at this part of its velocity.
 _HELD = (0.2, 0.7)

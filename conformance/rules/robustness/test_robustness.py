@@ -16,7 +16,7 @@ from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
 from conformance.transport.exchange import Exchange, NoAnswer
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 
 _ON = (survey, generated_requests, neighbours, own_things)

@@ -13,7 +13,7 @@ from conformance.scenarios.ros.web import changed, succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap, State
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _ACCEPTED: Final = (
     Course.SUCCEEDS, Course.ABORTS, Course.CANCELED, Course.GOES_ON, Course.FIRST, Course.SECOND,

@@ -20,7 +20,7 @@ from conformance.scenarios.ros.presence import (
 )
 from conformance.scenarios.ros.web import succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Subscriptions that a gateway may make for clients that read.
 _FEW: Final = 2

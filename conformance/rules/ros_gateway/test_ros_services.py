@@ -12,7 +12,7 @@ from conformance.scenarios.ros.web import changed
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _RESPONDS: Final = (Server.RESPONDS, Server.SLOW, Server.AFTER)
 _ABSENT: Final = (Server.MISSING, Server.GONE, Server.SILENT)

@@ -23,7 +23,7 @@ from conformance.scenarios.ros.web import Difference, changed, differences, docu
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
 from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # So many differing fields say enough.
 _ROWS: Final = 4

@@ -11,7 +11,7 @@ from conformance.scenarios.ros.watching import Look, Watched, topic_watches
 from conformance.scenarios.ros.web import Difference, differences, document_of, succeeded
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.statement.ros_map import RosMap
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Of a topic of best effort, the suite may miss messages that the gateway has; not most of them.
 _MISSED: Final = 0.5

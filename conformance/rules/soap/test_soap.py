@@ -10,13 +10,12 @@ from conformance.documents.multipart import parts_of
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
-from conformance.documents.xml import elements, text_of
-from conformance.documents.xml_names import local
+from conformance.documents.xml import elements, local, text_of
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
 from conformance.transport.exchange import NoAnswer
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 from conformance.verdict.run import Run
 

@@ -12,8 +12,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import MEDIA_TYPE
 from conformance.api.soap.valid_messages import quiet_example
 from conformance.checkers.soap import PASSIVE
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, clark
 from conformance.transport.client import HttpClient
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge

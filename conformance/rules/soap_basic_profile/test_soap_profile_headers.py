@@ -14,8 +14,7 @@ from conformance.api.soap.callable_services import (
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.valid_messages import quiet_example
-from conformance.documents.xml_names import ENVELOPE, NEXT_ACTOR, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ENVELOPE, NEXT_ACTOR, Node, clark
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 

@@ -13,12 +13,10 @@ from conformance.api.soap.messages import padded
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, quiet_example, require_valid_document
 from conformance.contract.classes import TAKEN_OCTETS
-from conformance.documents.xml import NotXmlError, parse
-from conformance.documents.xml_names import WSDL, XSD, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import WSDL, XSD, Node, NotXmlError, clark, parse
 from conformance.transport import raw
 from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError
-from conformance.transport.put_off import until_taken
+from conformance.transport.parallel import until_taken
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 

@@ -10,8 +10,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, clark
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 

@@ -12,7 +12,7 @@ from conformance.api.soap.calls import SoapResponse, call, expect_answer
 from conformance.api.soap.messages import ordinary, variants
 from conformance.api.soap.mutations import Payload, invalid_ones, mutations
 from conformance.api.soap.service import SoapService
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.documents.xsd_shapes import Element
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge, RefutedError

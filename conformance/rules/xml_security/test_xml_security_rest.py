@@ -11,11 +11,9 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.attack_runner import AttackRunner, judge_calls, outcome
 from conformance.api.soap.attacks import VALUE_SLOT, Attack, Template, attacks
 from conformance.api.soap.callback_server import CallbackServer
-from conformance.contract.classes import Level
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface, Level
 from conformance.contract.pack import Contract
-from conformance.documents.xml import NotXmlError, elements, parse, text_of
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, NotXmlError, elements, parse, text_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.effort import Effort

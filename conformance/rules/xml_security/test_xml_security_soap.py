@@ -14,8 +14,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import simple_leaves, with_text
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
-from conformance.documents.xml_names import ADDRESSING, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ADDRESSING, Node, clark
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge

@@ -15,7 +15,7 @@ from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, P
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
 from conformance.transport.exchange import NoAnswerError
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 
 # For so long the effect of an attempt at rest is awaited at most, without the time to settle, s.
 _EFFECT_S: Final = 2.0

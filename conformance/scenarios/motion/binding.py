@@ -12,15 +12,12 @@ from conformance.api.rest.validity import INVALID, validity
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, is_json
-from conformance.documents.resources import matching
+from conformance.documents.openapi import Operation, is_json, matching
 from conformance.documents.writing import form_body, multipart_body, xml_bytes
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of
-from conformance.documents.xml import NotXmlError, elements, parse
-from conformance.documents.xml_names import local
-from conformance.documents.xml_node import Node
-from conformance.documents.xml_values import NoElementError, node_of, value_of
+from conformance.documents.xml import Node, NotXmlError, elements, local, parse
+from conformance.documents.xsd_shapes import NoElementError, node_of, value_of
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Outgoing

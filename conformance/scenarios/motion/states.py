@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import recorded

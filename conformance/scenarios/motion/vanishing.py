@@ -12,7 +12,7 @@ from conformance.scenarios.motion.moves import recorded
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need, Stage
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
 SILENT: Final = "and the client falls silent"

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import Any, Final
 
-from conformance.documents.xml import NotXmlError, elements, parse
-from conformance.documents.xml_names import local
-from conformance.documents.xml_values import value_of
+from conformance.documents.xml import NotXmlError, elements, local, parse
+from conformance.documents.xsd_shapes import value_of
 from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, put_at, value_at
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Attempt, Exchange

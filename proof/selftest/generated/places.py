@@ -8,14 +8,13 @@ from typing import Any
 
 from lxml import etree
 
+from conformance.contract.classes import Interface
 from conformance.contract.generic import generic_classes
-from conformance.contract.interfaces import Interface
 from conformance.contract.pack import Contract
 from conformance.documents import wsdl
 from conformance.documents.json_schema import Schema, kind_of
-from conformance.documents.openapi import Body, Operation, is_json, is_xml, operations_of
+from conformance.documents.openapi import PARAMETER, Body, Operation, is_json, is_xml, operations_of
 from conformance.documents.representation import flat
-from conformance.documents.resources import PARAMETER
 from conformance.documents.xsd_shapes import Complex, Element
 from proof.mutation.changes import soap
 from proof.mutation.messages import Request

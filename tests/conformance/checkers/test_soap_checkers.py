@@ -7,8 +7,7 @@ import pytest
 from conformance.checkers.soap import SoapCheckers
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Judge, Observers
 
 URL = "http://robot/ws"
 SPACE = "http://soap.turtlebot.mybot.org/"

@@ -3,7 +3,7 @@ import stat
 
 import pytest
 
-from conformance.commandline.atomic_write import write_atomically
+from conformance.commandline.out_folder import write_atomically
 
 
 @pytest.fixture

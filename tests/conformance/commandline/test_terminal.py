@@ -3,7 +3,7 @@
 import pytest
 
 from conformance.commandline.guard import inert_lines
-from conformance.commandline.terminal import inert
+from conformance.commandline.help_pages import inert
 from reports.pages.untrusted import on_a_line
 
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from conformance.documents.compatibility import changes
+from conformance.documents.operation_compatibility import changes
 from conformance.documents.swagger import as_openapi_3
 
 POSE = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.documents.compatibility import changes
+from conformance.documents.operation_compatibility import changes
 
 TEXT, INT, NUMBER = {"type": "string"}, {"type": "integer"}, {"type": "number"}
 

@@ -10,9 +10,8 @@ from small_device import described, reading
 from conformance.contract.document_text import parsed
 from conformance.documents.description import Description, DescriptionError, read_description
 from conformance.documents.json_schema import modern, resolved
-from conformance.documents.json_shape import Shape, shape_of
+from conformance.documents.json_shape import Shape, has_formats, shape_of
 from conformance.documents.openapi import read_operations
-from conformance.documents.value_formats import has_formats
 
 _HEAD = "openapi: 3.0.3\ninfo: {title: a, version: '1'}\npaths: {}\n"
 _LAUGHS = "".join(f"x{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 15))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.documents.overlay import OverlayError, overlaid
+from conformance.documents.description import OverlayError, overlaid
 
 _DOCUMENT = {"paths": {"/a": {"get": {"tags": ["x"]}, "post": {}}, "/b": {"post": {"tags": ["y"]}}}, "l": [1, 2, 3]}
 

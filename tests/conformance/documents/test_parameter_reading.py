@@ -2,9 +2,14 @@
 
 import pytest
 
-from conformance.documents.field_reading import multipart_verdict, query_verdicts, urlencoded_verdict
 from conformance.documents.openapi import Body
-from conformance.documents.parameter_reading import decoded_path, judged
+from conformance.documents.parameter_reading import (
+    decoded_path,
+    judged,
+    multipart_verdict,
+    query_verdicts,
+    urlencoded_verdict,
+)
 from conformance.documents.parameters import Encoding, Parameter
 from conformance.documents.writing import header_text, multipart_body, path_text, query_pairs, query_text
 

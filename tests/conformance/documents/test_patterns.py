@@ -6,8 +6,14 @@ import time
 import pytest
 
 from conformance.documents.json_shape import shape_of
-from conformance.documents.pattern_python import for_python, with_python_patterns
-from conformance.documents.patterns import PatternError, SlowPatternError, check, matches
+from conformance.documents.patterns import (
+    PatternError,
+    SlowPatternError,
+    check,
+    for_python,
+    matches,
+    with_python_patterns,
+)
 
 
 @pytest.mark.parametrize(

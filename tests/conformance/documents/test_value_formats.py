@@ -3,8 +3,7 @@
 import pytest
 
 from conformance.documents.json_schema import modern, resolved
-from conformance.documents.json_shape import validator_of
-from conformance.documents.value_formats import has_formats, wrong_formats
+from conformance.documents.json_shape import has_formats, validator_of, wrong_formats
 
 _RIGHT = {
     "int8": [-128, 127, 1.0],

@@ -8,7 +8,7 @@ from lxml import etree
 from conformance.api.soap.messages import ordinary, unknown_in
 from conformance.documents.wsdl import WsdlError, read_services
 from conformance.documents.wsdl_imports import SchemaFolder
-from conformance.documents.xml_names import XSD
+from conformance.documents.xml import XSD
 
 _WSDL = f"""<w:definitions xmlns:w="http://schemas.xmlsoap.org/wsdl/" xmlns:s="http://schemas.xmlsoap.org/wsdl/soap/"
  xmlns:t="urn:t" xmlns:x="urn:x" xmlns:y="urn:y" xmlns:xs="{XSD}" targetNamespace="urn:t"><w:types>TYPES</w:types>

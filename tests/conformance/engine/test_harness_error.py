@@ -6,7 +6,7 @@ import pytest
 
 from conformance.api.rest import calls
 from conformance.contract.pack import Contract
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.robot import delivery, delivery_messages

@@ -17,7 +17,7 @@ from small_device import certified, described, reading, small_device
 from conformance.contract.pack import Contract
 from conformance.engine.judging import judge_stored
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.history.reading import read_history
+from conformance.history.events import read_history
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.statement import empty_statement
 from conformance.transport.exchange import Request, Response

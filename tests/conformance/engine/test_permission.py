@@ -18,8 +18,8 @@ from conformance.statement.statement import Calls, Statement, empty_statement
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NotPermittedError, Outgoing
-from conformance.transport.incomplete_request import PartialRequest
 from conformance.transport.parallel import send_together
+from conformance.transport.raw import PartialRequest
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from proof.table1.independent_robots import plain

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.engine import robot_under_test
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.packs.table1.statement import Statement

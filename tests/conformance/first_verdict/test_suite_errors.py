@@ -11,9 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Case, Judge, Observers
 
 
 def _exchange(path: str) -> Exchange:

@@ -14,17 +14,16 @@ from hypothesis import strategies as st
 from small_device import certified, constant, described, reading, small_device
 
 from conformance.commandline.secrecy import SECRETS
-from conformance.history.events import VERSION, Began, Ended, Eye, Octets, Seen, Sent, Span
-from conformance.history.reading import HistoryError, read_history
+from conformance.history.events import VERSION, Began, Ended, Eye, HistoryError, Octets, Seen, Sent, Span, read_history
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credentials, bearer
 from conformance.transport.exchange import NoAnswer, NoAnswerError, Outgoing, Request, Response
 from conformance.transport.fetching import Fetcher
-from conformance.transport.incomplete_request import PartialRequest
 from conformance.transport.parallel import send_together
 from conformance.transport.passage import EyeState, Passage
+from conformance.transport.raw import PartialRequest
 from conformance.transport.reach import Trust
 
 STARTED = "2026-11-28T00:00:00.000000Z"

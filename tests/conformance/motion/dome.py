@@ -9,7 +9,7 @@ from soap_devices import PASSWORD, SOAP_12, USER, Device, abstract, messages, op
 
 from conformance.documents.wsdl import read_services
 from conformance.scenarios.described_messages import DescribedMessages
-from conformance.transport.username_token import UsernameToken
+from conformance.transport.credentials import UsernameToken
 
 LIMITS = {"pan": (-1.0, 1.0), "tilt": (-0.5, 0.5)}
 # How fast it moves to a position, and at velocity 1, per second; so long after a velocity it moves on, s.

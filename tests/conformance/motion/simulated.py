@@ -22,8 +22,8 @@ from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 _PLAYED = (

@@ -16,7 +16,7 @@ from conformance.scenarios.scenario import Recording, Recordings
 from conformance.scenarios.stored import TRACES_NAME, read_traces, write_traces
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 def _relay(seed):

@@ -1,7 +1,6 @@
 """Polling by a simulated clock: as often as asked, and once more after the end."""
 
-from conformance.observe.clock import SimulatedClock
-from conformance.observe.polling import Patience, poll_for
+from conformance.observe.clock import Patience, SimulatedClock, poll_for
 from conformance.transport.pace import Pace
 
 

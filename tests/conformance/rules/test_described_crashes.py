@@ -13,8 +13,7 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Judge, Observers
 from conformance.verdict.run import Run
 
 _DOCUMENT = {

@@ -7,8 +7,7 @@ from conformance.api.rest.inputs import Inputs
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter
-from conformance.history.events import Sent
-from conformance.history.reading import read_history
+from conformance.history.events import Sent, read_history
 from conformance.history.writing import HISTORY_NAME
 from conformance.scenarios.drawing import drawn
 from conformance.verdict.effort import Effort

@@ -8,8 +8,7 @@ from conformance.scenarios.plan import Step, ordered, told
 from conformance.scenarios.rule import Note, NotTested, record, rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, Recordings, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Case, Judge
 
 _PLAYED = []
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from taking_robot import sent_by
 
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request

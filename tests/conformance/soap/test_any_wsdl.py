@@ -23,8 +23,8 @@ from conformance.scenarios.soap_survey import soap_survey, wsdl_faults
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 _DEVICES = {"camera": camera, "scale": scale, "table": table}

@@ -15,7 +15,7 @@ from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import Request
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 
 _ALL = Credentials(
     (

@@ -20,7 +20,7 @@ from conformance.statement.statement import empty_statement
 from conformance.target.connecting import connection_of
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 from conformance.verdict.run import Run
 
 _SHARED = "known-to-both"

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from conformance.observe.polling import Patience
+from conformance.observe.clock import Patience
 from conformance.transport import raw
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import NoAnswerError

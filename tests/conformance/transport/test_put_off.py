@@ -2,7 +2,7 @@ import pytest
 
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.transport.put_off import put_off_s, until_taken
+from conformance.transport.parallel import put_off_s, until_taken
 
 
 def _exchange(status: int, after: str | None) -> Exchange:

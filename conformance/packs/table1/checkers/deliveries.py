@@ -15,8 +15,7 @@ from urllib.parse import unquote
 
 from conformance.documents.openapi import is_json
 from conformance.documents.representation import UnreadableError, flattened, read
-from conformance.documents.xml import NotXmlError, elements, parse, text_of
-from conformance.documents.xml_names import clark, local
+from conformance.documents.xml import NotXmlError, clark, elements, local, parse, text_of
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
@@ -24,7 +23,7 @@ from conformance.packs.table1.robot.probe import ARRIVES_S
 from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
 from conformance.transport.exchange import Attempt, Exchange, Request
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 # So many deliveries may wait to be looked for, and the oldest of them for so long, s.
 _MANY: Final = 10

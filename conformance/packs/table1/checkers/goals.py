@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.goal import difference
 from conformance.packs.table1.robot.message_shapes import GOAL, GOAL_POSE, read_as
 from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.transport.exchange import Attempt, Exchange, Request, Response
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 # A value that is the old goal's after so many changes, and after most of those that change it, is so by rule.
 _OFTEN: Final = 3

@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.message_shapes import GOAL, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, VELOCITY, Velocity, is_near
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 # One interface may be behind the other: once is none too often, and neither is any time so soon after a change, s.
 _OFTEN: Final = 2

@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_S
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES
 from conformance.packs.table1.robot.soap_services import returned
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 #: Path, shapes of the list and of a type named in full, and requirement, by what is in a SOAP response with the list.
 _LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {

@@ -16,7 +16,7 @@ from conformance.packs.table1.robot.robot import PLAN, POSE
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 # Shorter than this, m, or than so many of the path's own steps, is no leap.
 _LEAP_M: Final = 1.0

@@ -21,7 +21,7 @@ from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"

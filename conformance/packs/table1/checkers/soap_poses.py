@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
 from conformance.packs.table1.robot.robot import POSE
 from conformance.packs.table1.robot.state_over_soap import answered, contradiction
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 # Whoever answers may have a sample that another one of the robot's processes has not yet, s.
 _BACK_S: Final = 1.0

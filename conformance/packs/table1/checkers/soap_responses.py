@@ -13,8 +13,7 @@ from lxml import etree
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
-from conformance.documents.xml import NotXmlError, elements, parse
-from conformance.documents.xml_names import ENVELOPE, clark, local
+from conformance.documents.xml import ENVELOPE, NotXmlError, clark, elements, local, parse
 from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import (
@@ -28,7 +27,7 @@ from conformance.packs.table1.robot.message_shapes import (
     TWIST,
 )
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soap-subscribers/response-valid"}
 # A longer path of a plan is judged where it is asked for.

@@ -22,7 +22,7 @@ from conformance.packs.table1.robot.robot import LINEAR, POSE, VELOCITY, Velocit
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Attempt, Exchange
-from conformance.verdict.case import Case, case
+from conformance.verdict.evidence import Case, case
 
 _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
     POSE: ("rest-resources/pose-type", ODOMETRY, "status 200 with a complete nav_msgs/Odometry"),

@@ -10,7 +10,7 @@ from typing import Final
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.calls import XML
 from conformance.api.rest.interface import RestInterface
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.plugin import Device
 from conformance.packs.table1.robot.geometry import Pose, pose_of

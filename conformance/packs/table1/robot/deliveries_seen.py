@@ -3,8 +3,7 @@
 from typing import Any, Final, Protocol
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.observe.polling import Patience, poll, poll_for
+from conformance.observe.clock import WALL_CLOCK, Clock, Patience, poll, poll_for
 from conformance.packs.table1.checkers.deliveries import Deliveries
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Seen

@@ -16,7 +16,7 @@ from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.papers_robot.delivery import COFFEE, COURIER, PATH_NAMES, DeliveryFields
 from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
-from conformance.transport.put_off import until_taken
+from conformance.transport.parallel import until_taken
 
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)

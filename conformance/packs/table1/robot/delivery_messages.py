@@ -5,8 +5,7 @@ from typing import Final
 
 from conformance.api.soap.messages import filled
 from conformance.documents.wsdl import read_file
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, clark
 from conformance.documents.xsd_shapes import Element
 from conformance.papers_robot.delivery import EXAMPLE
 from conformance.papers_robot.statement import CONTRACT_DIR

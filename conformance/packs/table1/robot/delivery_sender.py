@@ -18,8 +18,7 @@ from conformance.packs.table1.robot.soap_services import delivery_outgoing, send
 from conformance.papers_robot.delivery import COFFEE
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, Outgoing
-from conformance.transport.parallel import Addressed, send_together
-from conformance.transport.put_off import until_taken
+from conformance.transport.parallel import Addressed, send_together, until_taken
 
 
 @dataclass(frozen=True)

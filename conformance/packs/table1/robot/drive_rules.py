@@ -15,7 +15,7 @@ from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.packs.table1.robot.windows import middle, newest, shown, velocities
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # What was measured for so long alike is steady: readings of two resources may be compared, s.
 _STEADY_S: Final = 0.3

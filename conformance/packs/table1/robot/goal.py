@@ -5,7 +5,7 @@ from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.documents.json_text import read_json, shown
-from conformance.observe.polling import poll
+from conformance.observe.clock import poll
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
 from conformance.packs.table1.robot.message_shapes import LAST_GOAL, STATUS
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot

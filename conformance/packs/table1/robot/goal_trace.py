@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import CANCELLED, NEW, REPEATED
 from conformance.packs.table1.robot.plan import Start
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # The statuses that conform, and what is expected, for each kind of step.
 _STEPS: Final[dict[str, tuple[frozenset[int], str]]] = {

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.packs.table1.robot.delivery import Delivery, path_of
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 from conformance.packs.table1.limits import Noise
 from conformance.packs.table1.robot.geometry import wrapped
 from conformance.packs.table1.robot.robot import Odometry, Velocity
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # Less than this is no drive to judge: m and rad.
 _SHORTEST: Final = 0.08

@@ -18,7 +18,7 @@ from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import Exchange, Response
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
 # A way so much longer than the distance goes around something: not what a short drive is for.

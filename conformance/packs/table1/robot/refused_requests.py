@@ -15,7 +15,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import read_exchange
 from conformance.api.soap.service import SoapService
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.packs.table1.robot.delivery import Delivery, path_of
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal

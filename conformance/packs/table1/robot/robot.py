@@ -13,8 +13,7 @@ from conformance.api.rest.validity import require_valid
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import projected
 from conformance.measures.samples import FARTHEST
-from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.observe.polling import Patience
+from conformance.observe.clock import WALL_CLOCK, Clock, Patience
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import abilities
 from conformance.packs.table1.robot.geometry import Pose, pose_of

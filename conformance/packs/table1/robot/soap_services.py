@@ -10,9 +10,7 @@ from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_message
 from conformance.api.soap.xml_style import XmlStyle, serialize
 from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml import elements
-from conformance.documents.xml_names import local
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, elements, local
 from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
 from conformance.papers_robot.delivery import COFFEE

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from http import HTTPStatus
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.clock import WALL_CLOCK, Clock
-from conformance.observe.polling import poll
+from conformance.observe.clock import WALL_CLOCK, Clock, poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
 from conformance.packs.table1.robot.standstill_trace import GOAL, Attempt, Rest, Standing

@@ -6,7 +6,7 @@ from typing import Final
 
 from conformance.scenarios.rule import NotTested
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 #: What is found of a robot that rests and has a goal.
 GOAL: Final = "an active goal"

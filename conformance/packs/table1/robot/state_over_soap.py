@@ -15,7 +15,7 @@ from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _SLACK: Final = Slack()
 # Two samples are farther apart than this, ns.

@@ -6,8 +6,7 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
-from conformance.observe.clock import WALL_CLOCK
-from conformance.observe.polling import Patience, poll
+from conformance.observe.clock import WALL_CLOCK, Patience, poll
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
 from conformance.packs.table1.statement import said_of

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.polling import poll
+from conformance.observe.clock import poll
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_goal, goal_body
 from conformance.packs.table1.robot.letting_go import certain_s

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
-from conformance.observe.polling import poll, poll_for
+from conformance.observe.clock import poll, poll_for
 from conformance.packs.table1.robot.concurrent_puts import (
     Accepted,
     ConcurrentGoal,

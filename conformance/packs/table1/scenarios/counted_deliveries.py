@@ -10,8 +10,7 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import SoapResponse, call, read_exchange, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import MEDIA_TYPE, SoapService
-from conformance.documents.xml_names import ENVELOPE, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ENVELOPE, Node, clark
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_messages import request

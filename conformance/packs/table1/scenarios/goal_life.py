@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import (

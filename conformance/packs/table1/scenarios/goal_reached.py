@@ -9,7 +9,7 @@ from typing import Any, Final
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.measures.samples import FARTHEST, SEVERAL
-from conformance.observe.polling import poll
+from conformance.observe.clock import poll
 from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from conformance.api.soap.service import SoapService
 from conformance.documents.representation import from_element, projected
-from conformance.observe.polling import poll
+from conformance.observe.clock import poll
 from conformance.packs.table1.robot.agreement import Slack, disagreement
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal

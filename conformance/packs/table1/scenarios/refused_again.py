@@ -13,7 +13,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, validity
 from conformance.api.soap.callable_services import SoapServices
 from conformance.documents.json_text import read_json
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.deliveries_seen import QUIET_S, DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender

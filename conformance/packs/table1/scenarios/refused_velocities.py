@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, Final
 
 from conformance.api.rest.calls import JSON
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.invalid_bodies import elsewhere
 from conformance.packs.table1.robot.message_shapes import body_of

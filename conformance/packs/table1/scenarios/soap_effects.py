@@ -8,10 +8,9 @@ from typing import Final
 from conformance.api.interfaces import Interfaces
 from conformance.api.soap.calls import SoapResponse
 from conformance.api.soap.valid_messages import call_valid
-from conformance.contract.interfaces import Interface
-from conformance.documents.xml_names import ENVELOPE, clark
-from conformance.documents.xml_node import Node
-from conformance.observe.polling import Patience, poll
+from conformance.contract.classes import Interface
+from conformance.documents.xml import ENVELOPE, Node, clark
+from conformance.observe.clock import Patience, poll
 from conformance.packs.table1.robot import delivery_messages
 from conformance.packs.table1.robot.goal import NEW, goal_body, put_goal
 from conformance.packs.table1.robot.message_shapes import DELIVERIES, read_as

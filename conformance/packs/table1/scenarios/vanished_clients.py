@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need, Stage
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 
 _AFTER: Final = "clients vanished in the middle of a request"
 # For so long the robot is watched after the requests, before what comes next; s.

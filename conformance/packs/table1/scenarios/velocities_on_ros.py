@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.probe import ARRIVES_S, Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity, is_near

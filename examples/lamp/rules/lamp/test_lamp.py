@@ -6,8 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.clock import WALL_CLOCK
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import WALL_CLOCK, poll_for
 from conformance.scenarios.rule import Case, Outcome, rule
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need

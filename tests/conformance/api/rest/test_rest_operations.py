@@ -4,8 +4,7 @@ import pytest
 
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import operations_of
-from conformance.documents.resources import known_path, matching, resources_of
+from conformance.documents.openapi import known_path, matching, operations_of, resources_of
 
 LIBRARY = Contract.load(Path(__file__).parent.parent / "data" / "library-contract")
 

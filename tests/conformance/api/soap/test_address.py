@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.documents.addressing import is_http
+from conformance.documents.wsdl import is_http
 from conformance.transport.reach import split
 
 

@@ -6,7 +6,7 @@ from toy_server import serving
 from conformance.api.soap.callable_services import SoapServices, callable_services, is_gone
 from conformance.api.soap.calls import call
 from conformance.api.soap.service import SoapService
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run

@@ -7,7 +7,7 @@ import pytest
 from conformance.api.soap import comparison
 from conformance.api.soap.wsdl_rules import RULES
 from conformance.documents.wsdl import WsdlError, describe, read_file, unusable
-from conformance.documents.xml_names import clark
+from conformance.documents.xml import clark
 from conformance.papers_robot.statement import CONTRACT_DIR
 
 CONTRACT = read_file(CONTRACT_DIR / "publishers.wsdl")

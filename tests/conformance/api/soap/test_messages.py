@@ -13,12 +13,10 @@ from conformance.api.soap.messages import ordinary, simple_leaves, variants, wit
 from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, value_styles, xml_styles
 from conformance.documents.wsdl import read_file
-from conformance.documents.xml import parse
-from conformance.documents.xml_names import ENVELOPE, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ENVELOPE, Node, clark, parse
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_assembly import SchemaDocument
-from conformance.documents.xsd_lexical import plain, unreadable
+from conformance.documents.xsd_shapes import plain, unreadable
 from conformance.papers_robot.statement import CONTRACT_DIR
 
 XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"

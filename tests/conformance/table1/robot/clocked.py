@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 WANTED: Final = Velocity(linear_x=0.5)
 SETTLE_S: Final = 1.2

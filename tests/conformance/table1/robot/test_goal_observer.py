@@ -8,7 +8,7 @@ from conformance.packs.table1.checkers.goals import Goals
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"

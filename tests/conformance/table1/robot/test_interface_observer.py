@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, POSE, SENSORS, VELOCITY
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response, Unanswered
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot"

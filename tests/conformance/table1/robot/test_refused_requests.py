@@ -15,8 +15,8 @@ from conformance.packs.table1.robot.walk import Walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as rules
 from conformance.packs.table1.scenarios.refused_again import RefusedAgain, refused_again
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Request, Response
-from conformance.verdict.case import Case
 from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Case
 
 _FAULT = (
     b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body><e:Fault>'

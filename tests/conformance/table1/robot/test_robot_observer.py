@@ -13,7 +13,7 @@ from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"

@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.plan import Plan, start_of
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"

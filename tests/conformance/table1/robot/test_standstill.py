@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
 from conformance.packs.table1.robot.standstill_trace import Rest, stays
 from conformance.scenarios.rule import NotTested, Outcome
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _CANCEL, _REFUSED = "safety/cancel", "safety/refused-keeps"
 _WATCH_S = 0.3

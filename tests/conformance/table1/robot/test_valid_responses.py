@@ -7,14 +7,14 @@ import pytest
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary
 from conformance.api.soap.service import SoapService
-from conformance.contract.interfaces import Interface
+from conformance.contract.classes import Interface
 from conformance.documents.wsdl import read_file
-from conformance.documents.xml_names import clark
+from conformance.documents.xml import clark
 from conformance.packs.table1.checkers.soap_responses import SoapResponses
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.observers import Observers
+from conformance.verdict.evidence import Observers
 from conformance.verdict.run import Run
 
 _WSDL = CONTRACT_DIR / "subscribers.wsdl"

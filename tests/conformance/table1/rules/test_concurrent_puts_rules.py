@@ -17,7 +17,7 @@ from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.rules.rest_resources import test_several_clients as rules
 from conformance.packs.table1.statement import Statement
 from conformance.scenarios.rule import Note
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _STATEMENT = Statement(declared=DeclaredLimits(settle_s=1.0, hold_s=3.0, tolerance_abs=0.02))
 _ONE, _OTHER = Velocity(linear_x=0.5, angular_z=-0.5), Velocity(linear_x=-0.5, angular_z=0.5)

@@ -14,7 +14,7 @@ from conformance.packs.table1.rules.safety import test_driving as rules
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 _FAST = Velocity(linear_x=0.3)

@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.delivery import Delivery
 from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Sent
 from conformance.packs.table1.scenarios.deliveries import deliveries, deliveries_last, deliveries_later
 from conformance.scenarios.rule import Outcome, Rule, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 # How a delivery was sent that must make two messages, and their interfaces.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}

@@ -5,7 +5,7 @@ from http import HTTPStatus
 
 from conformance.packs.table1.scenarios.counted_deliveries import CountedDeliveries, Keyed, counted_deliveries
 from conformance.scenarios.rule import NotTested, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("equivalence/idempotency-key", on=(counted_deliveries,))

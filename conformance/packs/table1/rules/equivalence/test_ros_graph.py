@@ -5,15 +5,14 @@ from typing import Final
 
 import pytest
 
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.probe import Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import SENSORS, Robot
 from conformance.packs.table1.scenarios.velocities_on_ros import OnRos, velocities_on_ros
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, rule
-from conformance.verdict.case import Case
-from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.needs("rest")

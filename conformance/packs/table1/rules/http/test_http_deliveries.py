@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from conformance.packs.table1.scenarios.concurrent_puts import concurrent_deliveries
 from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("http/concurrent-answers", on=(concurrent_deliveries,))

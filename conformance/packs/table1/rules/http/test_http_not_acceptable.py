@@ -7,7 +7,7 @@ from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.not_acceptable import NotAcceptable, not_acceptable
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.scenarios.rule import Note, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 Puts = tuple[NotAcceptable, ...]
 

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import pytest
 
 from conformance.api.rest.interface import RestInterface
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.delivery import Delivery, put_delivery
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as

@@ -12,7 +12,7 @@ from conformance.packs.table1.scenarios.formats import (
 )
 from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("rest-formats/same-values", on=(formats_in_motion, formats_of_goals, formats_of_plans))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.clock import SPAN_S, Clock
 from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.verdict.evidence import Judge

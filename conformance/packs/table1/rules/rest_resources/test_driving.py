@@ -11,7 +11,7 @@ from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 

@@ -8,7 +8,7 @@ from conformance.packs.table1.robot.goal_trace import GoalReached
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 

@@ -8,7 +8,7 @@ from conformance.packs.table1.robot.goal import NEW
 from conformance.packs.table1.robot.goal_trace import Put
 from conformance.packs.table1.scenarios.goal_ids import goal_ids, goal_poses
 from conformance.scenarios.rule import Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("rest-resources/goal-id", on=(goal_ids,))

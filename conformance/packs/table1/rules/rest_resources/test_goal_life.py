@@ -8,7 +8,7 @@ from conformance.packs.table1.robot.goal_trace import GoalLife, Put
 from conformance.packs.table1.scenarios.goal_life import ID, goal_life
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 # How far the stamp of a goal may be from the odometry's, s; as far as the odometry's from Date (contract.md#poses).

@@ -6,7 +6,7 @@ from conformance.packs.table1.robot.goal import NEW
 from conformance.packs.table1.robot.goal_trace import RefusedGoals, SpecialGoal
 from conformance.packs.table1.scenarios.refused_goals import refused_goals
 from conformance.scenarios.rule import Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 def _refused(put: SpecialGoal) -> Case:

@@ -15,7 +15,7 @@ from conformance.packs.table1.scenarios.plans import (
 )
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 Plans = PlansFromRobot | PlansFromStart
 _YAW_OFF_RAD = 0.2

@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.robot import Velocity
 from conformance.packs.table1.scenarios.concurrent_puts import concurrent_goal, concurrent_goals, concurrent_velocities
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Note, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 

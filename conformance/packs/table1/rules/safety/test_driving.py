@@ -18,7 +18,7 @@ from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
 from conformance.transport.exchange import Exchange
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
 # A stop is answered so much later than the settle time allows at most, s: a robot may wait until it is at rest. So

@@ -13,7 +13,7 @@ from conformance.packs.table1.scenarios.vanished_clients import vanished_clients
 from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
-from conformance.transport.incomplete_request import PartialRequest
+from conformance.transport.raw import PartialRequest
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")

@@ -7,7 +7,7 @@ from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.packs.table1.scenarios.refused_velocities import RefusedVelocities, refused_velocities
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.scenarios.rule import NotClaimed, Note, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("safety/limits-refused", on=(refused_velocities,))

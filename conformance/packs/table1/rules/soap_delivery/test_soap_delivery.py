@@ -12,8 +12,7 @@ from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_document, typed
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
 from conformance.contract.classes import TAKEN_OCTETS
-from conformance.documents.xml_names import ADDRESSING, clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import ADDRESSING, Node, clark
 from conformance.packs.table1.robot import delivery_messages, soap_services
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together

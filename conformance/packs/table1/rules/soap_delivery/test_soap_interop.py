@@ -9,8 +9,7 @@ import pytest
 from conformance.api.soap.callable_services import SoapServices, repetitions
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import example
-from conformance.observe.clock import WALL_CLOCK
-from conformance.observe.polling import poll_for
+from conformance.observe.clock import WALL_CLOCK, poll_for
 from conformance.papers_robot.delivery import COFFEE, COURIER, EXAMPLE
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.effort import Effort

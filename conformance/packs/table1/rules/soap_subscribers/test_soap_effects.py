@@ -12,7 +12,7 @@ from conformance.packs.table1.scenarios.soap_effects import (
     misunderstood,
 )
 from conformance.scenarios.rule import Note, Outcome, rule
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _LAST = ("detail", "last_goal")
 # The goal has succeeded, or was cancelled.

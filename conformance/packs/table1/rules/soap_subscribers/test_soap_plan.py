@@ -9,8 +9,7 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.calls import SoapResponse, call, judge_answer
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, clark
 from conformance.packs.table1.robot import delivery_messages, soap_services
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.message_shapes import GET_PLAN

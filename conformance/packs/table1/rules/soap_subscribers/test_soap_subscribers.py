@@ -11,8 +11,7 @@ from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_document
 from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.representation import flattened
-from conformance.documents.xml_names import clark
-from conformance.documents.xml_node import Node
+from conformance.documents.xml import Node, clark
 from conformance.packs.table1.robot.delivery_messages import NAMESPACE, request
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.soap_services import ask, outgoing

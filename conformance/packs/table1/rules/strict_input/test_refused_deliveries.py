@@ -13,7 +13,7 @@ from conformance.packs.table1.scenarios.counted_deliveries import (
 )
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 
 @rule("strict-input/delivery-refused", on=(counted_deliveries,))

@@ -13,7 +13,7 @@ from conformance.packs.table1.scenarios.refused_again import DuringGoal, Refused
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
-from conformance.verdict.case import Case
+from conformance.verdict.evidence import Case
 
 _VELOCITY: Final = "strict-input/velocity-refused"
 
