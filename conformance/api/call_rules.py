@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.documents.openapi import Operation
 from conformance.statement.motion_calls import named_by
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import counted, listed
 
 if TYPE_CHECKING:
     from conformance.verdict.run import Run
@@ -153,12 +153,8 @@ def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[s
         if labels and reason is not Reason.SAFE:
             verb = "  Calls" if reason.may else "  Does not call"
             named = f", as in --call '{labels[0]}'" if reason is Reason.HARMFUL else ""
-            lines.append(f"{verb} {len(labels)}, because {reason}{named}: {_listed(labels)}")
+            lines.append(f"{verb} {len(labels)}, because {reason}{named}: {listed(labels)}")
     stops = [operation.label for operation in operations if operation.stop]
     if stops and changing:
-        lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {_listed(stops)}")
+        lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {listed(stops)}")
     return lines
-
-
-def _listed(labels: Sequence[str], most: int = 6) -> str:
-    return ", ".join(labels[:most]) + (f" and {len(labels) - most} more" if len(labels) > most else "")

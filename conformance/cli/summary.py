@@ -13,7 +13,7 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.help_pages import columns, inert, wrapped
 from conformance.contract.classes import QUESTIONS
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import counted, listed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -169,9 +169,7 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
         click.echo(wrapped(f"what breaks in practice: {requirement['breaks']}", "  "))
     blocks = cause["blocks"]
     if blocks:
-        shown = ", ".join(blocks[:_SHOWN_BLOCKED])
-        more = f" and {len(blocks) - _SHOWN_BLOCKED} more" if len(blocks) > _SHOWN_BLOCKED else ""
-        click.echo(f"  not tested because of it: {shown}{more}")
+        click.echo(f"  not tested because of it: {listed(blocks, _SHOWN_BLOCKED)}")
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     if failure["request"]:
         click.echo(f"  replay: {inert(_command(failure['request']['curl'], cause['number'], folder))}")

@@ -131,7 +131,7 @@ def _digest(value: Any) -> str:
 
 def _faults(run: Run) -> dict[str, Any]:
     """Return what could not be judged because of an error in the suite, under its key; empty if there was none."""
-    faults = [{"text": text, "requirements": sorted(ids)} for text, ids in run.judge.faults.items()]
+    faults = [{"text": text, "requirements": ids} for text, ids in run.judge.faults.items()]
     return {"suite_errors": faults} if faults else {}
 
 

@@ -15,7 +15,17 @@ from conformance.contract.ledger import Requirement, renamed, twins
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
-from conformance.verdict.finding import Finding, Sent, Showing, causes_of, kind_of, likeness, observed_in, subject_of
+from conformance.verdict.finding import (
+    Finding,
+    Sent,
+    Showing,
+    causes_of,
+    kind_of,
+    likeness,
+    listed,
+    observed_in,
+    subject_of,
+)
 
 # Findings of one requirement that are kept: further causes share one more. And how many have all of their requests.
 MAX_FINDINGS = 100
@@ -23,8 +33,8 @@ MAX_SEQUENCES = 10
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
 _REST = "the rest"
-# Characters of the message of an error of the suite.
-_FAULT = 200
+# Characters of the message of an error of the suite, and how many operations that met it are named.
+_FAULT, _NAMED = 200, 3
 _REFUSED = 400
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
@@ -142,7 +152,6 @@ class Judge:
         check_name: name of the running check.
         at_risk: the requirements that fail if the robot stops responding during a hostile request.
         met: findings of the running check, newest last.
-        faults: what the suite could not judge because of an error of its own, with the requirements concerned.
         ended_by: the finding after which the robot stopped responding, or None.
         concerned: returns the labels of the operations of a description that a request concerns.
     """
@@ -152,7 +161,7 @@ class Judge:
         self.check_name = ""
         self.at_risk: tuple[str, ...] = ()
         self.met: list[Finding] = []
-        self.faults: dict[str, set[str]] = {}
+        self._faults: dict[str, tuple[dict[str, None], set[str]]] = {}
         self.ended_by: Finding | None = None
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
@@ -379,8 +388,15 @@ class Judge:
         """Record an error of the suite that kept it from judging something, such as one operation."""
         said = (str(error).splitlines() or [""])[0][:_FAULT]
         name = "" if isinstance(error, PatternError) else f"{type(error).__name__}: "
-        text = f"{what}: not judged: {name}{said}"
-        self.faults.setdefault(text, set()).update(self._renamed.get(id_, id_) for id_ in ids)
+        met, concerned = self._faults.setdefault(f"{name}{said}", ({}, set()))
+        met[what] = None
+        concerned.update(self._renamed.get(id_, id_) for id_ in ids)
+
+    @property
+    def faults(self) -> dict[str, list[str]]:
+        """Return each error of the suite with what it kept from being judged, and the requirements concerned."""
+        found = self._faults.items()
+        return {f"{listed(list(met), _NAMED)}: not judged: {error}": sorted(ids) for error, (met, ids) in found}
 
     def note(self, requirement: str, remark: str) -> None:
         """Add a remark that changes no verdict."""

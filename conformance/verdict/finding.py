@@ -131,9 +131,7 @@ class Finding:
             parts.append(f"Seen {self.seen} times.")
         others = [f"`{one.operation}`" for one in list(self.operations.values())[1:]]
         if others:
-            more = len(others) - _NAMED
-            listed = ", ".join(others[:_NAMED]) + (f" and {counted(more, 'more operation')}" if more > 0 else "")
-            parts.append(f"The same for {counted(len(others), 'other operation')}: {listed}.")
+            parts.append(f"The same for {counted(len(others), 'other operation')}: {listed(others)}.")
         if self.rest:
             parts.append("It stands for all further causes: the requirement has too many findings.")
         if self.again is not None:
@@ -149,6 +147,11 @@ class Finding:
 def counted(number: int, what: str) -> str:
     """Return a number with its noun: "1 more operation", "9 more operations"."""
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def listed(names: Sequence[str], most: int = _NAMED) -> str:
+    """Return the first names, and how many more there are: "GET /a, GET /b and 37 more"."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def in_full(finding: Finding) -> str:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.transport.exchange import NotPermittedError
-from conformance.verdict.finding import counted
-
-# Names that a sentence lists.
-_NAMED = 10
+from conformance.verdict.finding import counted, listed
 
 
 class TimeIsOverError(NotPermittedError):
@@ -130,17 +127,9 @@ class TimeLimit:
         """
         uncalled, shortened = self.uncalled, self.fewer
         said = [
-            f"{len(uncalled)} of {counted(operations, 'operation')} not called: {_listed(uncalled)}"
-            if uncalled
-            else "",
-            f"{counted(len(shortened), 'operation')} got fewer requests: {_listed(shortened)}" if shortened else "",
-            f"{counted(len(unjudged), 'requirement')} not judged: {_listed(unjudged)}" if unjudged else "",
+            f"{len(uncalled)} of {counted(operations, 'operation')} not called: {listed(uncalled)}" if uncalled else "",
+            f"{counted(len(shortened), 'operation')} got fewer requests: {listed(shortened)}" if shortened else "",
+            f"{counted(len(unjudged), 'requirement')} not judged: {listed(unjudged)}" if unjudged else "",
         ]
         said = list(filter(None, said)) or ["some requests were not sent"]
         return f"--minutes {self.minutes or 0:g}: {'; '.join(said)}"
-
-
-def _listed(names: Iterable[str]) -> str:
-    names = list(names)
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return ", ".join(names[:_NAMED]) + more

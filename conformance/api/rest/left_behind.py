@@ -14,6 +14,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined, path_of
+from conformance.verdict.finding import listed
 
 # As many ids, paths and operations a line of the summary names; the result has all.
 _NAMED: Final = 3
@@ -114,7 +115,7 @@ class LeftBehind:
             ),
         )
         return {
-            "lines": [f"{what}: {_some(found)}" for what, found in lines if found],
+            "lines": [f"{what}: {listed(found, _NAMED)}" for what, found in lines if found],
             "created": [{"operation": label, "ids": ids} for label, ids in created.items()],
             "changed": [{"operation": label, "path": path} for path, label in changed.items()],
             "deleted": [{"operation": label, "ids": ids} for label, ids in deleted.items()],
@@ -126,8 +127,3 @@ def _things(label: str, ids: list[str]) -> str:
     shown = ", ".join(one[:_ID] for one in ids[-_NAMED:])
     earlier = "… " if len(ids) > _NAMED else ""
     return f"{len(ids)} by {label} (id{'s' if len(ids) > 1 else ''} {earlier}{shown})"
-
-
-def _some(texts: list[str]) -> str:
-    more = len(texts) - _NAMED
-    return f"{', '.join(texts[:_NAMED])}{f' and {more} more' if more > 0 else ''}"

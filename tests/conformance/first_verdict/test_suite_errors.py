@@ -52,6 +52,9 @@ def test_a_checker_that_fails_ends_no_request_and_no_other_checker():
         Observers(judge, [fails, sees]).answered(_exchange("/x?a=1"))
     assert len(seen) == 3
     assert list(judge.faults) == ["GET /x: not judged: ValueError: pattern"]
+    for number in range(39):
+        judge.fault(f"GET /{number}", ValueError("pattern"))
+    assert list(judge.faults) == ["GET /x, GET /0, GET /1 and 37 more: not judged: ValueError: pattern"]
 
 
 def test_an_error_of_the_suite_is_told_on_terminal_and_pages_and_is_no_verdict(tmp_path, monkeypatch):
@@ -66,7 +69,8 @@ def test_an_error_of_the_suite_is_told_on_terminal_and_pages_and_is_no_verdict(t
     assert done.exit_code == 4
     result = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert result["verdict"] == "inconclusive"
-    assert "GET /a: not judged: ValueError: no such pattern" in {one["text"] for one in result["suite_errors"]}
+    (error,) = result["suite_errors"]
+    assert error["text"] == "GET /a, GET /b: not judged: ValueError: no such pattern"
     for text in (
         done.output,
         *((tmp_path / f"certificate.{end}").read_text(encoding="utf-8") for end in ("md", "html")),
