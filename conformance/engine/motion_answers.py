@@ -11,8 +11,7 @@ from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.measuring import measured
 from conformance.scenarios.motion.moves import clamped_targets, stops, targets
 from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
-from conformance.scenarios.motion.vanishing import WAYS, vanishing
-from conformance.scenarios.motion.velocities import clamped_velocities, let_go, velocities
+from conformance.scenarios.motion.velocities import WAYS, clamped_velocities, let_go, vanishing, velocities
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import counted

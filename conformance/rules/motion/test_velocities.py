@@ -10,7 +10,7 @@ from conformance.rules.motion.judging import at, driven, is_each_late, must_rest
 from conformance.scenarios.motion.measuring import measured, noise_of
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
-from conformance.scenarios.motion.velocities import let_go, velocities
+from conformance.scenarios.motion.velocities import let_go, vanishing, velocities
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
@@ -72,9 +72,9 @@ def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:
         yield Case(not moved, last.exchange, expected, observed=moved, cause="moves")
 
 
-@rule("motion/watchdog", on=(let_go,))
+@rule("motion/watchdog", on=(let_go, vanishing))
 def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a device that gets no command any more rests after its hold time; every time counts."""
+    """Judge whether a device that gets no command any more rests after its hold time, however its client vanishes."""
     for drive in trace:
         if motion.velocity is None or motion.velocity.hold_s is None:
             continue

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Final
 
-from conformance.measures.samples import LATE, SEVERAL, usual_s
+from conformance.measures.samples import LATE, SEVERAL, slope, usual_s
 from conformance.scenarios.motion.trace import Reading, Resting
 from conformance.statement.motion_map import MotionMap
 
@@ -34,14 +33,8 @@ def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float
     ]
     if len(seen) < 2 * SEVERAL or seen[-1][0] - seen[0][0] < _LAPSE_S:
         return None
-    # The median of the slopes between readings (Theil and Sen), of which no single reading decides anything.
-    half_s = (seen[-1][0] - seen[0][0]) / 2
-    slopes = [
-        (there - here) / (later - first)
-        for (first, here), (later, there) in itertools.combinations(seen, 2)
-        if later - first >= half_s
-    ]
-    return median(slopes) / speed.scale
+    rate = slope(seen)
+    return None if rate is None else rate / speed.scale
 
 
 def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting: Resting) -> float:

@@ -6,6 +6,7 @@ import itertools
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -20,11 +21,20 @@ from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Way
+from conformance.transport.raw import PartialRequest
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
 _By = tuple[Way | None, ...]
+SILENT: Final = "and the client falls silent"
+CLOSED: Final = "and the client closes its connection"
+HALF_OPEN: Final = "and the link breaks without a word"
+POLLING: Final = "and the client only goes on reading the state"
+#: How a client vanishes, each as the end of a drive's name.
+WAYS: Final = (SILENT, CLOSED, HALF_OPEN, POLLING)
+# A device of which no hold time is declared is watched for so long, s; no verdict follows.
+_UNDECLARED_S: Final = 2.0
 # For so long a velocity that is not steady is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
 # Of the limit: a slow velocity, and the slowest.
@@ -169,14 +179,31 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
     for made, (speeds, by) in enumerate([*left, *(() if quick else _by_each_way(mapped))]):
         # An odd number of commands and an even one; and with readings and without.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
-        what = f"{_named(speeds, by)}, let go" + (", and nothing is read until it must rest" if silent else "")
-        part = _Part(what, speeds, by=by)
-        yield from _left_alone(mapped, part, hold_s, more=made % 2, silent=silent, brief=made > 0)
+        gone = SILENT if silent else POLLING
+        part = _Part(f"{_named(speeds, by)}, {gone}", speeds, by=by)
+        yield from _left_alone(mapped, part, hold_s, more=made % 2, gone=gone, brief=made > 0)
     name = axes[0][0]
     for kind, refused in refusals[: 1 if quick else None]:
         limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
         what = f"{name} {limit:g}, let go, with {kind} after it, which must be refused"
         yield from _left_alone(mapped, _Part(what, {name: limit}), hold_s, refused=refused, brief=True)
+
+
+@scenario(needs=_NEEDS, stage=Stage.DRIVE)
+def vanishing(mapped: MappedDevice) -> tuple[Drive, ...]:
+    """Drive slowly, and vanish: in silence, with the connection closed, with the link broken, and reading on."""
+    ways = WAYS if mapped.drives.hold_s is not None else (CLOSED, POLLING)
+    return recorded(drive for way in ways for drive in _vanished(mapped, way))
+
+
+def _vanished(mapped: MappedDevice, way: str) -> Iterator[Drive]:
+    name, axis = next(iter(mapped.drives.axes.items()))
+    limit = next(_there_and_back(mapped, axis.limits, axis.of))
+    # So slow that a device that goes on stays near.
+    least = min(_TOLD * mapped.motion.speed_tolerance(name), abs(limit))
+    speeds = {name: math.copysign(max(_SLOW * abs(limit), least), limit)}
+    hold_s = mapped.drives.hold_s if mapped.drives.hold_s is not None else _UNDECLARED_S
+    yield from _left_alone(mapped, _Part(f"{_named(speeds)}, {way}", speeds), hold_s, gone=way, brief=True)
 
 
 def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
@@ -293,7 +320,7 @@ def _left_alone(
     *,
     more: int = 0,
     refused: Callable[[], Command] | None = None,
-    silent: bool = False,
+    gone: str = "",
     brief: bool,
 ) -> Iterator[Drive]:
     """Drive at a velocity, then send nothing any more, and watch; again where a slow link or the limits spoilt it.
@@ -304,7 +331,7 @@ def _left_alone(
         hold_s: its hold time, s.
         more: how often the velocity is sent once more at the end, on a connection of its own.
         refused: sends what the device must refuse after the last command; None: nothing is sent.
-        silent: whether nothing is read until the device must rest.
+        gone: how the client vanishes, one of WAYS; empty: it stays, and keeps its lease.
         brief: whether to look no longer than until it rests.
     """
     settle_s, whole = mapped.drives.settle_s, False
@@ -319,13 +346,42 @@ def _left_alone(
         way = part.by[-1] if part.by else None
         again = [mapped.drive(made, way=way, fresh=True) for _ in range(more)]
         drive = replace(drive, commands=(*drive.commands, *again))
-        drive = _let_go_of(mapped, drive, hold_s, refused, silent=silent, brief=brief)
+        with ExitStack() as links:
+            links.callback(mapped.ready.speak)
+            if gone in {CLOSED, HALF_OPEN} and drive.commands[-1].accepted:
+                drive = replace(drive, commands=(*drive.commands, _unread(mapped, made, drive, links, gone)))
+            if gone:
+                mapped.ready.fall_silent()
+            drive = _let_go_of(mapped, drive, hold_s, refused, silent=gone not in {"", POLLING}, brief=brief)
         if drive.refused is None or not drive.refused.accepted:
             yield drive
         if drive.was_kept(hold_s):
             return
     if not whole:
         raise NotPossibleError(f"the limits leave no room for {part.what}")
+
+
+def _unread(mapped: MappedDevice, speeds: Position, drive: Drive, links: ExitStack, gone: str) -> Command:
+    """Send a velocity once more, and never read the response; the exchange is that of the command before.
+
+    Args:
+        mapped: the device.
+        speeds: what is commanded.
+        drive: with the command before.
+        links: closes the connection in the end.
+        gone: CLOSED: the client closes it at once, as one does that is killed; else it stays open without a word, as
+            one that has lost its network.
+    """
+    made, sent = mapped.request_of(mapped.drives, speeds), mapped.clock.now()
+    link = PartialRequest(
+        mapped.api.client, made.method, made.target, sent=made.body, promised=len(made.body), headers=made.headers
+    )
+    if gone == CLOSED:
+        link.vanish(reset=False)
+        mapped.api.client.close()
+    else:
+        links.callback(link.vanish)
+    return replace(drive.commands[-1], sent=sent, answered=mapped.clock.now())
 
 
 def _let_go_of(
