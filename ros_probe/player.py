@@ -10,7 +10,7 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
 - `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
   value]`; waits until so much has come.
 - `serve` (service, type, script): serve. Each call takes the next item of the script, and the last one goes on:
-  `{"answer": value, "delay_s": s}`, `{"never": true}`. Events: `request`, `response`.
+  `{"answer": value, "delay_s": s}`, `{"never": true}`. Events: `request`, and `response` with its `request`.
 - `act` (action, type, script): the same for goals: `{"reject": true}`, or `{"feedback": [values], "gap_s": s, "end":
   "succeed" | "abort" | "never", "result": value, "refuse_cancel": true, "cancel_s": s}`. Events: `goal`, `rejected`,
   `feedback`, `cancel`, `end`.
@@ -197,7 +197,7 @@ class Player:
             step = steps.next()
             self._note(service, "request", plain(request))
             self._ends.wait(None if step.get("never") else step.get("delay_s", 0.0))
-            self._note(service, "response", plain(step["made"]))
+            self._note(service, "response", {"request": plain(request), "response": plain(step["made"])})
             return step["made"]
 
         self._entities[service] = self._server().create_service(

@@ -1,5 +1,6 @@
 """Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
+import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -81,25 +82,41 @@ def meanwhile(to: HttpClient, request: Outgoing, timeout_s: float) -> Iterator["
         timeout_s: its deadline, s.
     """
     to.connection.take_slot((request.method, to.url(request.target)))
-    own = HttpClient(to.base_url, to.connection.unheard(request_rate=None, resent=0))
-
-    def send() -> tuple[Attempt, float]:
-        attempt: Attempt
-        try:
-            attempt = own.send(
-                request.method, request.target, headers=request.headers, body=request.body, timeout_s=timeout_s
-            )
-        except NoAnswerError as none:
-            attempt = none.unanswered
-        return attempt, time.monotonic()
-
     with ThreadPoolExecutor(1) as pool:
-        try:
-            yield pool.submit(send)
-        finally:
-            pool.shutdown()
-            own.close()
+        yield pool.submit(lambda: (_sent_apart(to, [request], timeout_s)[0], time.monotonic()))
     to.connection.note(request.method)
+
+
+def crowd(to: HttpClient, requests: Sequence[Sequence[Outgoing]], timeout_s: float) -> list[list[Attempt]]:
+    """Send the requests of many clients at the same time, those of each client one after another.
+
+    No listener gets them, as a device need not serve so many.
+
+    Args:
+        to: where they are sent.
+        requests: of each client.
+        timeout_s: the deadline of each request, s.
+    """
+    for request in itertools.chain(*requests):
+        to.connection.take_slot((request.method, to.url(request.target)))
+    with ThreadPoolExecutor(len(requests)) as pool:
+        return list(pool.map(lambda own: _sent_apart(to, own, timeout_s), requests))
+
+
+def _sent_apart(to: HttpClient, requests: Sequence[Outgoing], timeout_s: float) -> list[Attempt]:
+    """Send requests one after another from a client of their own, which has no listeners."""
+    own = HttpClient(to.base_url, to.connection.unheard(request_rate=None, resent=0))
+    attempts: list[Attempt] = []
+    try:
+        for one in requests:
+            try:
+                came = own.send(one.method, one.target, headers=one.headers, body=one.body, timeout_s=timeout_s)
+                attempts.append(came)
+            except NoAnswerError as none:
+                attempts.append(none.unanswered)
+    finally:
+        own.close()
+    return attempts
 
 
 class _Client:

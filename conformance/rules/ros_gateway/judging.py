@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.definition import Definition, put_at, value_at
 from conformance.scenarios.ros.web import differences, document_of, succeeded
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
@@ -27,6 +27,14 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
     part = msgspec.structs.replace(body, at=at, fields={})
     found = differences(document_of(exchange.response.body), json.loads(value), definition, part, ros)
     return f"{found[0].at} is {found[0].web} in place of {found[0].ros}" if found else ""
+
+
+def mapped(message: dict[str, object], body: Body) -> dict[str, object]:
+    """Return the fields of a ROS message that an operation's body has."""
+    found: dict[str, object] = {}
+    for own in body.fields.values():
+        found = put_at(found, own, value_at(message, own))
+    return found if body.fields else message
 
 
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:

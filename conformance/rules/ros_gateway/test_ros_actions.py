@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, mapped, statuses
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
 from conformance.scenarios.ros.web import changed, succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
@@ -46,7 +46,8 @@ def once(trace: Goals) -> Iterator[Outcome]:
             observed=f"{len(goals)} goals",
             cause="lost" if len(goals) < wanted else "doubled",
         )
-        wrong = next(changed(goals[0].content, json.loads(one.value)), None) if goals else None
+        wanted_fields = mapped(json.loads(one.value), one.body)
+        wrong = next(changed(mapped(goals[0].content, one.body), wanted_fields), None) if goals else None
         found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
         yield Case(not wrong, one.exchange, "the goal's fields at its server", observed=found, cause="changed")
 
@@ -134,14 +135,11 @@ def results(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
         ended = [look for look in one.looks if is_end(body, look.word)]
         if not one.result or not ended or one.course not in _ENDS:
             continue
-        for look in (ended[-1],):
-            if not look.result and _ENDS[one.course] != "succeeded":
-                continue
-            found = differing(
-                look.exchange, one.result, trace.definitions[f"{one.operation}#Result"], body, body.result, ros
-            )
+        last, definition = ended[-1], trace.definitions[f"{one.operation}#Result"]
+        if last.result or _ENDS[one.course] == "succeeded":
+            found = differing(last.exchange, one.result, definition, body, body.result, ros)
             expected = f"the result of a goal {one.course}"
-            yield Case(not found, look.exchange, expected, observed=found, cause=f"{one.course} {found.split(' ')[0]}")
+            yield Case(not found, last.exchange, expected, observed=found, cause=f"{one.course} {found.split(' ')[0]}")
 
 
 @rule("ros-gateway/goal-feedback", on=(action_goals,))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter, defaultdict
 from collections.abc import Iterator
-from typing import Final
+from typing import Any, Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, mapped, statuses
+from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.robot import Heard
-from conformance.scenarios.ros.services import ROUNDS, Called, Server, Services, is_held, service_calls
-from conformance.scenarios.ros.web import changed
+from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
+from conformance.scenarios.ros.web import changed, succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
-from conformance.statement.ros_map import RosMap
+from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
@@ -33,6 +36,28 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
             found = differing(one.attempt, one.answer, trace.responses[one.operation], one.body, one.body.result, ros)
         expected = f"2xx with the response of {one.body.service}, {one.server}"
         yield Case(ok and not found, one.attempt, expected, observed=found, cause=f"{one.server} {found.split(' ')[0]}")
+    for crowd in trace.crowds:
+        yield from _own(crowd, trace.responses[crowd.operation], ros)
+
+
+def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]:
+    """Judge whether each of many clients gets the response to its call; of equal calls, each gets another one."""
+    body, left = crowd.body, defaultdict[str, list[str]](list)
+    for one in crowd.heard:
+        if one.what == "response":
+            left[_key(one.content["request"], body)].append(json.dumps(one.content["response"]))
+    for request, attempt in zip(crowd.requests, crowd.attempts, strict=True):
+        if isinstance(attempt, Exchange) and succeeded(attempt, body):
+            own = left[_key(json.loads(request), body)]
+            fits = next((one for one in own if not differing(attempt, one, definition, body, body.result, ros)), None)
+            expected = f"the response of {body.service} to this call, one of {len(crowd.requests)} at once"
+            yield Case(fits is not None, attempt, expected, observed="another one", cause="another")
+            if fits is not None:
+                own.remove(fits)
+
+
+def _key(request: dict[str, Any], body: Body) -> str:
+    return json.dumps(mapped(request, body))
 
 
 @rule("ros-gateway/service-once", on=(service_calls,))
@@ -51,10 +76,26 @@ def once(trace: Services) -> Iterator[Outcome]:
         )
         if requests:
             yield from _as_sent(one, requests[0])
+    for crowd in trace.crowds:
+        yield from _reached(crowd)
+
+
+def _reached(crowd: Crowd) -> Iterator[Outcome]:
+    """Judge whether of many calls at once none reaches the server twice, and each that succeeds does once."""
+    body = crowd.body
+    keys = [_key(json.loads(request), body) for request in crowd.requests]
+    sent = Counter(keys)
+    heard = Counter(_key(one.content, body) for one in crowd.heard if one.what == "request")
+    done = Counter(key for key, attempt in zip(keys, crowd.attempts, strict=True) if succeeded(attempt, body))
+    for key, attempt in zip(keys, crowd.attempts, strict=True):
+        calls = f"{done[key]} to {sent[key]}" if done[key] < sent[key] else f"{sent[key]}"
+        expected = f"{calls} calls of {body.service} for {sent[key]} equal requests, {len(keys)} requests at once"
+        cause = "lost" if heard[key] < done[key] else "doubled"
+        yield Case(done[key] <= heard[key] <= sent[key], attempt, expected, f"{heard[key]} calls", cause)
 
 
 def _as_sent(one: Called, request: Heard) -> Iterator[Outcome]:
-    wrong = next(changed(request.content, Heard(0.0, "", one.request).content), None)
+    wrong = next(changed(mapped(request.content, one.body), mapped(json.loads(one.request), one.body)), None)
     found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
     yield Case(not wrong, one.attempt, f"the request's fields at {one.body.service}", observed=found, cause="changed")
 

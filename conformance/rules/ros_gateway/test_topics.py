@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Final
 
-from conformance.scenarios.ros.definition import put_at, value_at
+from conformance.rules.ros_gateway.judging import mapped
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
     Burst,
@@ -152,13 +151,9 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
 
 
 def _mapped(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, object]:
-    """Return the fields of a message that the operation's body has."""
     body = ros.operations[one.operation]
     assert isinstance(body, Publishes)
-    found: dict[str, object] = {}
-    for own in body.fields.values():
-        found = put_at(found, own, value_at(message, own))
-    return found if body.fields else message
+    return mapped(message, body)
 
 
 @rule("ros-gateway/once", on=(topic_writes, topic_bursts))
@@ -181,7 +176,7 @@ def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
             elif same:
                 yield Case(False, one.exchange, expected, f"{same} equal messages", f"{one.operation} several")
             elif not burst.reliable:
-                yield NotTested(f"the gateway publishes {one.topic} with best effort, which may lose messages")
+                yield NotTested(f"of {burst.how}, some of {one.topic} may be lost on the way")
             elif not strange:  # else it came, and was changed
                 yield Case(False, one.exchange, expected, f"none on {one.topic}", f"{one.operation} none")
 
@@ -197,17 +192,18 @@ def _is_blank(value: object) -> bool:
 def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether the messages of one client are published in the order of its requests."""
     for burst in trace:
-        if any(one.client for one in burst.sent):
-            continue
-        places = []
-        for one in burst.sent:
-            wanted = _mapped(json.loads(one.value), one, ros)
-            place = next((i for i, each in enumerate(burst.heard) if equal(each.content, wanted)), None)
-            if place is not None:
-                places.append((place, one))
-        for (before, _), (after, one) in pairwise(places):
-            expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
-            yield Case(before < after, one.exchange, expected, "one before that of an earlier request", one.operation)
+        heard = [each.content for each in burst.heard]
+        wanted = [_mapped(json.loads(one.value), one, ros) for one in burst.sent]
+        before: dict[int, int] = {}
+        for one, message in zip(burst.sent, wanted, strict=True):
+            place = next((place for place, each in enumerate(heard) if equal(each, message)), None)
+            if place is None or wanted.count(message) > 1:
+                continue  # of equal messages, it is open which is which
+            if one.client in before:
+                expected = f"the messages on {one.topic} in the order of the requests ({burst.how})"
+                holds, found = before[one.client] < place, "one before that of an earlier request"
+                yield Case(holds, one.exchange, expected, found, one.operation)
+            before[one.client] = place
 
 
 @rule("ros-gateway/refused-nothing", on=(topic_refusals, topic_writes))

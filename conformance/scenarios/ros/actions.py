@@ -243,16 +243,13 @@ class _Sender:
             received = WALL_CLOCK.now()
             value = document_of(exchange.response.body).value if exchange.response.ok else None
             word = value_at(value, state.at)
-            has = [pointer is not None and value_at(value, pointer) is not None for pointer in self._parts]
+            pointers = (self._body.feedback, self._body.result)
+            has = [pointer is not None and value_at(value, pointer) is not None for pointer in pointers]
             looks.append(Look(sent, received, exchange, "" if word is None else str(word), *has))
             if sent > until or is_over(looks):
                 break
             WALL_CLOCK.sleep(_PACE_S)
         return looks
-
-    @property
-    def _parts(self) -> tuple[str | None, str | None]:
-        return self._body.feedback, self._body.result
 
     def _has_ended(self, looks: list[Look]) -> bool:
         """Return whether the last looks all show an end."""

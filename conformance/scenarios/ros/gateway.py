@@ -20,6 +20,8 @@ from conformance.transport.exchange import Exchange, Outgoing
 from conformance.verdict.run import Run
 
 _Operation = TypeVar("_Operation")
+#: Clients at once for a gateway without a robot.
+CROWD: Final = 32
 # From one look at the gateway to the next, s.
 PACE_S: Final = 0.03
 _DISCOVERY_S: Final = 15.0
@@ -147,6 +149,14 @@ class Gateway:
         if value is not None:
             document = written(value, self.definition(_type_of(body)), body, self.ros)
         return self.binding.made(filled(call, body.values), document)
+
+    def read(self, call: str, reads: Reads) -> Exchange:
+        """Read a topic.
+
+        Raises:
+            NoAnswerError: there is no response.
+        """
+        return self.send(self.request(call, reads), reads.response_s)
 
     def send(self, made: Outgoing, timeout_s: float) -> Exchange:
         """Send a request.

@@ -38,14 +38,12 @@ class Absence:
     """What an operation returned when there was no message, or none that is young enough.
 
     Attributes:
-        operation: the operation.
         body: its map.
         when: as a noun phrase.
         exchange: the last read.
         first: the read that was made when there was a message; None: there never was any.
     """
 
-    operation: str
     body: Reads
     when: str
     exchange: Exchange
@@ -57,14 +55,12 @@ class Presence:
     """What an operation returned of a publisher of some quality of service.
 
     Attributes:
-        operation: the operation.
         publisher: as a noun phrase.
         shown: whether its message was returned in time.
         exchange: the read that shows it, else the last one.
         instead: the topic whose message was returned; empty: none.
     """
 
-    operation: str
     publisher: str
     shown: bool
     exchange: Exchange
@@ -92,11 +88,11 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
             continue
         # An earlier run may have published.
         until = WALL_CLOCK.now() + (body.max_age_s or 0.0) + _LATE_S
-        exchange = _read(gateway, call, body)
+        exchange = gateway.read(call, body)
         while succeeded(exchange, body) and WALL_CLOCK.now() < until:
             WALL_CLOCK.sleep(PACE_S)
-            exchange = _read(gateway, call, body)
-        found.append(Absence(call, body, "on which nothing was published", exchange))
+            exchange = gateway.read(call, body)
+        found.append(Absence(body, "on which nothing was published", exchange))
     if not found:
         raise NotPossibleError("each topic has a publisher")
     return tuple(found)
@@ -105,7 +101,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
 # Late, as a killed publisher is on the graph until its lease is over, and a gateway may count it.
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def publishers_end(gateway: Gateway) -> Publishers:
-    """Publish on all topics at once, fall silent, publish again, kill the publisher, and begin anew."""
+    """Publish on all topics at once, fall silent, publish again, leave, come back, and be killed, and begin anew."""
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
@@ -113,6 +109,8 @@ def publishers_end(gateway: Gateway) -> Publishers:
     presences = list(topics.shown("all topics at once"))
     absences += topics.aged("whose publisher fell silent", topics.silence)
     presences += topics.shown("a publisher that fell silent before")
+    absences += topics.aged("whose publisher left", topics.leave)
+    presences += topics.shown("a publisher in place of one that left")
     absences += topics.aged("whose publisher was killed", gateway.kill)
     presences += topics.shown("a publisher in place of one that was killed")
     topics.leave()
@@ -139,14 +137,15 @@ class _Topics:
         self._gateway = gateway
         self._reads = dict(gateway.of(Reads))
         self._definitions = {call: gateway.definition(body.type) for call, body in self._reads.items()}
-        self._makers = {call: gateway.maker(one) for call, one in self._definitions.items()}
+        # One for each type, so that topics of the same type have other messages.
+        self._makers = {body.type: gateway.maker(self._definitions[call]) for call, body in self._reads.items()}
 
     def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
         """Publish on all topics, and yield what the gateway returns of each."""
         values = {}
-        for call, body in self._reads.items():
+        for body in self._reads.values():
             if body.topic not in values:
-                value = values[body.topic] = self._message(call)
+                value = values[body.topic] = self._message(body.type)
                 self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, **quality)
         until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values())
         found: dict[str, Presence] = {}
@@ -165,18 +164,18 @@ class _Topics:
         yield from found.values()
 
     def _presence(self, call: str, publisher: str, values: Mapping[str, Any]) -> Presence:
-        exchange = _read(self._gateway, call, self._reads[call])
+        exchange = self._gateway.read(call, self._reads[call])
         body, kinds = self._reads[call], {one.topic: one.type for one in self._reads.values()}
         shows: list[str] = []
         if succeeded(exchange, body):
             document, definition = document_of(exchange.response.body), self._definitions[call]
             alike = {topic: value for topic, value in values.items() if kinds[topic] == body.type}
             shows = [t for t, v in alike.items() if not differences(document, v, definition, body, self._gateway.ros)]
-        return Presence(call, publisher, body.topic in shows, exchange, next(iter(shows), ""))
+        return Presence(publisher, body.topic in shows, exchange, next(iter(shows), ""))
 
-    def _message(self, call: str) -> dict[str, Any]:
+    def _message(self, kind: str) -> dict[str, Any]:
         """Return a new message, whose stamp is the present: its age may be read from that."""
-        kind, value = self._reads[call].type, self._makers[call].usual().value
+        value = self._makers[kind].usual().value
         if "stamp" in value.get("header", {}):
             now = time.time_ns()
             value["header"]["stamp"] = {"sec": now // 10**9, "nanosec": now % 10**9}
@@ -188,29 +187,26 @@ class _Topics:
             self._gateway.robot.publish(body.topic, body.type)
 
     def leave(self) -> None:
-        """Leave all topics."""
+        """Leave all topics, for long enough that a gateway which looks at the graph now and then notices."""
         for body in self._reads.values():
             self._gateway.robot.tell("forget", name=body.topic)
+        WALL_CLOCK.sleep(_LATE_S)
 
     def aged(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
         """End publishing, and yield what the gateway returns when the last messages are too old."""
         judged = {call: body for call, body in self._reads.items() if body.max_age_s is not None}
-        first = {call: _read(self._gateway, call, body) for call, body in judged.items()}
+        first = {call: self._gateway.read(call, body) for call, body in judged.items()}
         end()
         ended = WALL_CLOCK.now()
         for call, body in sorted(judged.items(), key=lambda one: one[1].max_age_s or 0.0):
             WALL_CLOCK.sleep(max(0.0, ended + (body.max_age_s or 0.0) + _LATE_S - WALL_CLOCK.now()))
-            exchange = _read(self._gateway, call, body)
+            exchange = self._gateway.read(call, body)
             for _ in range(_TRIES):
                 if not succeeded(exchange, body):
                     break
                 WALL_CLOCK.sleep(_LATE_S)
-                exchange = _read(self._gateway, call, body)
-            yield Absence(call, body, when, exchange, first[call])
-
-
-def _read(gateway: Gateway, call: str, body: Reads) -> Exchange:
-    return gateway.send(gateway.request(call, body), body.response_s)
+                exchange = self._gateway.read(call, body)
+            yield Absence(body, when, exchange, first[call])
 
 
 @dataclass(frozen=True)
@@ -218,7 +214,6 @@ class Listed:
     """What a list said of one name.
 
     Attributes:
-        operation: the operation.
         body: its map.
         name: the name, and its type on the graph.
         kind: its type.
@@ -228,7 +223,6 @@ class Listed:
         exchange: the last read.
     """
 
-    operation: str
     body: Lists
     name: str
     kind: str
@@ -282,7 +276,7 @@ def _listed(gateway: Gateway, call: str, body: Lists, name: str, kind: str, *, t
         types = _types_in(exchange, body).get(name)
         is_right = exchange.response.ok and ((types is not None and kind in types) if there else types is None)
         if is_right or began > until:
-            return Listed(call, body, name, kind, there, is_right, " ".join(types or ()), exchange)
+            return Listed(body, name, kind, there, is_right, " ".join(types or ()), exchange)
         WALL_CLOCK.sleep(PACE_S)
 
 
@@ -301,13 +295,11 @@ class Growth:
     """How many subscriptions a topic had before and after many reads.
 
     Attributes:
-        operation: the operation.
         reads: how many.
         before, after: subscriptions.
         exchange: the last read.
     """
 
-    operation: str
     reads: int
     before: int
     after: int
@@ -319,19 +311,19 @@ def many_reads(gateway: Gateway, effort: Effort) -> tuple[Growth, ...]:
     """Read a topic many times, and count its subscriptions."""
     count, read = _READS[effort.name], []
     for call, body in gateway.of(Reads):
-        _read(gateway, call, body)
+        gateway.read(call, body)
         before = _subscriptions(gateway, body.topic)
-        exchange = [_read(gateway, call, body) for _ in range(count)][-1]
-        read.append((call, body, before, exchange))
+        exchange = [gateway.read(call, body) for _ in range(count)][-1]
+        read.append((body, before, exchange))
     # A new subscription is found a moment later.
     WALL_CLOCK.sleep(_LATE_S)
     found = []
-    for call, body, before, exchange in read:
+    for body, before, exchange in read:
         # What is closed late is closed all the same.
         until = WALL_CLOCK.now() + body.within_s
         while (after := _subscriptions(gateway, body.topic)) > before + 1 and WALL_CLOCK.now() < until:
             WALL_CLOCK.sleep(PACE_S)
-        found.append(Growth(call, count, before, after, exchange))
+        found.append(Growth(count, before, after, exchange))
     return tuple(found)
 
 

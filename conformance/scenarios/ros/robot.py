@@ -42,12 +42,10 @@ class Published:
 
     Attributes:
         at: when the first message was handed to ROS, s of the monotonic clock.
-        subscribers: how many there were.
-        reliably: whether all of them have each message sent again that is lost on the way.
+        reliably: whether all subscribers have each message sent again that is lost on the way.
     """
 
     at: float
-    subscribers: int
     reliably: bool
 
 
@@ -84,7 +82,7 @@ class Robot(RosProcess):
         """
         said = self.tell("publish", topic=topic, type=type_, values=values, **how)
         sent = said["sent"]
-        return Published(sent[0] / _NS if sent else time.monotonic(), said["subscribers"], not said["best_effort"])
+        return Published(sent[0] / _NS if sent else time.monotonic(), not said["best_effort"])
 
     def heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
         """Return what came to a topic, service or action since the last call; wait until so much has come.

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition
-from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
 from conformance.scenarios.ros.web import succeeded
@@ -21,7 +21,7 @@ from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scen
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError
-from conformance.transport.parallel import meanwhile
+from conformance.transport.parallel import crowd, meanwhile
 from conformance.verdict.effort import Effort
 
 #: Why a scenario cannot be played where there is a real robot.
@@ -40,6 +40,8 @@ _BESIDE: Final = 4
 _HELD_S, _HELD = 0.8, 5.0
 # What a call held up ends with it: so much before its response arrives, at most, s.
 _TOGETHER_S: Final = 0.25
+# Of many calls at once, every second one is overtaken by the next, s.
+_OVERTAKEN_S: Final = 0.1
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 
 
@@ -113,12 +115,31 @@ def is_held(call: Called, beside: Beside) -> bool:
 
 
 @dataclass(frozen=True)
+class Crowd:
+    """Calls of many clients at once.
+
+    Attributes:
+        operation: the operation.
+        body: its map.
+        requests: JSON of what was sent.
+        attempts: what the gateway responded to each.
+        heard: what the server got and responded.
+    """
+
+    operation: str
+    body: Calls
+    requests: tuple[str, ...]
+    attempts: tuple[Attempt, ...]
+    heard: tuple[Heard, ...]
+
+
+@dataclass(frozen=True)
 class Services:
-    """Calls, and the definitions of what was sent and responded, by operation."""
+    """Calls, and the definitions of what was responded, by operation."""
 
     probes: tuple[Called, ...]
-    requests: dict[str, Definition]
     responses: dict[str, Definition]
+    crowds: tuple[Crowd, ...] = ()
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -127,15 +148,18 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     probes: list[Called] = []
-    requests: dict[str, Definition] = {}
     responses: dict[str, Definition] = {}
-    with partial_trace(lambda: Services(tuple(probes), requests, responses)):
+    crowds: list[Crowd] = []
+    with partial_trace(lambda: Services(tuple(probes), responses)):
         for call, body in gateway.of(Calls):
-            requests[call] = gateway.definition(f"{body.type}#Request")
+            request = gateway.definition(f"{body.type}#Request")
             responses[call] = gateway.definition(f"{body.type}#Response")
             with gateway.robot.publishing(body.service):
-                probes.extend(_Caller(gateway, call, body, requests[call], responses[call]).calls(effort))
-    return Services(tuple(probes), requests, responses)
+                caller = _Caller(gateway, call, body, request, responses[call])
+                probes.extend(caller.calls(effort))
+                if effort.name != "quick":
+                    crowds.append(caller.of_many())
+    return Services(tuple(probes), responses, tuple(crowds))
 
 
 class _Caller:
@@ -169,6 +193,21 @@ class _Caller:
         yield self._called(Server.GONE, {})
         self._serve([{"answer": {}}])
         yield self._reached(Server.BACK)
+
+    def of_many(self) -> Crowd:
+        """Call from many clients at once. It comes last, as calls that were given up may still reach the server."""
+        robot, body = self._gateway.robot, self._body
+        requests = [self._complete("Request", self._requests.usual().value) for _ in range(CROWD)]
+        script = [
+            {"answer": self._complete("Response", self._responses.usual().value), "delay_s": _OVERTAKEN_S * (turn % 2)}
+            for turn in range(CROWD)
+        ]
+        robot.tell("script", name=body.service, script=[*script, {}])
+        robot.heard(body.service)
+        made = [[self._gateway.request(self._call, body, one)] for one in requests]
+        attempts = crowd(self._gateway.api.client, made, body.within_s + _LATE_S)
+        heard = tuple(robot.heard(body.service, 2 * CROWD, _MORE_S))
+        return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
 
     def _serve(self, script: list[dict[str, Any]]) -> None:
         self._gateway.robot.tell("serve", service=self._body.service, type=self._body.type, script=script)

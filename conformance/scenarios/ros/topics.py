@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition, value_at
-from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
 from conformance.scenarios.ros.web import differences, document_of, equal, succeeded
@@ -20,7 +20,7 @@ from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, pa
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
 from conformance.transport.exchange import Exchange, Outgoing
-from conformance.transport.parallel import MOST_CLIENTS, send_together
+from conformance.transport.parallel import MOST_CLIENTS, crowd
 from conformance.verdict.effort import Effort
 
 _NEEDS: Final = (Need.REST,)
@@ -41,6 +41,8 @@ _SILENCE_S: Final = 2.0
 _SILENT_S: Final = 10.0
 # A publisher may keep no more messages than that, and need not wait for who is slow.
 _BURST: Final = 8
+# Messages of each of many clients.
+_OF_EACH: Final = 3
 _TEXTS: Final = "a message with a text in place of each number"
 _SAMPLES: Final = {"quick": 8, "standard": 16, "deep": 40}
 
@@ -57,7 +59,7 @@ class Shown:
         value: JSON of the message, with all its fields.
         published: when it was published first.
         exchange: the read that shows it, else the last one.
-        sent, received: when that was requested, and when the response had arrived.
+        sent: when that was requested.
         was_shown: whether it shows the message.
         reliably: whether the gateway subscribes so that no message is lost on the way.
         earlier: reads of other content before that.
@@ -72,7 +74,6 @@ class Shown:
     published: float
     exchange: Exchange
     sent: float
-    received: float
     was_shown: bool
     reliably: bool = True
     earlier: int = 0
@@ -134,8 +135,7 @@ class _Reader:
         earlier = 0
         while True:
             sent = clock.now()
-            exchange = self.read()
-            received = clock.now()
+            exchange = self.gateway.read(self.call, self.reads)
             is_shown = self.shows(exchange, value, sample.kind)
             if is_shown or sent > until:
                 break
@@ -147,15 +147,12 @@ class _Reader:
                 if len(wrong) >= _SURE and sent - wrong[0][0] > _SURE_S:
                     break
             clock.sleep(PACE_S)
-        later = tuple(self.read() for _ in range(2)) if is_shown else ()
+        later = tuple(self.gateway.read(self.call, self.reads) for _ in range(2)) if is_shown else ()
         text = json.dumps(value)
         return Shown(
-            self.call, reads.topic, sample.what, sample.kind, text, published.at, exchange, sent, received, is_shown,
+            self.call, reads.topic, sample.what, sample.kind, text, published.at, exchange, sent, is_shown,
             reliably, earlier, later,
         )  # fmt: skip
-
-    def read(self) -> Exchange:
-        return self.gateway.send(self.gateway.request(self.call, self.reads), self.reads.response_s)
 
     def shows(self, exchange: Exchange, value: dict[str, Any], kind: Kind) -> bool:
         """Return whether a response shows a message."""
@@ -208,7 +205,7 @@ class Burst:
         how: as a noun phrase.
         sent: in the order of sending.
         heard: in the order of arrival.
-        reliable: whether the gateway publishes reliably, so that no message is lost on the way.
+        reliable: whether the gateway publishes reliably, and so few that no message is lost on the way.
     """
 
     operation: str
@@ -228,7 +225,8 @@ def topic_writes(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
 def topic_bursts(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
     """Send messages in a row from one client, and at once from several, and hear what the gateway publishes."""
     times = {"quick": 1, "standard": 3}.get(effort.name, 8)
-    return tuple(_bursts(gateway, lambda writer: (one for _ in range(times) for one in writer.in_bursts())))
+    many = gateway.plays and effort.name != "quick"
+    return tuple(_bursts(gateway, lambda writer: writer.in_bursts(times, many=many)))
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -349,22 +347,28 @@ class _Writer:
             if came:
                 until = min(until, clock.now() + _MORE_S)
 
-    def in_bursts(self) -> Iterator[Burst]:
-        """Yield messages in a row of one client, and at once of several."""
-        samples = [self.usual() for _ in range(_BURST)]
-        made = [(one, json.dumps(self.value(one)), self.request(one)) for one in samples]
-        sent = tuple(self.sent(one.what, value, request) for one, value, request in made)
+    def in_bursts(self, times: int, *, many: bool) -> Iterator[Burst]:
+        """Yield messages in a row of one client, at once of several, and of many, each of which sends several."""
+        for _ in range(times):
+            yield self.burst(1, _BURST, f"{_BURST} messages in a row")
+            yield self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
+        if many:
+            # A publisher with ROS's usual depth of 10 may lose some of so many.
+            yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
+
+    def burst(self, clients: int, each: int, how: str) -> Burst:
+        """Return what came of messages of clients that send at the same moment, each one after another."""
+        samples = [[self.usual() for _ in range(each)] for _ in range(clients)]
+        made = [[(one, json.dumps(self.value(one)), self.request(one)) for one in own] for own in samples]
+        requests = [[request for _, _, request in own] for own in made]
+        sent = tuple(
+            self.sent_as(one.what, value, attempt, client)
+            for client, attempts in enumerate(crowd(self.gateway.api.client, requests, self.body.response_s))
+            for attempt, (one, value, _) in zip(attempts, made[client], strict=True)
+            if isinstance(attempt, Exchange)
+        )
         heard = self.hear(sum(one.accepted for one in sent))
-        yield Burst(self.call, f"{_BURST} messages in a row", sent, heard, self.reliable)
-        several: list[Sent] = []
-        samples = [self.usual() for _ in range(MOST_CLIENTS)]
-        made = [(one, json.dumps(self.value(one)), self.request(one)) for one in samples]
-        attempts = send_together([[(self.gateway.api.client, request) for _, _, request in made]])[0]
-        for client, (attempt, (one, value, _)) in enumerate(zip(attempts, made, strict=True)):
-            if isinstance(attempt, Exchange):
-                several.append(self.sent_as(one.what, value, attempt, client))
-        heard = self.hear(sum(one.accepted for one in several))
-        yield Burst(self.call, f"messages of {MOST_CLIENTS} clients at once", tuple(several), heard, self.reliable)
+        return Burst(self.call, how, sent, heard, self.reliable)
 
     def malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, and what came of them."""

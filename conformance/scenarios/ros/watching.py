@@ -92,7 +92,7 @@ def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched 
         # At once, so that one that goes back shows; and for so long that one that stands still does.
         for _ in range(_AT_ONCE):
             sent = clock.now()
-            looks.append(Look(sent, gateway.send(gateway.request(call, reads), reads.response_s)))
+            looks.append(Look(sent, gateway.read(call, reads)))
         clock.sleep((within_s + _LATE_S) / number)
     clock.sleep(_COMES_S)
     heard += robot.heard(reads.topic)

@@ -5,11 +5,15 @@ import math
 
 import pytest
 import test_msgs.msg
+import toy_messages
 
+from conformance.rules.ros_gateway.test_topics import order
 from conformance.scenarios.ros.definition import Definition, put_at, shape_of, value_at
+from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker
+from conformance.scenarios.ros.topics import Burst, Sent
 from conformance.scenarios.ros.web import changed, differences, document_of, equal, written
-from conformance.statement.ros_map import Body, RosMap
+from conformance.statement.ros_map import Body, Publishes, RosMap
 from ros_probe.values import described, message_of, plain
 
 TYPES = [f"test_msgs/msg/{name}" for name in dir(test_msgs.msg) if name[0].isupper()]
@@ -131,3 +135,22 @@ def test_shapes_and_pointers():
     assert shape_of("string<22>").longest == 22
     assert value_at(put_at({}, "/a/1/b", 3), "/a/1/b") == 3
     assert value_at({"a": 1}, "/a/b") is None
+
+
+@pytest.mark.parametrize(
+    ("sent", "heard", "holds"),
+    [
+        ("TFFT", "TFFT", []),
+        ("TFF", "FTF", []),
+        ("123", "123", [True] * 2),
+        ("12", "21", [False]),
+        ("123", "13", [True]),
+    ],
+)
+def test_order_is_judged_by_messages_that_differ(sent, heard, holds):
+    ros = RosMap({"POST /a": Publishes(publishes="/a", type="std_msgs/msg/Char")})
+    values = [json.dumps({"data": ord(one)}) for one in sent]
+    requests = tuple(Sent("POST /a", "/a", "a message", one, toy_messages.exchange(), accepted=True) for one in values)
+    came = tuple(Heard(0.0, "message", json.dumps({"data": ord(one)})) for one in heard)
+    trace = (Burst("POST /a", "messages in a row", requests, came),)
+    assert [one.holds for one in order.judge(trace, ros)] == holds

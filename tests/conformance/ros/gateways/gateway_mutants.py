@@ -46,6 +46,8 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "reordered": _STYLES,
     "invalid accepted": _STYLES,
     "invalid published": _STYLES,
+    "message doubled in a crowd": _STYLES,
+    "reordered in a crowd": _STYLES,
     # time
     "stale": _STYLES,
     "empty when stale": _STYLES,
@@ -67,6 +69,8 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "absent service as success": _STYLES,
     "absence remembered": _STYLES,
     "deadlock": _STYLES,
+    "call doubled in a crowd": _STYLES,
+    "last response in a crowd": _STYLES,
     # actions
     "goal doubled": _STYLES,
     "goals mixed": _STYLES,

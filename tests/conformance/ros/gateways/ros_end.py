@@ -7,6 +7,7 @@ import argparse
 import threading
 import time
 import uuid
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -27,6 +28,8 @@ from surface import ACTION, DEADLINE_S, PUBLISHES, READS, SERVICES, STYLES, End
 _LOOK_S = 0.1
 _DEPTH = 100
 _LEAKED = 1
+# So many at once, or within a second, are a crowd.
+_MANY = 17
 
 
 @dataclass
@@ -79,6 +82,7 @@ class RosEnd:
         self._last: dict[str, tuple[Any, float]] = {}
         self._ends: dict[str, Any] = {}
         self._held: list[Any] = []
+        self._waiting, self._recent = 0, deque(maxlen=_MANY)
         self._topics: dict[str, str] = {}
         self._creating = threading.Lock()
         self.node.create_timer(_LOOK_S, self._look)
@@ -161,8 +165,14 @@ class RosEnd:
                 elif len(self._held) == 1:
                     threading.Timer(0.3, self._late, [publisher, message]).start()
                 return
+            self._recent.append(time.monotonic())
+            is_crowd = len(self._recent) == _MANY and self._recent[-1] - self._recent[0] < 1
+            if is_crowd and self.fault == "reordered in a crowd":
+                threading.Timer(0.3 * (len(self._held) % 2), publisher.publish, [message]).start()
+                self._held.append(message)
+                return
             publisher.publish(message)
-            if self.fault == "message doubled":
+            if self.fault == "message doubled" or (is_crowd and self.fault == "message doubled in a crowd"):
                 publisher.publish(message)
 
     def client(self, end: End) -> Any:
@@ -186,7 +196,9 @@ class RosEnd:
         if self.fault == "call dropped":
             future.set_result(empty())
             return future
-        if self.fault == "call doubled":
+        self._waiting += 1
+        is_crowd = self._waiting >= _MANY
+        if self.fault == "call doubled" or (is_crowd and self.fault == "call doubled in a crowd"):
             client.call_async(request)
         if self.fault == "late as success":
             threading.Timer(self.deadline_s / 2, lambda: future.done() or future.set_result(empty())).start()
@@ -265,7 +277,8 @@ class RosEnd:
                 publisher.publish(self._held.pop())
 
     def _served(self, service: str, response: Any) -> Any:
-        if self.fault == "last response":
+        is_crowd, self._waiting = self._waiting >= _MANY, self._waiting - 1
+        if self.fault == "last response" or (is_crowd and self.fault == "last response in a crowd"):
             response, self._last[service] = self._last.get(service, (response, 0.0))[0], (response, 0.0)
         if self.fault == "response as success" and hasattr(response, "success"):
             response.success = True
