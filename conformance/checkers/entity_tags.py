@@ -64,6 +64,8 @@ class EntityTags:
         self._refused = 0
         self._ignored: list[Case] = []
         self._performed: list[Case] = []
+        # By URL: what was read before the last write that was accepted by its tag.
+        self._spent: dict[str, Response] = {}
         # A 304 for a copy that is not the current one, with the tag that was current: the next read decides.
         self._stale: dict[str, tuple[Occasion, str]] = {}
 
@@ -169,6 +171,7 @@ class EntityTags:
             self._stale.clear()
             if answer.ok and occasion.request.method in {"PUT", "PATCH"}:
                 self._wrote[url] = occasion
+        yield from self._at_once(occasion, now, wanted or "")
         if now is not None:
             yield from _performed(occasion, asked)
         if wanted is None or wanted.strip() == "*" or now is None or not _LIST.fullmatch(wanted):
@@ -196,6 +199,20 @@ class EntityTags:
             else:
                 self._performed.append(case)
 
+    def _at_once(self, occasion: Occasion, now: Response | None, wanted: str) -> Iterator[Case]:
+        """Judge a write by a tag that another one has used since it was read, as two clients do at the same moment."""
+        before, status = self._spent.pop(occasion.request.url, None) if now is None else now, occasion.response.status
+        tag = (before.header("etag") if before is not None else None) or "W/"
+        if before is None or tag.startswith("W/") or tag not in _TAG.findall(wanted):
+            return
+        is_done = _has_changed(occasion, before)
+        if now is None and (is_done or status == HTTPStatus.PRECONDITION_FAILED):
+            found, label = f"status {status}, as the write before it by this tag", label_of(occasion.operation)
+            expected = f"a refusal with 412, because another write has changed what {tag} named"
+            yield occasion.case(_MATCH, not is_done, expected, found, cause=f"{label} at once")
+        if is_done:
+            self._spent[occasion.request.url] = before
+
 
 def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
     """Judge a request to what exists that has no If-Match, or one that creates alone (RFC 9110 13.1.2, RFC 6585 3)."""
@@ -214,6 +231,14 @@ def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
     if asked.keys().isdisjoint({"if-match", *_OTHERS}) and is_asked_for and is_decided:
         expected = "a refusal with 428, which the operation declares as well as If-Match"
         yield occasion.case(_REQUIRED, not is_done, expected, cause=f"{operation.label} header If-Match")
+
+
+def _has_changed(occasion: Occasion, before: Response) -> bool:
+    """Return whether the response to a write shows a member as it was sent, which was read otherwise before."""
+    sent, old, new = (read_json(one).value for one in (occasion.request.body, before.body, occasion.response.body))
+    if not occasion.response.ok or not all(isinstance(one, dict) for one in (sent, old, new)):
+        return False
+    return any(name in old and old[name] != value == new.get(name) for name, value in sent.items())
 
 
 def fields_of(occasion: Occasion) -> Fields:

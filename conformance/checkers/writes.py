@@ -39,8 +39,8 @@ _SEEN: Final = 2
 _EXACT: Final = 2**53
 # Doubles that differ by no more are equal; those that differ by more than the second are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
-# By these words a description says what becomes of what a PUT leaves out.
-_GONE: Final = re.compile(
+#: By these words a description says what becomes of what a PUT leaves out.
+GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
 )
@@ -197,7 +197,7 @@ class Writes:
         if write.response.status == _NOT_NOW:
             return
         if JSON_PATCH in request.media_type:
-            yield from self._patched(occasion, change)
+            yield from self._patched(occasion, item, change)
         elif isinstance(change.sent, dict):
             yield from self._owned(occasion, item, change)
             # A schema of a merge patch need not say that null removes.
@@ -230,7 +230,7 @@ class Writes:
         if made:
             yield occasion.case(_KEPT, not wrong, expected, wrong, cause=f"{change.operation.label} refused")
 
-    def _patched(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
+    def _patched(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge a JSON patch that was accepted."""
         operations = change.sent
         try:
@@ -244,13 +244,17 @@ class Writes:
                 yield Case(False, change.write.exchange, expected, found, cause, requirement=_KEPT)  # noqa: FBT003
             return
         yield Case(True, change.write.exchange, "a patch applied as a whole", requirement=_KEPT)  # noqa: FBT003
-        touched = [name for name in made if isinstance(made, dict) and not same(made[name], change.before.get(name))]
+        made = made if isinstance(made, dict) else change.before
+        touched = [name for name in {**change.before, **made} if not same(made.get(name), change.before.get(name))]
         for name in touched:
             kept, is_same = change.now.get(name), same(change.now.get(name), change.before.get(name))
-            far = not same(kept, made[name]) and (isinstance(kept, list) or is_same)
-            if name not in change.moving and name in change.now:
+            # What is removed may have its default.
+            is_free = name not in made and "default" in flat(_parts(item.shape).get(name) or {})
+            far = not same(kept, made.get(name)) and (is_same or (name in made and isinstance(kept, list)))
+            if name not in change.moving and name in change.now and not is_free:
                 wrong = f"{shown(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
-                expected = f"{shown(made[name])} as {name}, as {change.label} asked for (RFC 6902)"
+                asked = f"{shown(made[name])} as {name}" if name in made else f"no {name}"
+                expected = f"{asked}, as {change.label} asked for (RFC 6902)"
                 yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
 
     def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
@@ -318,7 +322,7 @@ class Writes:
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether what a PUT leaves out has its declared default, or is gone where the description says so."""
-        is_said, needed = _GONE.search(change.operation.text), flat(item.shape or {}).get("required", ())
+        is_said, needed = GONE.search(change.operation.text), flat(item.shape or {}).get("required", ())
         for name, part in _parts(change.schema).items():
             given = flat(part) if isinstance(part, dict) else {}
             is_open = "default" not in given and (not is_said or name in needed)

@@ -37,6 +37,7 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
+from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
@@ -47,12 +48,14 @@ _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
 _PARTS: Final = ((("Range", "bytes=-2"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 _GONE_PLACE: Final = "path of what was deleted"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# Files with what programs take for the end of a line, of a text or of a file.
+# Files with what programs take for the end of a line, of a text or of a file, each shorter than the one before.
 _FILES: Final = (
-    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
-    bytes(range(256)) * 17 + b"\r\n\n \0end",
     bytes(range(255, -1, -1)) * 18,
+    bytes(range(256)) * 17 + b"\r\n\n \0end",
+    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
 )
+# As a client sends what it does not know the length of (RFC 9112 7.1).
+_IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
 # Texts of as many octets, with several ends of lines.
 _TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b"end" for word in ("one", "other"))
 # The turn of an identifier that no other check chooses.
@@ -205,13 +208,16 @@ class _Thing:
                 self._refused(change, refusable)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
-            for body in alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone:
+            for turn, body in enumerate(
+                alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
+            ):
                 old = self.tag
-                if self.sent(change, body, *self._current()).ok:
+                if self.sent(change, body, *self._current(None if turn else change)).ok:
                     self.get()
                     if old not in {"", self.tag} and change is changes[0] and not is_behind:
                         is_behind = True
                         self._behind(change, bodies[-1], old)
+            self._at_once(change, bodies)
             waits = True
             for body in self._special(change):
                 before, until = self._members(), time.monotonic() + _SETTLES_S
@@ -251,6 +257,17 @@ class _Thing:
             self.api.client.send(change.method, self.target, headers=headers, body=request.body, authorized=False)
             self.get()
 
+    def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
+        """Write by two clients at the same moment that have the same copy, of which one has to be refused."""
+        names = {one.name.lower() for one in change.parameter("header")}
+        if self._current() and "if-match" in names and len(bodies) > 1:
+            inputs = usual_inputs(change, self.surveyor.values)[0]
+            own = [written(change, replace(inputs, body=body)) for body in bodies[:2]]
+            fields = [tuple(one for one in own[0].headers if one[0].lower() != "if-match"), self._current()]
+            requests = [replace(one, target=self.target, headers=(*fields[0], *fields[1])) for one in own]
+            send_together([[(self.api.client, one) for one in requests]])
+            self.get()
+
     def _other(self, bodies: Sequence[Any]) -> Any:
         """Return a body that would change it; None without any."""
         now = self._members()
@@ -266,17 +283,19 @@ class _Thing:
         self.get()
 
     def filled(self) -> None:
-        """Send a file to what is below it and keeps one, and read that: all octets are those of the file."""
-        above = f"{self.read.template.rstrip('/')}/"
+        """Send files to it, or to what is below it and keeps one, and read that: all octets are those of the file."""
+        own = self.read.template.rstrip("/")
         operations = {(one.method, one.template): one for one in operations_of(self.api.run.contract)}
         for (method, template), read in operations.items():
             put = operations.get(("PUT", template))
-            if method != "GET" or put is None or not template.startswith(above) or "{" in template[len(above) :]:
+            below = template.rstrip("/").removeprefix(own)
+            if method != "GET" or put is None or not f"{template}/".startswith(f"{own}/") or "{" in below:
                 continue
             media_type = next((one for one in put.bodies if keeps_octets(one)), "")
             if not (media_type or _TEXT in put.bodies) or not (allowed(self.api, put) and allowed(self.api, read)):
                 continue
-            path = self.target.rstrip("/") + template[len(above) - 1 :]
+            path = self.target.rstrip("/") + below
+            whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
             files = [(media_type, octets) for octets in _FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
             for kept_as, octets in files:
@@ -288,7 +307,10 @@ class _Thing:
                     break
                 self.in_parts(read, path, more="206" in read.responses and octets is _FILES[-1])
             else:
-                whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+                for _, octets in files[-2:]:
+                    coded = replace(request, body=octets, headers=(*request.headers, _IN_CHUNKS))
+                    self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
+                    self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
                 self._ended(put, read, operations.get(("DELETE", template)), request, whole)
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
@@ -370,9 +392,16 @@ class _Thing:
         if delete is not None:
             other.sent(delete, None, *other._current())
 
-    def _current(self) -> tuple[tuple[str, str], ...]:
-        """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1)."""
-        return (("If-Match", self.tag),) if self.tag and not self.tag.startswith("W/") else ()
+    def _current(self, second: Operation | None = None) -> tuple[tuple[str, str], ...]:
+        """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1).
+
+        Args:
+            second: for this operation it is the second of two tags, if the schema of the field allows a list.
+        """
+        tags = f"{NO_TAG}, {self.tag}"
+        given = [one for one in (second.parameter("header") if second else ()) if one.name.lower() == "if-match"]
+        tags = tags if second is not None and all(fits(one.schema, tags) for one in given) else self.tag
+        return (("If-Match", tags),) if self.tag and not self.tag.startswith("W/") else ()
 
     def deleted(self, delete: Operation | None, lister: Operation | None) -> None:
         """Delete it by a wrong condition, and then by a right one; look for it in the list by each of its filters."""
@@ -388,7 +417,9 @@ class _Thing:
         self._refused(delete)
         if not self.get().ok:
             return
-        self.sent(delete, None, *self._current())
+        if not self.sent(delete, None, *self._current(delete)).ok:
+            self.get()
+            self.sent(delete, None, *self._current())
         self.get(place=_GONE_PLACE)
         head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
         variation = Variation(Kind.ODD, "", _GONE_PLACE, Inputs())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
+from itertools import product
 from typing import Any, Final
 
 from conformance.api.rest.inputs import Inputs, usual_inputs
@@ -14,6 +15,7 @@ from conformance.api.rest.samples import alike_and_apart, fits
 from conformance.api.rest.things import another, is_devices
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
+from conformance.checkers.writes import GONE
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -45,9 +47,8 @@ def special_bodies(
     """
     usual, first = usual_inputs(change, values)[0], now()
     schema = change.bodies[usual.media_type].schema
-    shown = parts_of(read.shape or {})
     if JSON_PATCH in usual.media_type:
-        yield from _patches(schema, shown, now, values, may)
+        yield from _patches(schema, read, now, values, may)
         return
     if not isinstance(usual.body, dict):
         return
@@ -60,7 +61,9 @@ def special_bodies(
     if change.method == "PUT":
         base = {**usual.body, **there}
         yield from half_valid(change, usual, {**base, **changed})
-        yield from _replacing(schema, base, changed, values, may)
+        # A device has no default for what the description says goes.
+        needed = flat(read.shape or {}).get("required", ()) if GONE.search(change.text) else None
+        yield from _replacing(schema, base, changed, values, may, needed)
         return
     if MERGE in usual.media_type:
         yield from _nulls(parts, read, now, values, may)
@@ -75,7 +78,12 @@ def special_bodies(
 
 
 def _replacing(
-    schema: Schema, base: dict[str, Any], changed: dict[str, Any], values: Values, may: Callable[[str], bool]
+    schema: Schema,
+    base: dict[str, Any],
+    changed: dict[str, Any],
+    values: Values,
+    may: Callable[[str], bool],
+    needed: Collection[str] | None,
 ) -> Iterator[dict[str, Any]]:
     """Yield bodies of PUT with other values of all members, with the required members alone, and as it was before."""
     if fits(schema, {**base, **changed}):
@@ -84,7 +92,8 @@ def _replacing(
         other = telling(schema, least, 2, values.collections)
         least |= {name: one for name, one in other.items() if may(name)}
         left_out = [flat(one) for name, one in parts_of(schema).items() if name not in least]
-        if any("default" in one for one in left_out) and fits(schema, least):
+        goes = needed is not None and any(name not in least and name not in needed for name in base)
+        if (goes or any("default" in one for one in left_out)) and fits(schema, least):
             yield least
     if fits(schema, base):
         yield base
@@ -165,9 +174,10 @@ def _nulls(
 
 
 def _patches(
-    schema: Schema, parts: Schema, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
+    schema: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[list[dict[str, Any]]]:
     """Yield JSON patches: right ones, and ones of which an operation fails at the beginning or at the end."""
+    parts = parts_of(read.shape or {})
     first = {name: one for name, one in now().items() if name in parts and may(name)}
     first = {name: one for name, one in first.items() if not is_devices(name, parts[name], values.collections)}
 
@@ -200,13 +210,55 @@ def _patches(
         if rest and fits(parts[name], [*rest, last_item]) and not flat(parts[name]).get("readOnly"):
             makers.append(lambda whole=whole, added=added: [whole, added])  # type: ignore[misc] # bound in its round
             break
+    makers += [
+        lambda: [testing(*unequal), replacing(one, 2)] if (unequal := _turned(now())) else [],
+        lambda: [{"op": "move", **moved} for moved in _moves(read, now(), may)][:1],
+        lambda: [{"op": "remove", "path": _pointer(name)} for name in _optional(read, now(), may)][:1],
+    ]
     for make in makers:
         if (patch := make()) and fits(schema, patch):
             yield patch
-    restored = [{"op": "replace", "path": _pointer(name), "value": first[name]} for name in first]
-    restored = [one for one in restored if now().get(one["path"][1:]) != one["value"] and fits(schema, [one])]
+    there = now()
+    restored = [
+        {"op": "replace" if name in there else "add", "path": _pointer(name), "value": value}
+        for name, value in first.items()
+        if there.get(name) != value
+    ]
+    restored = [one for one in restored if fits(schema, [one])]
     if restored:
         yield restored
+
+
+def _optional(read: Operation, there: dict[str, Any], may: Callable[[str], bool]) -> list[str]:
+    """Return the members of a thing that may be removed from it."""
+    parts, needed = parts_of(read.shape or {}), flat(read.shape or {}).get("required", ())
+    free = [name for name in there if name in parts and name not in needed and may(name)]
+    return [
+        name for name in free if not (flat(parts[name]).get("readOnly") or is_devices(name, parts[name], frozenset()))
+    ]
+
+
+def _moves(read: Operation, there: dict[str, Any], may: Callable[[str], bool]) -> Iterator[dict[str, str]]:
+    """Yield from where to where a value of a thing may be moved: an optional one, or the first item of a list."""
+    parts = parts_of(read.shape or {})
+    free = {name: there[name] for name in _optional(read, there, may)}
+    lists = {name: one for name, one in there.items() if isinstance(one, list) and one and may(name)}
+    sources = [(name, _pointer(name), one) for name, one in free.items()]
+    sources += [
+        (name, f"{_pointer(name)}/0", one[0])
+        for name, one in lists.items()
+        if name in parts and fits(parts[name], one[1:]) and not flat(parts[name]).get("readOnly")
+    ]
+    for (name, pointer, value), target in product(sources, parts):
+        is_usable = target != name and may(target) and not is_devices(target, parts[target], frozenset())
+        if is_usable and not flat(parts[target]).get("readOnly") and fits(parts[target], value):
+            yield {"from": pointer, "path": _pointer(target)}
+
+
+def _turned(there: dict[str, Any]) -> tuple[str, Any] | None:
+    """Return a list of a thing with its items in the opposite order, which is another list (RFC 6902 4.6)."""
+    lists = ((name, one[::-1]) for name, one in there.items() if isinstance(one, list) and one != one[::-1])
+    return next(lists, None)
 
 
 def is_list_of_changes(document: Any, patch: Any) -> bool:
