@@ -57,7 +57,11 @@ See whether it moves and stops as told; this moves it:
 @click.argument("targets", nargs=-1, metavar="[DESCRIPTION] [STATEMENT]")
 @options_of(Group.DEVICE)
 @click.option("--init", is_flag=True, help="Write a commented STATEMENT from the device's descriptions; test nothing.")
-@click.option("--ros", is_flag=True, help="Judge a ROS 2 web gateway by the ROS map in its statement, from both ends.")
+@click.option(
+    "--ros",
+    is_flag=True,
+    help="Judge a ROS 2 web gateway by its ROS map, from both ends; with --init: propose the map.",
+)
 @click.option("--ros-play", is_flag=True, help="The same, with the suite in the robot's place: no robot is needed.")
 @options_of(Group.DEVICE, rare=True)
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")

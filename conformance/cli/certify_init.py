@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import click
 
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.extras import lacking_ros
 from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
+from conformance.statement.ros_map import RosMap
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 from conformance.target.connecting import connection_of
 from conformance.target.describing import fetch_description, is_wsdl
 from conformance.target.naming import DeviceOptions
+from conformance.transport.client import HttpClient
+from ros_probe.process import ProbeError
 
 
 def init(path: Path | None, chosen: Statement, contract: Contract, *, force: bool) -> CommandResult:
@@ -56,18 +61,27 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         UnreachableError: the server of the description does not respond.
     """
     from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
+    from conformance.engine.first_ros import ros_proposals  # noqa: PLC0415 - as above
 
     if is_wsdl(source) or source == options.wsdl:
         raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
     path = _new_file(path, force=force)
     where = options.applied(Endpoints())
+    if options.ros and (problem := lacking_ros("proposing a ROS map")):
+        raise click.UsageError(problem)
     api = Api(overlays=options.overlays, base_url=options.base_url or where.rest)
     try:
         found = fetch_description(
             source, api.overlays, connection_of(where), api.base_url, allow_files=options.allow_files
         )
-        write_described_statement(path, found, api, Calls(options.allow, options.never))
-    except OSError as error:
+        base_url = api.base_url or found.base_url
+        if options.ros and not base_url:
+            raise StatementError(f"{source} does not say where the operations are: give --base-url")
+        client = HttpClient(base_url or "", connection_of(where))
+        domain_id = RosMap({}, options.ros_domain_id).domain
+        ros = partial(ros_proposals, domain_id=domain_id, client=client) if options.ros else None
+        write_described_statement(path, found, api, Calls(options.allow, options.never), ros)
+    except (OSError, ProbeError) as error:
         raise StatementError(str(error)) from error
     for remark in (*found.remarks, *found.unread):
         click.echo(inert(remark), err=True)

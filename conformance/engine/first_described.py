@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,15 @@ never = [{never}]
 {motion}
 [values]
 # Values for parameters that the description gives none for. Without them, ids are taken from what the device lists.
-{values}"""
+{values}{ros}"""
+_ROS = """
+# Which operation is what of the ROS graph: docs/ros-gateway.md. What is a guess is a comment.
+"""
 
 
-def write_described_statement(path: Path, found: Description, api: Api, calls: Calls) -> None:
+def write_described_statement(
+    path: Path, found: Description, api: Api, calls: Calls, ros: Callable[[Sequence[Operation]], Iterator[str]] | None
+) -> None:
     """Write a commented statement for a device with a description.
 
     Args:
@@ -60,6 +65,7 @@ def write_described_statement(path: Path, found: Description, api: Api, calls: C
         found: the description.
         api: overlays and base URL as the options give them.
         calls: what may be called as the options say it.
+        ros: makes the lines of a ROS map of the operations; None: there is none.
 
     Raises:
         DescriptionError: the description is malformed.
@@ -86,6 +92,12 @@ def write_described_statement(path: Path, found: Description, api: Api, calls: C
             never=", ".join(map(basic_string, calls.never)),
             motion="".join(f"# {line}".rstrip() + "\n" for line in _motion(operations)),
             values="".join(f"{line}\n" for line in _values(operations)) or "# id = [1, 2]\n",
+            ros=_ROS
+            + "".join(
+                f"{line}\n" for line in ros([one for one in operations if one.method != "GET" or rules.decide(one).may])
+            )
+            if ros
+            else "",
         ),
     )
 

@@ -27,7 +27,7 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     What is sent and what is read are taken for one axis if they have the same name.
     """
     reading = [item for item in operations if item.method == "GET" and not item.parameter("path") and item.shape]
-    sending = [(item, body) for item in operations if (body := _body(item)) is not None and _acts(item)]
+    sending = [(item, body) for item in operations if (body := body_of(item)) is not None and _acts(item)]
     goes = _best(reading, [one for one in sending if _GOES.search(one[0].label)])
     drives = next((one for one in sending if _DRIVES.search(one[0].label) and dict(_numbers(one[1]))), None)
     if goes is None:
@@ -89,7 +89,7 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
         yield ""
         yield "[motion.stop]"
         yield f"send = {basic_string(found.label)}"
-        body = _body(found)
+        body = body_of(found)
         if body is not None:
             yield f"body = {inline(_template(body, set()))}  # an id of the move: " + '"{goto:/id}"'
         yield "rests_within_s = 0.5"
@@ -99,7 +99,8 @@ def _acts(operation: Operation) -> bool:
     return not operation.safe and not operation.never and "{" not in operation.template
 
 
-def _body(operation: Operation) -> Schema | None:
+def body_of(operation: Operation) -> Schema | None:
+    """Return the schema of the JSON that an operation takes; None: it takes none."""
     return next((one.schema for name, one in operation.bodies.items() if is_json(name)), None)
 
 
@@ -117,18 +118,18 @@ def _best(
     return best if best and best[2] else None
 
 
-def _parts(schema: Schema) -> Iterator[Schema]:
+def parts_of(schema: Schema) -> Iterator[Schema]:
     """Yield a schema and its alternatives."""
     yield schema
     for word in ("allOf", "anyOf", "oneOf"):
         for part in schema.get(word, ()):
             if isinstance(part, dict):
-                yield from _parts(part)
+                yield from parts_of(part)
 
 
 def _numbers(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:
     """Yield the JSON pointers of the numbers in an object, with their schemas."""
-    for part in _parts(schema) if depth else ():
+    for part in parts_of(schema) if depth else ():
         for name, member in part.get("properties", {}).items():
             place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
             if isinstance(member, dict) and is_numeric(member):
@@ -138,7 +139,7 @@ def _numbers(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tupl
 
 
 def _stamps(schema: Schema) -> list[str]:
-    found = [f"/{name}" for part in _parts(schema) for name in part.get("properties", {}) if _STAMP.search(name)]
+    found = [f"/{name}" for part in parts_of(schema) for name in part.get("properties", {}) if _STAMP.search(name)]
     return found[:1]
 
 

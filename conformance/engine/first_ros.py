@@ -1,0 +1,422 @@
+"""``roaas certify --init --ros``: a ROS map as the description and the live graph suggest it, for a person to check.
+
+An operation is taken for the topic, service or action whose fields its schemas have, by name and type, and whose name
+its path or operationId shares. What is left to guess becomes a comment.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+from conformance.contract.toml_file import basic_string
+from conformance.documents.json_schema import Schema, kinds_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation
+from conformance.engine.first_motion import body_of, parts_of
+from conformance.engine.map_text import inline
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, value_at
+from conformance.scenarios.ros.robot import ProbeError, Robot
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import NoAnswerError
+
+# Of a schema, as many fields and levels are read; a comment names so many ends of the graph.
+_LEAVES: Final = 500
+_DEPTH: Final = 8
+_NAMED: Final = 3
+# A type with fewer fields is not known by them.
+_FEW: Final = 4
+# A read; what is on the graph is found so soon; nothing more came for so long, s.
+_READ_S: Final = 3.0
+_DISCOVERY_S: Final = 15.0
+_SETTLES_S: Final = 1.0
+# What each node has, and parts of actions.
+_COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
+_PARAMETER: Final = re.compile(r"\{[^{}]*\}")
+_CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
+_SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
+#: How words for the states of a goal begin, and the numbers of action_msgs/msg/GoalStatus.
+_STATES: Final = {
+    "running": r"run|exec|activ|accept|pend|work|cancell?ing|[123]$",
+    "succeeded": r"succe|done|compl|finish|4$",
+    "canceled": r"cancel|stop|preempt|5$",
+    "aborted": r"abort|fail|error|6$",
+    "rejected": r"reject|refus|deni",
+}
+
+
+class Graph(NamedTuple):
+    """What is on the ROS graph: types by the names of topics, services and actions; and the definition of a type."""
+
+    topics: dict[str, str]
+    services: dict[str, str]
+    actions: dict[str, str]
+    definition: Callable[[str], Definition]
+
+    def fitting(self, schema: Schema | None, ends: dict[str, str], part: str = "") -> dict[str, Fit]:
+        """Return how a schema has the fields of each end's type, or of a part of it, by name."""
+        found = {}
+        for name, type_ in ends.items():
+            with suppress(ProbeError):  # the type is not installed
+                fit = _fit(schema, self.definition(type_ + part))
+                if fit is not None and not (part and fit.lacks):
+                    found[name] = fit
+        return found
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a schema has the fields of a message.
+
+    Attributes:
+        at: where the message is.
+        fields: the map's key `fields`; empty: the names are those of the message.
+        size: how many fields both have.
+        lacks: how many fields of the message the schema lacks.
+        forms: how it writes numbers and octets, by key of the map.
+    """
+
+    at: str
+    fields: dict[str, str]
+    size: int
+    lacks: int
+    forms: dict[str, str]
+
+    @property
+    def keys(self) -> dict[str, Any]:
+        """The keys of the map that say it."""
+        return {name: value for name, value in (("at", self.at), ("fields", self.fields)) if value}
+
+
+@dataclass
+class _Proposal:
+    """The table of one operation, how it writes numbers and octets, and why it is a guess; empty: it is none."""
+
+    keys: dict[str, Any]
+    forms: dict[str, str] = field(default_factory=dict)
+    guess: str = ""
+
+
+def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpClient) -> Iterator[str]:
+    """Yield the lines of a ROS map by the graph of a domain, after each operation that may be called was read once.
+
+    Raises:
+        ProbeError: the suite's node cannot be started.
+    """
+    read: dict[str, Any] = {}
+    for one in operations:
+        if one.method == "GET" and one.shape is not None and "{" not in one.template and not one.never:
+            # A gateway may subscribe only when somebody asks.
+            with suppress(NoAnswerError):
+                exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
+                read[one.label] = read_json(exchange.response.body).value
+    robot = Robot(domain_id, "roaas_init")
+    try:
+        robot.await_ready()
+        told = _settled(robot)
+        topics = {name: one["types"] for name, one in told["topics"].items()}
+        topics, services, actions = (
+            {name: types[0] for name, types in named.items() if types and not _COMMON.search(name)}
+            for named in (topics, told["services"], told["actions"])
+        )
+        graph = Graph(topics, services, actions, robot.definition)
+        yield from proposed_ros_map(operations, graph, domain_id, read)
+    finally:
+        robot.close()
+
+
+def _settled(robot: Robot) -> dict[str, Any]:
+    """Return what is on the graph, when other nodes were found and no more come."""
+    until, seen = WALL_CLOCK.now() + _DISCOVERY_S, robot.tell("graph")
+    while True:
+        WALL_CLOCK.sleep(_SETTLES_S)
+        now = robot.tell("graph")
+        if (now["nodes"] and now == seen) or WALL_CLOCK.now() > until:
+            return now
+        seen = now
+
+
+def proposed_ros_map(
+    operations: Sequence[Operation], graph: Graph, domain_id: int, read: dict[str, Any]
+) -> Iterator[str]:
+    """Yield the lines of a ROS map, with a comment for each operation that is a guess, or no part of it.
+
+    Args:
+        operations: of the description.
+        graph: the ROS graph.
+        domain_id: its domain.
+        read: what operations returned, by label.
+    """
+    found: dict[str, _Proposal] = {}
+    followers: set[str] = set()
+    written: set[str] = set()
+    # What is published is known first: another operation hardly reads it.
+    for one in sorted(operations, key=lambda item: item.method == "GET"):
+        if "{" in one.template:
+            continue
+        if one.method in _SENDS:
+            proposal = _goal(one, operations, graph, followers) or _call(one, graph) or _topic(one, graph, written)
+        else:
+            proposal = _lists(one, graph, read.get(one.label)) or _topic(one, graph, written)
+        if proposal:
+            found[one.label] = proposal
+            written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
+    sure = [one for one in found.values() if not one.guess]
+    sign = "" if sure else "# "
+    yield f"{sign}[ros]"
+    yield f"{sign}domain_id = {domain_id}"
+    for name in ("non_finite", "integers", "bytes"):
+        forms = {one.forms[name] for one in sure if name in one.forms}
+        yield from (f"{name} = {basic_string(form)}" for form in forms if len(forms) == 1)
+    yield ""
+    yield f"{sign}[ros.operations]"
+    for one in operations:
+        if one.label in found:
+            proposal = found[one.label]
+            comment = "# " if proposal.guess else ""
+            yield from [f"# A guess: {proposal.guess}"] if proposal.guess else []
+            yield f"{comment}{basic_string(one.label)} = {inline(proposal.keys)}"
+        elif one.label not in followers:
+            yield f"# {''.join(char if char.isprintable() else ' ' for char in one.label)}: {_why_not(one, graph)}"
+
+
+def _why_not(one: Operation, graph: Graph) -> str:
+    schema = one.shape if one.method == "GET" else body_of(one)
+    if "{" in one.template:
+        return "its path has a parameter: write an operation for each value, as in GET /topics/odom"
+    if one.method != "GET" and one.method not in _SENDS:
+        return "it reads nothing and sends nothing, unless it cancels a goal"
+    if schema is None or not any(at for at, _ in _leaves(schema)):
+        return "its schema names no fields"
+    ends = f"{len(graph.topics)} topics, {len(graph.services)} services and {len(graph.actions)} actions"
+    return f"nothing on the graph has its fields, of {ends}"
+
+
+def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal | None:
+    """Return the proposal that an operation reads a topic, or publishes on it."""
+    reads = one.method == "GET"
+    fits = graph.fitting(one.shape if reads else body_of(one), graph.topics)
+    # Some fields of any message may be some of an operation, if not its name says so.
+    fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared(one, name)}
+    name, guess = _best(one, fits, written if reads else ())
+    if not name:
+        return None
+    absent = [int(status) for status in one.responses if status in {"404", "503"}] if reads else []
+    keys = {"topic" if reads else "publishes": name, "type": graph.topics[name]} | fits[name].keys
+    return _Proposal(keys | ({"absent": absent} if absent else {}), fits[name].forms, guess)
+
+
+def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -> tuple[str, str]:
+    """Return the end of the graph that an operation fits best, and why that is a guess; empty: there is none."""
+
+    def rank(name: str) -> tuple[bool, bool, int, float]:
+        return name not in written, not fits[name].lacks, fits[name].size, _shared(one, name)
+
+    name, *others = sorted(fits, key=rank, reverse=True) or [""]
+    equal = [other for other in others if rank(other) == rank(name)]
+    if equal:
+        return name, f"{', '.join(equal[:_NAMED])} would do as well."
+    if name in written:
+        return name, "another operation publishes on this topic."
+    alike = any(fits[other].size == fits[name].size for other in others)
+    if name and not _shared(one, name) and (alike or fits[name].size < _FEW):
+        return name, "the fields agree, but not the name."
+    return name, ""
+
+
+def _call(one: Operation, graph: Graph) -> _Proposal | None:
+    """Return the proposal that an operation calls a service."""
+    requests = graph.fitting(body_of(one), graph.services, "#Request")
+    responses = graph.fitting(one.shape, {name: graph.services[name] for name in requests}, "#Response")
+    name, guess = _best(one, {name: fit for name, fit in responses.items() if not fit.fields})
+    if not name:
+        return None
+    keys = {"service": name, "type": graph.services[name]} | requests[name].keys
+    result = {"result": responses[name].at} if responses[name].at else {}
+    return _Proposal(keys | result, requests[name].forms | responses[name].forms, guess)
+
+
+def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followers: set[str]) -> _Proposal | None:
+    """Return the proposal that an operation sends goals to an action; those that follow a goal go to ``followers``."""
+    fits = graph.fitting(body_of(one), graph.actions, "#Goal")
+    name, guess = _best(one, fits)
+    id_ = next((at for at, _ in _leaves(one.shape or {}) if re.search(r"[/_]u?u?id$", at)), None)
+    if not name or id_ is None:
+        return None
+    keys = {"action": name, "type": graph.actions[name]} | fits[name].keys | {"id": id_}
+    forms = dict(fits[name].forms)
+    goal = re.compile(re.escape(one.template.rstrip("/")) + r"/\{[^{}]+\}(/[^{}]*)?")
+    for other in (other for other in operations if goal.fullmatch(other.template)):
+        call = f"{other.method} {_PARAMETER.sub('{id}', other.template)}"
+        cancels = other.method == "DELETE" if other.template.endswith("}") else _CANCELS.search(other.template)
+        if cancels and other.method != "GET":
+            keys["cancel"] = call
+        elif other.method == "GET" and other.shape is not None and "state" not in keys:
+            states = ((at, leaf) for at, leaf in _leaves(other.shape) if re.search("/(state|status|phase)$", at))
+            at, leaf = next(states, ("", {}))
+            keys |= {"state": {"read": call, "at": at} | _states(leaf)} if at else {}
+            for part in ("Feedback", "Result") if at else ():
+                for fit in graph.fitting(other.shape, {name: graph.actions[name]}, f"#{part}").values():
+                    keys |= {part.lower(): fit.at} if fit.at and not fit.fields else {}
+                    forms |= fit.forms
+        else:
+            continue
+        followers.add(other.label)
+    return _Proposal(keys, forms, guess)
+
+
+def _states(leaf: Schema) -> dict[str, list[str]]:
+    """Return the words of a schema for the states of a goal."""
+    found: dict[str, list[str]] = {}
+    for word in (str(word) for part in parts_of(leaf) for word in part.get("enum", ())):
+        state = next((name for name, begins in _STATES.items() if re.match(begins, word.lower())), None)
+        if state:
+            found.setdefault(state, []).append(word)
+    return found
+
+
+def _lists(one: Operation, graph: Graph, read: Any) -> _Proposal | None:
+    """Return the proposal that an operation lists what is on the graph, if it has all of one kind."""
+    for at, leaf in _leaves(one.shape or {}):
+        items = _items(leaf)
+        members = dict(_leaves(items)) if items else {}
+        listed = value_at(read, at)
+        for kind, ends in (("topics", graph.topics), ("services", graph.services), ("actions", graph.actions)):
+            for name in members if ends and isinstance(listed, list) else ():
+                if {*ends} <= {str(value_at(item, name)) for item in listed}:
+                    type_ = next((other for other in members if re.search("type|kind", other)), "")
+                    places = {"at": at, "name": name, "type": type_}
+                    return _Proposal({"lists": kind} | {key: place for key, place in places.items() if place})
+    return None
+
+
+def _shared(one: Operation, name: str) -> float:
+    """Return the share of the words in a ROS name that an operation's path or id has; "vel" is "velocity"."""
+    own = re.findall("[a-z]+", name.lower())
+    web = re.findall("[a-z]+", re.sub("([a-z])([A-Z])", r"\1 \2", f"{one.template} {one.id}").lower())
+    return sum(any(_is_word(*sorted((word, other), key=len)) for other in web) for word in own) / max(1, len(own))
+
+
+def _is_word(short: str, long: str) -> bool:
+    return short == long or (len(short) > 2 and long.startswith(short))  # noqa: PLR2004 - shorter ones begin anything
+
+
+def _fit(schema: Schema | None, definition: Definition, message: str = "") -> Fit | None:
+    """Return how a schema has the fields of a message, where in it it has most; None: it is another message.
+
+    Args:
+        schema: of a body, or an item of an array.
+        definition: of a type.
+        message: a type in it; empty: itself.
+    """
+    own = dict(_own_leaves(definition, message))
+    if not own:
+        return Fit("", {}, 0, 0, {})
+    leaves = dict(_leaves(schema or {}))
+    steps = [at.split("/")[:-1] for at in leaves]
+    best: Fit | None = None
+    for place in sorted({"/".join(one[:end]) for one in steps for end in range(1, len(one) + 1)}):
+        below = {at.removeprefix(place): leaf for at, leaf in leaves.items() if at.startswith(f"{place}/")}
+        pairs, forms = _pairs(below, own), dict[str, str]()
+        lacks = len(own) - len(pairs)
+        # A part of a message is all that the body has, and no small part of another one.
+        fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(leaves))
+        larger = len(pairs) > (best.size if best else 0)
+        if fits and larger and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items()):
+            best = Fit(place, _fields(pairs, own), len(pairs), lacks, forms)
+    return best
+
+
+def _pairs(leaves: Collection[str], own: Collection[str]) -> dict[str, str]:
+    """Return the position in a message of each field of a schema that has one.
+
+    A field is known by its path however its words are written, or by the end of a path that no other field has.
+    """
+    by_key: dict[str, set[str]] = {}
+    for pointer in own:
+        steps = pointer.split("/")[1:]
+        for first in range(len(steps)):
+            by_key.setdefault(_key("".join(steps[first:])), set()).add(pointer)
+    found: dict[str, str] = {}
+    for web in leaves:
+        named = by_key.get(_key(web), set())
+        exact = {pointer for pointer in named if _key(pointer) == _key(web)} or named
+        if len(exact) == 1 and not exact <= {*found.values()}:
+            found[web] = next(iter(exact))
+    return found
+
+
+def _key(text: str) -> str:
+    return re.sub("[^a-z0-9]", "", text.lower())
+
+
+def _fields(pairs: dict[str, str], own: Collection[str]) -> dict[str, str]:
+    """Return the map's key `fields` for pairs of fields: what is alike below two positions goes by them."""
+    if len(pairs) == len(own) and all(web == one for web, one in pairs.items()):
+        return {}
+    found: dict[str, str] = {}
+    for web, one in pairs.items():
+        here, there = web, one
+        while here.rpartition("/")[2] == there.rpartition("/")[2]:
+            above, over = here.rpartition("/")[0], there.rpartition("/")[0]
+            below = [other.removeprefix(over) for other in own if other.startswith(f"{over}/")]
+            if not above or not over or any(pairs.get(above + rest) != over + rest for rest in below):
+                break
+            here, there = above, over
+        found[here] = there
+    return found
+
+
+def _own_leaves(definition: Definition, message: str = "", at: str = "") -> Iterator[tuple[str, Shape]]:
+    """Yield the fields of a message that are no messages themselves, by position."""
+    for name, shape in definition.fields(message):
+        if shape.is_message and not shape.is_array:
+            yield from _own_leaves(definition, shape.item, f"{at}/{name}")
+        else:
+            yield f"{at}/{name}", shape
+
+
+def _leaves(schema: Schema) -> Iterator[tuple[str, Schema]]:
+    """Yield the fields of a schema that are no objects, by position; itself if it is none."""
+    left: list[tuple[str, Schema]] = [("", schema)]
+    for _ in range(_LEAVES):
+        if not left:
+            return
+        at, one = left.pop(0)
+        members = {name: member for part in parts_of(one) for name, member in part.get("properties", {}).items()}
+        if members and at.count("/") < _DEPTH:
+            places = {f"{at}/{name.replace('~', '~0').replace('/', '~1')}": member for name, member in members.items()}
+            left[:0] = [(place, member) for place, member in places.items() if isinstance(member, dict)]
+        else:
+            yield at, one
+
+
+def _items(schema: Schema) -> Schema | None:
+    return next((part["items"] for part in parts_of(schema) if isinstance(part.get("items"), dict)), None)
+
+
+def _has_type(leaf: Schema, shape: Shape, definition: Definition, forms: dict[str, str]) -> bool:
+    """Return whether a schema is that of a field; note how it writes numbers and octets."""
+    kinds, items, parts = kinds_of(leaf), _items(leaf), list(parts_of(leaf))
+    if shape.is_octets:
+        forms["bytes"] = "array" if "array" in kinds else "base64"
+        return not kinds.isdisjoint({"string", "array"})
+    if shape.is_array:
+        if items is None or not shape.is_message:
+            return items is not None and _has_type(items, Shape(shape.item), definition, forms)
+        found = _fit(items, definition, shape.item)
+        forms |= found.forms if found else {}
+        return found is not None and not (found.at or found.fields or found.lacks)
+    if shape.item in LONG:
+        forms["integers"] = "string" if "string" in kinds else "number"
+    if shape.item in FLOATS and any("NaN" in part.get("enum", ()) for part in parts):
+        forms["non_finite"] = "string"
+    elif shape.item in FLOATS and any("null" in (part.get("type"), *part.get("type", ())) for part in parts):
+        forms["non_finite"] = "null"
+    wanted = {"integer", "number"} if shape.item in INTEGERS else {"number"} if shape.item in FLOATS else {shape.item}
+    wanted |= {"string"} if shape.is_text or shape.item in LONG else set()
+    return not kinds.isdisjoint(wanted)

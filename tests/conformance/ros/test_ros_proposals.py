@@ -1,0 +1,142 @@
+"""``roaas certify --init --ros``: the map that is proposed of a right gateway is its own, and a run with it passes."""
+
+import json
+import sys
+import threading
+import tomllib
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+from gateway_processes import gateway
+from processes import ended
+
+from ros_probe.process import RosProcess
+
+#: What no description says.
+UNSAID = ("max_age_s", "rejected")
+
+
+def _proposed(url, folder, domain_id):
+    """Return the statement that is written, and what it says."""
+    path = folder / "proposed.toml"
+    more = ["--init", "--ros", "--ros-domain-id", domain_id, path]
+    done = ended(sys.executable, "-m", "roaas", "certify", url, *more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return path, tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("style", ["fastapi", "aiohttp", "flask", "node"])
+def test_the_map_of_a_right_gateway_is_found(tmp_path, domain_id, style):
+    with gateway(style, domain_id, tmp_path) as statement:
+        own = tomllib.loads(statement.read_text(encoding="utf-8"))
+        _, found = _proposed(own["api"]["openapi"], tmp_path, domain_id)
+    empty = ("", [])
+    wanted = {
+        call: {key: value for key, value in table.items() if key not in UNSAID and value not in empty}
+        for call, table in own["ros"]["operations"].items()
+    }
+    assert found["ros"]["operations"] == wanted
+    assert found["ros"].items() <= (own["ros"] | {"operations": wanted}).items()
+
+
+STAMP = {"type": "object", "properties": {"sec": {"type": "integer"}, "nanosec": {"type": "integer"}}}
+HEADER = {"type": "object", "properties": {"stamp": STAMP, "frameId": {"type": "string"}}}
+PLACE = {"header": HEADER} | {name: {"type": "number"} for name in ("pointX", "pointY", "pointZ")}
+VELOCITY = {f"{part}{axis}": {"type": "number"} for part in ("linear", "angular") for axis in "XYZ"}
+
+
+def _paths():
+    def content(members):
+        return {"content": {"application/json": {"schema": {"type": "object", "properties": members}}}}
+
+    done = {"200": {"description": "done"} | content({}), "422": {"description": "refused"} | content({})}
+    read = {"200": {"description": "a place"} | content(PLACE), "404": {"description": "none"} | content({})}
+    return {
+        "/place": {"get": {"responses": read}},
+        "/cmd/velocity": {"post": {"requestBody": {"required": True} | content(VELOCITY), "responses": done}},
+        "/halt": {"post": {"requestBody": content({"hard": {"type": "boolean"}}), "responses": done}},
+        "/places/{id}": {"get": {"responses": read}},
+    }
+
+
+@contextmanager
+def _renaming(domain_id):
+    """Serve a gateway whose names are not those of ROS, and yield its URL."""
+    ros, lock, last = RosProcess("gateway", domain_id=domain_id), threading.Lock(), {}
+    ros.await_ready()
+    ros.tell("listen", topic="/robot1/place", type="geometry_msgs/msg/PointStamped")
+    twist = {"topic": "/robot1/cmd_vel", "type": "geometry_msgs/msg/Twist"}
+    ros.tell("publish", **twist)
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version, disable_nagle_algorithm = "HTTP/1.1", True
+
+        def answer(self, status, value):
+            octets = json.dumps(value).encode()
+            self.send_response(status)
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(octets)))
+            self.end_headers()
+            self.wfile.write(octets)
+
+        def do_GET(self):
+            with lock:
+                for _, _, value in ros.tell("heard", name="/robot1/place")["events"]:
+                    header, point = value["header"], value["point"]
+                    last.update({"header": {"stamp": header["stamp"], "frameId": header["frame_id"]}})
+                    last.update({f"point{axis.upper()}": one for axis, one in point.items()})
+            if self.path == "/openapi.json":
+                self.answer(200, {"openapi": "3.1.0", "info": {"title": "x", "version": "1"}, "paths": _paths()})
+            else:
+                self.answer(*((200, last) if last and self.path == "/place" else (404, {})))
+
+        def do_POST(self):
+            try:
+                body = json.loads(self.rfile.read(int(self.headers.get("Content-Length") or 0)))
+                right = body.keys() == VELOCITY.keys() and all(type(one) in {int, float} for one in body.values())
+            except (ValueError, AttributeError):
+                right = False
+            if right:
+                parts = {
+                    part: {axis: float(body[f"{part}{axis.upper()}"]) for axis in "xyz"}
+                    for part in ("linear", "angular")
+                }
+                with lock:
+                    ros.tell("publish", **twist, values=[parts])
+            self.answer(200 if right else 422, {})
+
+        def log_message(self, *_):
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/openapi.json"
+        server.shutdown()
+    ros.close()
+
+
+def test_names_that_differ_are_mapped_and_a_run_with_the_map_passes(tmp_path, domain_id):
+    with _renaming(domain_id) as url:
+        path, found = _proposed(url, tmp_path, domain_id)
+        selected = [f"ros-gateway/{one}" for one in ("read-exact", "write-exact", "once", "absent")]
+        options = ["--ros-play", "--effort", "quick", "--out", tmp_path / "out"]
+        options += [word for one in selected for word in ("--select", one)]
+        done = ended(sys.executable, "-m", "roaas", "certify", path, *options)
+    tables = found["ros"]["operations"]
+    assert tables["GET /place"]["fields"] == {
+        "/header/stamp": "/header/stamp", "/header/frameId": "/header/frame_id",
+        "/pointX": "/point/x", "/pointY": "/point/y", "/pointZ": "/point/z",
+    }  # fmt: skip
+    assert tables["POST /cmd/velocity"]["fields"] == {
+        f"/{part}{axis.upper()}": f"/{part}/{axis}" for part in ("linear", "angular") for axis in "xyz"
+    }
+    for line in (
+        "# POST /halt: nothing on the graph has its fields, of 2 topics, 0 services and 0 actions",
+        "# GET /places/{id}: its path has a parameter: write an operation for each value",
+    ):
+        assert line in path.read_text(encoding="utf-8")
+    verdicts = {
+        one["id"]: one["verdict"] for one in json.loads((tmp_path / "out" / "result.json").read_text())["requirements"]
+    }
+    assert {verdicts[one] for one in selected} == {"pass"}, done.stdout
