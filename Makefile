@@ -3,9 +3,8 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := out
-# How many processes share the tests: two for each processor, because a test waits for half of its time. With three,
-# a load test's requests ran into their deadline.
-WORKERS ?= $(shell echo $$((2 * $$(nproc))))
+# How many processes share the tests: three for each processor, because a test waits for half of its time.
+WORKERS ?= $(shell echo $$((3 * $$(nproc))))
 # The newest Python that is there, from 3.11 up; or say which: make PYTHON=/path/to/python3.12 install
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null && command -v $$p && break; done)
@@ -74,11 +73,9 @@ $(VENV)/.installed: $(VENV)/.demo
 demo: $(VENV)/.demo
 	$(BIN)/python demo.py --out $(OUT)
 
-# Types are checked beside the tests: mypy keeps one processor busy, and tests wait for half of their time. What lint
-# finds, it finds first.
+# Style and types are checked beside the tests, which wait for half of their time.
 test: install browser servers
-	@$(MAKE) --no-print-directory style
-	@$(MAKE) --no-print-directory --jobs=2 types tests
+	@$(MAKE) --no-print-directory --jobs=3 style types tests
 
 lint: style types
 

@@ -8,7 +8,9 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
+from _pytest.terminal import TerminalReporter
 from hypothesis import settings
+from xdist.scheduler import LoadFileScheduling
 
 from conformance.commandline.secrecy import SECRETS
 from proof.selftest.robots import own_domain
@@ -24,6 +26,45 @@ if hasattr(signal, "SIGQUIT"):
 
 # Folders whose tests start whole commands: few tests that take long. One that began last would run alone at the end.
 _OF_COMMANDS = {"ci", "first_verdict", "hostile", "loadtests", "motion", "selftest"}
+
+
+# Load tests measure. However many processes share the tests, two at most run at a time: one of these, one of the rest.
+_HALF_OF_LOAD_TESTS = ("tests/loadtests/test_load_command.py", "tests/loadtests/test_load_workers.py")
+
+
+class _Sharing(LoadFileScheduling):
+    """Give each process whole modules, and all load tests to two processes."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        module = super()._split_scope(nodeid)
+        if not module.startswith("tests/loadtests/test_load_"):
+            return module
+        return f"load tests, {module in _HALF_OF_LOAD_TESTS}"
+
+
+@pytest.hookimpl(optionalhook=True)  # of a plugin
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileScheduling:
+    """Return what shares the tests among the processes."""
+    return _Sharing(config, log)
+
+
+class _Failures:
+    """Names each failing test at once; pytest names them in the end."""
+
+    def __init__(self, terminal: TerminalReporter) -> None:
+        self._terminal = terminal
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Write the name of a test that failed."""
+        if report.failed:
+            self._terminal.write_line(f"\nfailed: {report.nodeid}")
+
+
+@pytest.hookimpl(trylast=True)  # pytest makes the reporter in this hook
+def pytest_configure(config: pytest.Config) -> None:
+    """Name failing tests where there is a terminal to write to: a process that shares the tests has none."""
+    if terminal := config.pluginmanager.get_plugin("terminalreporter"):
+        config.pluginmanager.register(_Failures(terminal))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
