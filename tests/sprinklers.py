@@ -36,6 +36,7 @@ _SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "addit
 _PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
 _READ = "description/written-is-read"
 _STATES = ["idle", "running", "paused", "done"]
+_SAID = "A retry with its key gets the first answer. A request that is refused does not use up its key."
 _LOG = "".join(f"{number:04} valve opened\n" for number in range(40)).encode()
 
 
@@ -126,6 +127,7 @@ class Sprinklers:
             asks = self.style.get("asks", True) and not self.has("a missing If-Match is taken")
             return error(428, "If-Match is missing") if asks else None
         tags = re.findall(r'(?:W/)?"[^"]*"', wanted)
+        tags = tags[:1] if self.has("the first tag alone counts") else tags
         holds = wanted.strip() == "*" or (tag in tags and not tag.startswith("W/"))
         if self.has("If-Match takes a weak tag"):
             holds |= f"W/{tag}" in tags
@@ -148,7 +150,7 @@ class Sprinklers:
 
     async def body(self, request, *, whole):
         """Return the valid members of a request's body, or the refusal."""
-        if request.content_type != "application/json":
+        if request.content_type != "application/json" and not self.has("any content type is taken"):
             return error(415, "JSON only", Accept="application/json")
         try:
             value = json.loads(await request.read(), parse_constant=lambda text: int(text, 99))
@@ -250,6 +252,8 @@ class Sprinklers:
         if isinstance(body, web.Response):
             if body.status == 415 and self.has("what is refused with 415 is created"):
                 self.add(self.taken(_forced(await request.read())))
+            if key is not None and self.has("a refusal spends its key"):
+                self.keys[key] = {}, {"id": "none"}
             return body
         if (known := self.answer_of(key, body)) is not None:
             return known
@@ -279,7 +283,8 @@ class Sprinklers:
             return error(409, "done before")
         if self.has("a repeated key acts and says nothing"):
             self.add(self.taken(body))
-        return self.again(201, value)
+        is_new = self.has("a retry gets the thing as it is now") and value["id"] in self.zones
+        return self.again(201, self.shown(value["id"]) if is_new else value)
 
     def again(self, status, value):
         fields = {"Location": f"/zones/{value['id']}", **self.headers(value)}
@@ -319,20 +324,22 @@ class Sprinklers:
         tags = {"*", *self.headers(self.shown(id_)).values()}
         if none is not None and none.strip() in tags and not self.has("If-None-Match: * is not looked at"):
             return error(412, "there is one")
-        return self.written(request, id_, {**_FIRST, **self.taken(body)})
+        return await self.written(request, id_, {**_FIRST, **self.taken(body)})
 
     async def patch(self, request):
         id_ = self.zone(request)
         if not id_:
             return error(404, "no such zone")
         body = await self.body(request, whole=False)
-        return body if isinstance(body, web.Response) else self.written(request, id_, self.taken(body))
+        return body if isinstance(body, web.Response) else await self.written(request, id_, self.taken(body))
 
-    def written(self, request, id_, values):
+    async def written(self, request, id_, values):
         accepted, refusal = self.wants(request, "application/json"), None
         if not accepted:
             refusal = error(406, "JSON only")
         refusal = refusal or self.refused(request, id_)
+        if self.has("two at once write by one tag"):
+            await asyncio.sleep(0.05)
         if refusal is None or self.acts_anyway(refusal.status):
             self.write(id_, values)
         value = self.shown(id_)
@@ -379,6 +386,10 @@ class Sprinklers:
             octets = octets.replace(b"\r\n", b"\n")
         if self.has("a file ends at NUL"):
             octets = octets.partition(b"\0")[0]
+        if self.has("a shorter file keeps the tail"):
+            octets += self.maps.get(id_, b"")[len(octets) :]
+        if self.has("a file in chunks is empty") and "Transfer-Encoding" in request.headers:
+            octets = b""
         self.maps[id_] = octets
         if self.has("the checksum is of other octets"):
             octets = octets.strip() + b"\n"
@@ -534,6 +545,7 @@ def sprinklers(style, faults=()):
             "/zones": {
                 "get": {"parameters": _QUERY, "responses": {"200": listing, **_BAD}},
                 "post": {
+                    "description": _SAID if style.keys().isdisjoint({"repeats", "remembers"}) else "",
                     "parameters": key,
                     "requestBody": sent,
                     "responses": {"201": answers(shape), "406": REFUSED, **prints, **_BAD},
@@ -671,6 +683,23 @@ FAULTS = [
             "the filter goes by the first area": "description/list-filter",
             "minutes are sorted as texts": "description/list-order",
             "the next key ends one": "description/idempotency-key",
+        },
+    ),
+    (
+        "as described",
+        {
+            "the first tag alone counts": "description/if-match",
+            "any content type is taken": "description/invalid-refused",
+            "a shorter file keeps the tail": _READ,
+            "a refusal spends its key": "description/idempotency-key",
+        },
+    ),
+    (
+        "as described",
+        {
+            "two at once write by one tag": "description/if-match",
+            "a file in chunks is empty": _READ,
+            "a retry gets the thing as it is now": "description/idempotency-key",
         },
     ),
     ("without conditions", {"two at once get one id": "description/created-is-there", "the season stays": _READ}),

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import re
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
@@ -16,6 +18,7 @@ from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
+from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
@@ -36,6 +39,16 @@ FINAL: Final = _CANCELLED | _DONE
 _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
 #: Operations that end what goes on, or interrupt it.
 ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
+#: By these words a description says in which state of another thing an operation is refused.
+ANOTHER: Final = re.compile(r"\b(?:while|if|when) another\b[^.;]*", re.IGNORECASE)
+# By these it says that a number never becomes less.
+_GROWS: Final = re.compile(
+    r"\b(?:never|not) (?:falls?|decreases?|drops?|goes? (?:back|down))\b(?! (?:below|under|to))"
+    r"|\bonly (?:grows?|rises?|increases?)\b",
+    re.IGNORECASE,
+)
+# Operations after which a number may begin again.
+_ANEW: Final = frozenset({"reset", "clear", "restart", "reboot", "restore", "zero"})
 
 
 @dataclass
@@ -72,6 +85,12 @@ class Changes:
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
         }
+        # States that one thing alone may be in, by the operation that leads to them; and accepted ones until a read.
+        self._alone = {one.label: found for one in operations if "409" in one.responses and (found := _alone(one))}
+        self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
+        # Members that never fall, by template; and as they were read last, by path.
+        self._growing = {one.template.rstrip("/"): names for one in reads.values() if (names := _growing(one))}
+        self._grown: dict[str, tuple[dict[str, Any], float]] = {}
         # What was there when it was read last, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
@@ -80,6 +99,8 @@ class Changes:
         """Forget what a request may have changed of which nobody knows what it did."""
         self._there.clear()
         self._known.clear()
+        self._claims.clear()
+        self._grown.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -96,6 +117,10 @@ class Changes:
                 self._there[path] = said
         else:
             self._there.clear()
+            if words_of(path) & _ANEW:
+                self._grown.clear()
+            elif method != "POST":
+                self._grown = {key: one for key, one in self._grown.items() if not f"{key}/".startswith(f"{path}/")}
             yield from self._act(occasion, operation, path)
 
     def _act(self, occasion: Occasion, operation: Operation | None, path: str) -> Iterator[Case]:
@@ -118,6 +143,12 @@ class Changes:
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
+        for said in self._alone.get(operation.label, ()) if now else ():
+            if said == now:
+                near = path.rpartition("/")[0]
+                others = [one for one, state in self._known.items() if state.value == now]
+                for other in (one for one in others if one.rpartition("/")[0] == near):
+                    self._claims[other].append((occasion, now))
         if now:
             is_news = now != was
             at_s = occasion.response.received_s
@@ -140,13 +171,19 @@ class Changes:
         if len(self._there) < _MOST_THINGS:
             self._there[path] = ""
         template = operation.template.rstrip("/")
+        yield from self._fallen(occasion, operation, path)
         if template in self._states and (state := _state_in(occasion, self._states[template])):
             yield from self._state(occasion, operation, path, state)
 
     def _state(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
         """Judge the state of a thing by what was read or told of it before."""
         name = self._states[operation.template.rstrip("/")]
-        sent_s = occasion.response.received_s - occasion.response.elapsed_ms / 1000
+        sent_s = occasion.sent_s
+        for claim, state in self._claims.pop(path, ()):
+            if now == state and sent_s >= claim.response.received_s:
+                label = claim.operation.label if claim.operation is not None else ""
+                expected = f"a refusal with 409, as {path} was {state} before and after it, and one alone may be so"
+                yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
         before = self._known.get(path)
         if before is None or sent_s < before.at_s:
             if before is None and len(self._known) < _MOST_THINGS:
@@ -169,6 +206,19 @@ class Changes:
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
         self._known[path] = _State(now, occasion.response.received_s)
 
+    def _fallen(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        """Judge members of which the description says that they never become less."""
+        names, answer = self._growing.get(operation.template.rstrip("/"), frozenset()), occasion.response
+        value = read_json(answer.body).value if names and is_json(answer.media_type) else None
+        now = {name: one for name, one in represented(value, names).items() if name in names and is_number(one)}
+        before, at_s = self._grown.get(path, ({}, 0.0))
+        if occasion.sent_s >= at_s and now:
+            for name in now.keys() & before.keys():
+                expected = f"at least {before[name]} as {name}, which never falls by the description"
+                holds, cause = now[name] >= before[name], f"{operation.label} {name} falls"
+                yield occasion.case("description/states", holds, expected, f"{now[name]} as {name}", cause=cause)
+            self._grown[path] = now, answer.received_s
+
     @staticmethod
     def _case(occasion: Occasion, holds: bool, expected: str, found: str, cause: str) -> Case:  # noqa: FBT001 - as case()
         return occasion.case("description/states", holds, expected, found, cause=f"{cause} state")
@@ -183,6 +233,23 @@ def state_of(read: Operation) -> str:
         str(name) for name, one in parts if plain_name(name) in _STATES and FINAL & set(map(str, one.get("enum", ())))
     )
     return next(named, "")
+
+
+def _alone(operation: Operation) -> frozenset[str]:
+    """Return the words, in backticks or alone, for the state of another thing in which an operation is refused."""
+    said = [found[0] for found in ANOTHER.finditer(operation.text)]
+    return frozenset(word for text in said for word in re.findall(r"`([\w -]+)`", text))
+
+
+def _growing(read: Operation) -> frozenset[str]:
+    """Return the numbers of a resource that never become less by its description."""
+    parts = flat(read.shape or {}).get("properties", {})
+    given = {name: flat(one) for name, one in parts.items() if isinstance(one, dict)}
+    return frozenset(
+        name
+        for name, one in given.items()
+        if kinds_of(one) & {"integer", "number"} and _GROWS.search(str(one.get("description", "")))
+    )
 
 
 def _state_in(occasion: Occasion, name: str) -> str:

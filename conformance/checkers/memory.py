@@ -54,7 +54,8 @@ _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on
 _TELLING: Final = 5
 # By these words a description says that an identifier is given once, and that something outlives a thing.
 _NEVER_AGAIN: Final = re.compile(
-    r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)",
+    r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)"
+    r"|\bid(?:entifier)?\b[^.]*\b(?:higher|greater|larger) than\b[^.]*\b(?:had|ever|deleted)\b",
     re.IGNORECASE,
 )
 _STAYS: Final = re.compile(
@@ -74,6 +75,7 @@ class _Thing:
         gone: whether that deleted it.
         absent: whether a read has shown that it is not there.
         own: whether this run has created what it deleted.
+        ends: kinds of things that end with it, by what the description of its DELETE says.
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
@@ -89,6 +91,7 @@ class _Thing:
     gone: bool = False
     absent: bool = False
     own: bool = False
+    ends: frozenset[str] = frozenset()
     made: bool = False
     body: int = 0
     replaced: bool = False
@@ -210,12 +213,12 @@ class Memory:
         self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
         before = self._things.pop(path.casefold(), None)
         status = occasion.response.status
-        overlaps = before is not None and _sent_s(occasion) < before.changed_s
+        overlaps = before is not None and occasion.sent_s < before.changed_s
         if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.is_simple:
             return
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
-            thing.gone, thing.own = True, path in self._made
+            thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
             self._things |= {one.casefold(): replace(thing, path=one, own=True) for one in below}
         if status == HTTPStatus.CREATED:
             self._made.add(path)
@@ -230,8 +233,8 @@ class Memory:
     def _ending(self, delete: Operation, path: str) -> list[str]:
         """Return what the run has put below a thing, and ends with it by what the description of its DELETE says."""
         found = [one.path for one in self._things.values() if _is_below(one.path, path) and not one.gone]
-        said = set(map(singular, words_of(delete.text))) if not _STAYS.search(delete.text) else set()
-        return [one for one in found if one in self._made and singular(one.rpartition("/")[2]) in said]
+        said = ending_with(delete)
+        return [one for one in found if one in self._made and said & set(map(singular, one[len(path) :].split("/")))]
 
     def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
@@ -254,7 +257,7 @@ class Memory:
             yield from self._located(occasion, path, target)
             yield from self._defaults(occasion, operation)
             sent = _sent_of(occasion)
-            if before is not None and before.gone and _is_for_ever(item):
+            if before is not None and before.gone and _is_for_ever(item, operation):
                 expected = f"an identifier of its own, not that of the thing that {before.change} has deleted"
                 is_chosen = target.rpartition("/")[2].casefold() in {str(one).casefold() for one in sent.values()}
                 yield occasion.case("description/created-is-there", is_chosen, expected, target, cause=operation.label)
@@ -335,7 +338,7 @@ class Memory:
             yield from self._devices(occasion, item, path)
         if thing is None or thing.path != path:
             return
-        age_s = _sent_s(occasion) - thing.changed_s
+        age_s = occasion.sent_s - thing.changed_s
         if age_s < 0:
             return  # it was sent before that
         if thing.gone:
@@ -369,14 +372,20 @@ class Memory:
             yield from self._back.pop(item.template, [])
 
     def _listed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
-        """Judge whether a list, however it is filtered, has things that were deleted and are not there any more."""
+        """Judge whether a list, however it is filtered, has things that were deleted, or is below such a thing."""
+        above = self._things.get(path.rpartition("/")[0].casefold())
+        if above is not None and above.absent and "404" in operation.responses:
+            age_s, last = occasion.sent_s - above.changed_s, singular(path.rpartition("/")[2])
+            if last in above.ends and age_s > _SETTLES_S:
+                expected = f"status 404, as {above.change} ended the {last} too, by the description"
+                yield self._case("deleted-is-gone", occasion, expected, cause=f"{operation.label} below")
         item = self._of_collections.get(operation.template.rstrip("/"))
         gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
         if item is None or not gone or not is_json(occasion.response.media_type):
             return
         for value in listed(read_json(occasion.response.body).value) or ():
             thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
-            age_s = _sent_s(occasion) - thing.changed_s if thing is not None else 0.0
+            age_s = occasion.sent_s - thing.changed_s if thing is not None else 0.0
             if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
                 expected = (
                     f"a list without what {thing.change} has deleted {age_s:.0f} s before, which a GET does not find"
@@ -448,23 +457,25 @@ def _sent_of(occasion: Occasion) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _is_for_ever(item: Operation) -> bool:
+def ending_with(delete: Operation) -> frozenset[str]:
+    """Return the words for what ends with a thing, by the clauses of a description that do not say what stays."""
+    clauses = [one for one in re.split(r"[.;]\s", delete.text) if not _STAYS.search(one)]
+    return frozenset(singular(word) for one in clauses for word in words_of(one))
+
+
+def _is_for_ever(item: Operation, create: Operation) -> bool:
     """Return whether no other thing gets the identifier of a deleted one: it is a UUID, or the description says so."""
     parameter, parts = item.parameter("path")[-1], flat(item.shape or {}).get("properties", {})
     named = [flat(one) for name, one in parts.items() if plain_name(name) in {plain_name(parameter.name), "id"}]
     given = flat(parameter.schema)
     said = [str(one["description"]) for one in (given, *named) if "description" in one]
-    return given.get("format") == "uuid" or any(_NEVER_AGAIN.search(one) for one in said)
+    return given.get("format") == "uuid" or any(_NEVER_AGAIN.search(one) for one in (*said, create.text))
 
 
 def _above(template: str) -> Iterator[str]:
     """Yield the paths that one is below."""
     while template := template.rpartition("/")[0]:
         yield template
-
-
-def _sent_s(occasion: Occasion) -> float:
-    return occasion.response.received_s - occasion.response.elapsed_ms / 1000
 
 
 def _path_in(target: str) -> str:

@@ -46,6 +46,11 @@ class Occasion:
         """The operation that it is for, or None."""
         return self.context.operation
 
+    @property
+    def sent_s(self) -> float:
+        """When the request was sent, s of the monotonic clock."""
+        return self.response.received_s - self.response.elapsed_ms / 1000
+
     @cached_property
     def validity(self) -> Validity:
         """What the contract says of parameters and body."""

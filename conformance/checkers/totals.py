@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -21,6 +22,8 @@ _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
 # So many choices of filters are remembered.
 _MOST: Final = 1000
+# By these words a description says that a total goes by the filters.
+_FILTERED: Final = re.compile(r"\b(?:filter\w*|match\w*)\b(?![^.]*\b(?:ignor|regardless|whatever))", re.IGNORECASE)
 _CAP: Final = 50  # also the fewest items that a list without parameters for its parts is cut at
 
 
@@ -140,6 +143,8 @@ class Totals:
             count = self._counts[label, name, chosen] if len(self._counts) < _MOST else every
             every.is_of_all |= total > shown > 0
             count.is_of_all |= every.is_of_all
+            if chosen and whole and count.agrees is None and name in says_filtered(listing):
+                count.agrees = True
             # A filter that leaves all items does not show whether the total is that of what it leaves.
             if whole and shown and (not chosen or part.least < every.all):
                 count.learn(total, part)
@@ -179,6 +184,11 @@ class Totals:
         has_parts = not all(one is None for one in (listing.limit, listing.offset, listing.page, listing.cursor))
         longest = self._longest[listing.operation.label]
         return is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
+
+
+def says_filtered(listing: Listing) -> set[str]:
+    """Return the totals that are those of what the filters leave, as the description says of them."""
+    return {name for name, text in listing.says.items() if plain_name(name) in TOTALS and _FILTERED.search(text)}
 
 
 def _is_cap(total: int) -> bool:

@@ -165,7 +165,7 @@ class Writes:
         value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
         now = represented(value, {plain_name(name) for name in _parts(item.shape)})
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
-        sent_s, late = response.received_s - response.elapsed_ms / 1000, self._late.pop(path, None)
+        sent_s, late = occasion.sent_s, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
             names = {*now, *state.members}
             is_same = all(same(now.get(one), state.members.get(one)) for one in names)
@@ -174,7 +174,7 @@ class Writes:
                     (item.template, one) for one in names if not same(now.get(one), state.members.get(one))
                 }
             write = writes[0] if len(writes) == 1 else late if not writes and is_same else None
-            if write is not None and (state.at_s <= _sent_s(write) or write is late):
+            if write is not None and (state.at_s <= write.sent_s or write is late):
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
                 is_old = sent_s - write.response.received_s > _SETTLES_S
                 if is_old or write is not late:
@@ -418,7 +418,3 @@ def _parts(schema: Schema | None) -> Mapping[str, Any]:
     outer = flat(schema or {}).get("properties", {})
     inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
     return max(inner, key=len) if len(outer) == 1 and inner and inner[0] else outer
-
-
-def _sent_s(occasion: Occasion) -> float:
-    return occasion.response.received_s - occasion.response.elapsed_ms / 1000

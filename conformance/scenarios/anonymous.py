@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 from contextlib import closing, suppress
-from dataclasses import replace
 from typing import Final
 from urllib.parse import quote
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allowed, callable_operations
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stranger import Stranger
@@ -59,8 +58,8 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                         fresh=True,
                     )
                     found += [exchange] if exchange else []
-                    if exchange and not authorized and exchange.response.status in _UNDECIDED:
-                        found += _on_new_thing(api, values, operation, request)
+                    if exchange and exchange.response.status in _UNDECIDED:
+                        found += _on_new_thing(Surveyor(api, values), operation, request, client, authorized=authorized)
     return (*found, *_on_kept_connection(api, values, closed), *_beyond_ascii(api, values, closed))
 
 
@@ -78,23 +77,25 @@ def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operati
             )
 
 
-def _on_new_thing(api: RestInterface, values: Values, operation: Operation, request: Outgoing) -> Iterator[Exchange]:
-    """Send a request without credentials for a thing that was just created, if one can be, and delete the thing."""
-    known = {
-        (item.method, item.template.rstrip("/")): item for item in operations_of(api.run.contract) if allowed(api, item)
-    }
-    item = operation.template.partition("}")[0] + "}"
+def _on_new_thing(
+    surveyor: Surveyor, operation: Operation, request: Outgoing, client: HttpClient | Stranger, *, authorized: bool
+) -> Iterator[Exchange]:
+    """Send a request without valid credentials for a thing that was just created, if one can be; delete the thing."""
+    api = surveyor.api
+    known = callable_operations(api)
+    item = operation.template.rpartition("}")[0] + "}"
     read, create, delete = (known.get((method, path)) for method, path in _life_of(item))
-    if operation.safe or read is None or create is None or "{" in operation.template[len(item) :]:
+    if operation.safe or read is None or create is None:
         return
-    surveyor = Surveyor(api, values)
     path = created_path(surveyor, create, read)
     if path:
         target = path + operation.template[len(item) :] + "".join(request.target.partition("?")[1:])
-        own = replace(request, target=target)
-        yield api.client.send(own.method, own.target, headers=own.headers, body=own.body, authorized=False, fresh=True)
+        sent = client.send(
+            request.method, target, headers=request.headers, body=request.body, authorized=authorized, fresh=True
+        )
+        yield from [sent] if sent else []
         if delete is not None:
-            Writer(api, values).send(delete, path)
+            Writer(api, surveyor.values).send(delete, path)
 
 
 def _life_of(item: str) -> tuple[tuple[str, str], ...]:

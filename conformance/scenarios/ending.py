@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from conformance.api.call_rules import words_of
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listed
@@ -24,7 +24,7 @@ from conformance.checkers.changes import ENDING, FINAL, state_of
 from conformance.checkers.transitions import KEEPS, OFTEN, state_member
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.living import ABSENT
@@ -41,6 +41,9 @@ _IN_USE: Final = re.compile(
     r"\b(?:in use|while|empty|refer|contain|assign|attach|link|need|depend|belong|stand|used|uses|has|have)",
     re.IGNORECASE,
 )
+
+# Operations after which a thing goes on.
+_PAUSING: Final = frozenset({"pause", "halt", "interrupt"})
 
 _Operations = Mapping[tuple[str, str], Operation]
 
@@ -67,7 +70,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
 
     Of a collection in which nothing can be created, the usual thing goes through its states.
     """
-    operations = _callable(api)
+    operations = callable_operations(api)
     found, writer = list[Ended](), Writer(api, values)
     for (method, path), read in operations.items():
         create = operations.get(("POST", collection_of(path)))
@@ -77,8 +80,13 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
             continue
         kind, paths = Ended(read, state, actions), list[str]()
         begins = [one for one in actions if not _ends(one)][:_BEGINNING]
-        ends = [one for one in actions if _ends(one)][:1]
-        for steps in ([*begins, *ends, *begins, *ends], begins):
+        ends = [one for one in actions if _ends(one)]
+        pauses = [one for one in ends if words_of(one.template.rpartition("/")[2]) & _PAUSING][:1]
+        ends = [one for one in ends if one not in pauses][:1]
+        for steps in (
+            [*begins, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)],
+            begins,
+        ):
             api.run.limit.check()
             with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
                 if create is None:
@@ -133,21 +141,13 @@ def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
 
 def _listed_as_done(writer: Writer, kind: Ended) -> str:
     """Return the path of a listed thing that is done."""
-    lister = _callable(writer.api).get(("GET", collection_of(kind.read.template)))
+    lister = callable_operations(writer.api).get(("GET", collection_of(kind.read.template)))
     items = listed(read_json(writer.send(lister).response.body).value) if lister is not None else None
     for one in items or []:
         id_ = identified(one, kind.read)[1]
         if isinstance(one, dict) and id_ is not None and one.get(kind.state) in FINAL:
             return f"{collection_of(kind.read.template)}/{id_}"
     return ""
-
-
-def _callable(api: RestInterface) -> dict[tuple[str, str], Operation]:
-    return {
-        (item.method, item.template.rstrip("/")): item
-        for item in operations_of(api.run.contract)
-        if allowed(api, item) and item.label not in api.streams
-    }
 
 
 def _actions(read: Operation, operations: _Operations) -> tuple[Operation, ...]:
@@ -185,7 +185,7 @@ class Deletion:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def used_things(api: RestInterface, values: Values) -> tuple[Deletion, ...]:
     """Create a thing and one that refers to it, and delete the first, where the description refuses that by 409."""
-    operations, found = _callable(api), list[Deletion]()
+    operations, found = callable_operations(api), list[Deletion]()
     for (method, path), delete in operations.items():
         if method == "DELETE" and "409" in delete.responses and _IN_USE.search(_said_of(api, delete)):
             api.run.limit.check()

@@ -1,10 +1,11 @@
-"""Send requests with an Idempotency-Key once more: with the same body, with another one, and by a new key.
+"""Send requests with an Idempotency-Key once more: with the same body, with another one, later, and by a new key.
 
 The draft draft-ietf-httpapi-idempotency-key-header, 2.6, says what a device does.
 """
 
 from __future__ import annotations
 
+import re
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
@@ -12,19 +13,20 @@ from dataclasses import dataclass, replace
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import Inputs, renewed, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, identified
 from conformance.api.rest.values import Values
-from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.scenarios.own_things import located
-from conformance.scenarios.refusing import is_ours
+from conformance.scenarios.refusing import is_ours, is_refused
 from conformance.scenarios.scenario import NoOccasionError, scenario
+from conformance.scenarios.special_bodies import half_valid
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.whole_list import read_whole
 from conformance.scenarios.writing import Writer, members
@@ -32,10 +34,20 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
 # So many operations are tried; and the turn of bodies that no other check sends.
 _OPERATIONS, _TURN = 6, 7100
+# A round needs so many keys: the first one, and a new one.
+_KEYS: Final = 2
 # Members by which a response names what was made, whatever the client has sent.
 _IDS: Final = ("id", "uuid", "guid")
 # By these an operation says that it may refuse a key that came with another body.
 _REFUSALS: Final = frozenset({"409", "422"})
+# By these words a description says that a retry gets what came first, and that a refused request leaves its key free.
+_FIRST: Final = re.compile(
+    r"\b(?:first|original|same|earlier|previous|stored) (?:answer|response|result|reply)\b", re.IGNORECASE
+)
+UNSPENT: Final = re.compile(
+    r"\b(?:refus|reject|fail)\w*\b[^.]*\b(?:not|never)\b[^.]*\b(?:us|consum|spen|keep|kept|stor|remember|burn)\w*",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True)
@@ -60,10 +72,9 @@ class Keyed:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
     """Repeat requests with the key of an earlier one; what is found wrong counts if a second round finds it too."""
-    operations = [one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams]
-    by_key = {(one.method, one.template.rstrip("/")): one for one in operations}
+    by_key = callable_operations(api)
     found, tried = list[Keyed](), 0
-    for operation in operations:
+    for operation in by_key.values():
         key = key_of(operation)
         if key is None or operation.method != "POST" or operation.motion or tried >= _OPERATIONS:
             continue
@@ -107,7 +118,7 @@ class _Rounds:
     def play(self, number: int) -> Iterator[Keyed]:
         """Send a request twice, its key with another body, a new key with a third one, and the first request again."""
         bodies, keys = self._bodies(_TURN + 10 * number), self._keys()
-        if len(keys) < 2 or not bodies:  # noqa: PLR2004 - the first one, and a new one
+        if len(keys) < _KEYS or not bodies:
             return
         before = self._listed()
         request = self._request(keys[0], bodies[0])
@@ -135,6 +146,11 @@ class _Rounds:
                 again = self._send(request)
                 made.append(again)
                 yield self._repeated(first, again, name, before)
+            said = f"{self.operation.text} {self.key.says}"
+            if len(keys) > _KEYS and UNSPENT.search(said):
+                yield from self._unspent(keys[_KEYS:], bodies[0], made)
+            if _FIRST.search(said) and self._item is not None and name.startswith("/"):
+                yield from self._later(request, first, self._item, name)
         finally:
             self._tidied(made)
 
@@ -156,6 +172,31 @@ class _Rounds:
                 expected, shown, fault = f"a list with {name} alone of what was sent", listing.exchange, ", ".join(new)
         return Keyed(self.operation.label, "same request", shown, expected, fault)
 
+    def _unspent(self, keys: list[str], inputs: Inputs, made: list[Exchange]) -> Iterator[Keyed]:
+        """Judge a key that came with a request which was refused; a new key shows that the right one can be taken."""
+        wrong = next(half_valid(self.operation, inputs, inputs.body), None) if isinstance(inputs.body, dict) else None
+        if wrong is None or not is_refused(self._send(self._request(keys[0], replace(inputs, body=wrong)))):
+            return
+        taken = self._send(self._request(keys[0], inputs))
+        other = self._send(self._request(keys[1], inputs)) if is_refused(taken) else taken
+        made += [taken, other]
+        expected = "a creation, because the description says that a refused request does not use up its key"
+        fault = taken.came if other.response.ok and is_refused(taken) else ""
+        yield Keyed(self.operation.label, "refused before", taken, expected, fault)
+
+    def _later(self, request: Outgoing, first: Exchange, item: Operation, path: str) -> Iterator[Keyed]:
+        """Judge a retry after what was made has changed: the description says that it gets the first response."""
+        changes = (self.operations.get((method, item.template.rstrip("/"))) for method in ("PUT", "PATCH"))
+        written = (self.writer.change(one, item, path, _TURN) for one in changes if one is not None)
+        write = next((one for one in written if one is not None), None)
+        again = self._send(request) if write is not None else first
+        was, now = members(first, ()), members(again, ())
+        new = members(write.found, ()) if write is not None and again.response.ok else {}
+        other = [name for name in new if name in was and name in now and was[name] != new[name]]
+        if other:
+            fault = ", ".join(f"{shown(now[name])} as {name}" for name in other if now[name] == new[name])
+            yield Keyed(self.operation.label, "later", again, "the members as in the first response", fault)
+
     def _send(self, request: Outgoing) -> Exchange:
         return self.writer.api.send(request)
 
@@ -163,9 +204,9 @@ class _Rounds:
         return written(self.operation, inputs.having("header", self.key.name, key))
 
     def _keys(self) -> list[str]:
-        """Return two keys that the device does not know, as far as the schema allows them."""
+        """Return keys that the device does not know, as far as the schema allows them."""
         found = []
-        for _ in range(2):
+        for _ in range(2 * _KEYS):
             text = str(uuid.uuid4())
             candidates = (text, f'"{text}"', text.replace("-", ""), text[:8])
             found += [next((one for one in candidates if fits(self.key.schema, one)), "")]

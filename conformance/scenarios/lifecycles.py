@@ -12,14 +12,14 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listed
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.things import collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json, shown
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.chosen import Chosen
@@ -52,9 +52,7 @@ _TIMES: Final = re.compile(r"(?:created|updated|modified|changed|timestamp|time|
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
 def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
     """Create things of each collection, read them, change them, delete them, and read them again."""
-    operations = {
-        (item.method, item.template.rstrip("/")): item for item in operations_of(api.run.contract) if allowed(api, item)
-    }
+    operations = callable_operations(api)
     lives, held = list[Life](), dict[str, int]()
     for (method, path), read in operations.items():
         collection = collection_of(path)

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta, timezone
 from itertools import combinations, islice, product
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.listing import Listing, Page, fitting, listing_of, members_of, page_of
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
-from conformance.checkers.totals import SETTLES_S
+from conformance.checkers.totals import SETTLES_S, says_filtered
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.parameters import Parameter, plain_name
@@ -48,6 +49,13 @@ _FEWEST: Final = 2
 # So far beyond the end a part of a list is asked for, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
+# A place whose clocks differ by so many hours from UTC.
+_FAR_H: Final = 11
+# By these words a description says that the last page names no further one.
+_ENDS: Final = re.compile(
+    r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
+    re.IGNORECASE,
+)
 # Plain names of members that have a link to the next page, or the cursor of it.
 _NEXT: Final = re.compile(
     r"next(?:page)?(?:cursor|token|marker|link|url|href|key|after|id)?|end(?:cursor|token)|continuationtoken"
@@ -226,7 +234,12 @@ def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
     wrong = [query] if not now.goes_on and any(now.totals.get(name) != len(now.items) for name in agreed) else []
     # A total of all items whatever the filter is right as well.
     pages = {index: part[1] for index, one in enumerate(doubted) if (part := reader.part(one)) is not None}
-    wrong += [doubted[index] for index, one in pages.items() if one.totals != now.totals and _is_doubted(listing, one)]
+    is_said = says_filtered(listing)
+    wrong += [
+        doubted[index]
+        for index, one in pages.items()
+        if (is_said or one.totals != now.totals) and _is_doubted(listing, one)
+    ]
     if wrong:
         time.sleep(SETTLES_S)
         for one in (*wrong, *wrong):
@@ -251,7 +264,12 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
         ordered = sorted(there, key=lambda one: bound.rank(str(one)) or 0)
         # The second of several: there are items on both sides, and one is at the bound.
         middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
-        rows += [{bound.parameter.name: one} for one in middle if len(ordered) > 1 and fitting(bound.parameter, one)]
+        rows += [
+            {bound.parameter.name: text}
+            for one in middle
+            for text in (one, _elsewhere(one, is_least=bound.is_least))
+            if len(ordered) > 1 and text is not None and fitting(bound.parameter, text)
+        ]
     if listing.sort is not None:
         directions = flat(listing.direction.schema).get("enum", ()) if listing.direction is not None else ()
         for number, text in enumerate(list(listing.sortings)[:most]):
@@ -270,6 +288,16 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
             yield {**row, **part}
         elif later or part:
             yield {**sorts, **row, **part, **later}
+
+
+def _elsewhere(value: Any, *, is_least: bool) -> str | None:
+    """Return an instant as clocks far away show it; a device that ignores the offset lets too many items pass."""
+    try:
+        at = datetime.fromisoformat(value)
+    except (TypeError, ValueError):
+        return None
+    zone = timezone(timedelta(hours=-_FAR_H if is_least else _FAR_H))
+    return at.astimezone(zone).isoformat(timespec="milliseconds") if at.tzinfo is not None else None
 
 
 def _together(listing: Listing, page: Page) -> dict[str, Any]:
@@ -308,6 +336,7 @@ class _Parts:
             return
         for walk in (
             self._entire,
+            self._exact,
             self._shifted,
             self._beyond,
             self._last,
@@ -349,6 +378,23 @@ class _Parts:
         is_newest = found[-len(whole.items) :] == whole.identities[-len(found) :]
         fault = "" if found[: len(expected)] == expected or is_newest else _difference(expected, found)
         return self._paged(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
+
+    def _exact(self, whole: Page) -> Paged | None:
+        """Read with the limit that is the list's length; no page follows, where the description says how that shows."""
+        listing, count = self.reader.listing, self._count(whole)
+        limit, cursor = listing.limit, listing.cursor
+        is_said = any(_NEXT.fullmatch(plain_name(name)) and _ENDS.search(text) for name, text in listing.says.items())
+        if limit is None or cursor is None or not is_said or not fitting(limit, count):
+            return None
+        part = self.reader.part({limit.name: count})
+        following = next(cursors(listing, *part), "") if part is not None else ""
+        later = self.reader.part({limit.name: count, cursor.name: following}) if following else part
+        if part is None or later is None or len(part[1].items) != count:
+            return None
+        fault = f"{cursor.name} {following[:60]}, which leads to an empty page" if not later[1].items else ""
+        return self._paged(
+            f"{limit.name} exactly", later[0], "no further page, as the description says of the last", fault
+        )
 
     def _shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""

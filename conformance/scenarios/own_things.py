@@ -11,17 +11,18 @@ from itertools import islice
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allowed, callable_operations
 from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
 from conformance.api.rest.patches import same
-from conformance.api.rest.references import is_free_text
+from conformance.api.rest.references import is_free_text, singular
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.contents import keeps_octets
+from conformance.checkers.memory import ending_with
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
@@ -67,12 +68,10 @@ _SINGLES: Final = 4
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def own_things(api: RestInterface, values: Values) -> Survey:
     """Create a thing of each collection; write to it by right and wrong conditions, and ask by undeclared methods."""
-    operations = {
-        (item.method, item.template.rstrip("/")): item for item in operations_of(api.run.contract) if allowed(api, item)
-    }
+    operations = callable_operations(api)
     surveyor = Surveyor(api, values)
     for (method, path), read in operations.items():
-        if method != "GET" or read.label in api.streams:
+        if method != "GET":
             continue
         api.run.limit.check()
         changes = [operations[name, path] for name in ("PATCH", "PUT") if (name, path) in operations]
@@ -415,6 +414,19 @@ class _Thing:
             # A device may keep the answer.
             self._look_in(listing, query, id_, began - _SETTLES_S)
         self._refused(delete)
+        ends, own = ending_with(delete), self.read.template.rstrip("/")
+        for read in operations_of(self.api.run.contract):
+            above, _, last = read.template.rstrip("/").rpartition("/")
+            is_ending = read.method == "GET" and above == own and singular(last) in ends
+            if is_ending and "404" in read.responses and allowed(self.api, read):
+                there = Outgoing("GET", f"{self.target.rstrip('/')}/{last}")
+                self.below.append((read, there))
+                create = callable_operations(self.api).get(("POST", read.template.rstrip("/")))
+                if create is not None:
+                    # Nothing may be kept of an empty list.
+                    inputs = usual_inputs(create, self.surveyor.values)[0]
+                    request = replace(written(create, inputs), target=there.target)
+                    self.surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs), request)
         if not self.get().ok:
             return
         if not self.sent(delete, None, *self._current(delete)).ok:

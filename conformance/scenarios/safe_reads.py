@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Final
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
@@ -22,7 +22,7 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, is_devices, is_shared
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import shown
-from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.own_things import created_path
@@ -105,9 +105,7 @@ class _Watch:
     resources: list[_Resource] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        api = self.writer.api
-        usable = [one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams]
-        self._operations = {(one.method, one.template.rstrip("/")): one for one in usable}
+        self._operations = callable_operations(self.writer.api)
         for (method, path), read in self._operations.items():
             if method == "GET" and len(self.resources) < _WATCHED:
                 self.resources += self._resource(path, read)

@@ -58,6 +58,8 @@ _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # Where a request has JSON with a charset, which means nothing (RFC 8259 11), so that nobody refuses it (RFC 2045 5).
 _CHARSET: Final = "header Content-Type"
+# Media types that hardly an API has, at quick the first of them.
+_OTHER_TYPES: Final = ("text/plain", "application/xml")
 #: Statuses by which a request is refused for what is in it, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
@@ -402,6 +404,12 @@ class Surveyor:
             shown = Variation(Kind.OPTIONAL, "with a charset", _CHARSET, usual)
             request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
+        # What may be left out may be ignored.
+        is_judged = is_usable and operation.body_required and "415" in operation.responses
+        types = [one for one in _OTHER_TYPES if is_judged and not {one, "text/*", "*/*"} & operation.bodies.keys()]
+        for media_type in types[: 1 if self.api.run.effort.name == "quick" else None]:
+            other = Variation(Kind.INVALID, f"{media_type}, which is not declared, with 415 declared", _CHARSET, usual)
+            self.send(operation, other, self._reaching.request(operation, other).having_type(media_type))
         # What is left out has its default, more than once.
         least = least_inputs(operation, usual)
         for inputs in [usual] if least is None else [least] * 2:

@@ -10,10 +10,10 @@ from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import quote
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.listing import Page, listing_of, page_of
 from conformance.api.rest.things import collection_of, identified, identifier_of
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
@@ -122,11 +122,7 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
 
 def read_items(writer: Writer) -> None:
     """Read the first, the middle and the last item of each list, and the first one again."""
-    operations = {
-        (one.method, one.template.rstrip("/")): one
-        for one in operations_of(writer.api.run.contract)
-        if allowed(writer.api, one)
-    }
+    operations = callable_operations(writer.api)
     for (method, path), item in operations.items():
         lister = operations.get(("GET", collection_of(path)))
         if method != "GET" or lister is None or len(item.parameter("path")) > 1:

@@ -87,6 +87,12 @@ def allowed(api: RestInterface, operation: Operation) -> bool:
     return api.call_rules.decide(operation).may
 
 
+def callable_operations(api: RestInterface) -> dict[tuple[str, str], Operation]:
+    """Return the operations that may be sent and whose responses end, by method and path without a slash at its end."""
+    found = (one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams)
+    return {(one.method, one.template.rstrip("/")): one for one in found}
+
+
 def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:
     """Return the operations that ``wanted`` selects and this run may send; for a slow robot, a few of them."""
     usable = [item for item in operations_of(api.run.contract) if wanted(item) and allowed(api, item)]

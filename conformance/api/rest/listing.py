@@ -100,6 +100,13 @@ class Listing:
         return {plain_name(name): part for name, part in {**inner, **own}.items() if isinstance(part, dict)}
 
     @cached_property
+    def says(self) -> dict[str, str]:
+        """What the description says of the members around the list, by name."""
+        parts = flat(self.operation.shape or {}).get("properties", {})
+        found = {name: flat(one).get("description") for name, one in parts.items() if isinstance(one, dict)}
+        return {name: text for name, text in found.items() if isinstance(text, str)}
+
+    @cached_property
     def known(self) -> frozenset[str]:
         """The names of all parameters whose part is known."""
         parts = (
@@ -406,7 +413,9 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
         if words[index] not in _LEAST | _MOST:
             continue
         rest = "".join(words[1:] if index == 0 else words[:-1])
-        named = [name for name in members if name == rest]
+        # "createdAfter" bounds "createdAt".
+        ends = ("", "at", "on", "date", "time") if rest and kind in _DATES else ("",)
+        named = [name for name in members if name in {f"{rest}{end}" for end in ends}]
         dated = [name for name, one in members.items() if _kind(one) == "date-time"]
         found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [])
         if found and (kind in _DATES) is (_kind(members[found[0]]) in _DATES) and _kind(members[found[0]]):

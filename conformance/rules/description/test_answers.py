@@ -16,6 +16,7 @@ from conformance.documents.parameter_reading import parts_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.anonymous import anonymous_requests
+from conformance.scenarios.held import held_operations
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
@@ -27,7 +28,7 @@ from conformance.verdict.run import Run
 
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
-_ON = (survey, generated_requests, neighbours, own_things, others)
+_ON = (survey, held_operations, generated_requests, neighbours, own_things, others)
 # HTTP lets any server or gateway send these, whatever the operation: conditions, ranges, rates, sizes, upgrades.
 _ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 # ... and these, unless the request was the operation's usual one.

@@ -8,16 +8,17 @@ from dataclasses import dataclass, field
 from typing import Any
 from uuid import uuid4
 
+from conformance.api.rest.patches import JSON_PATCH
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
-from conformance.scenarios.keys import key_of
+from conformance.scenarios.keys import UNSPENT, key_of
 from proof.mutation.messages import Change, Forward, Request, Response
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
-_NOT_ACCEPTABLE, _FAILED, _REQUIRED, _PART, _CURRENT = 406, 412, 428, 206, 304
+_NOT_ACCEPTABLE, _FAILED, _UNSUPPORTED, _REQUIRED, _PART, _CURRENT = 406, 412, 415, 428, 206, 304
 _WRITING = frozenset({"PUT", "PATCH", "DELETE"})
 _OCTETS, _CSV, _KEY = "application/octet-stream", "text/csv", "Idempotency-Key"
 # As many resources are tried, and so many decimals are kept.
@@ -63,11 +64,15 @@ def _rows(operation: Operation) -> Iterator[_Row]:
         yield "key-again", "performs a request again that has a known key", _again
         yield "key-any-body", "takes a known key with any body", _any_body
         yield "key-old", "answers a new key as the first one", _old_key
+        if UNSPENT.search(operation.text):
+            yield "key-spent", "refuses a key that came with a refused request", _spent_key
     if operation.method in _WRITING:
         yield from _of_conditions(operation)
     if operation.method in {"PUT", "PATCH", "POST"}:
         if str(_NOT_ACCEPTABLE) in declared:
             yield "applies-406", "performs what it refuses with 406", _applying_unaccepted
+        if str(_UNSUPPORTED) in declared and operation.bodies:
+            yield "type-any", "takes its content by any media type", _typed(next(iter(operation.bodies)))
         yield from _of_values(operation)
 
 
@@ -92,6 +97,7 @@ def _of_conditions(operation: Operation) -> Iterator[_Row]:
         yield "match-missing", "does without If-Match (RFC 6585 3)", _knowing(_REQUIRED, is_told=True)
         yield "applies-428", "performs what it refuses with 428", _knowing(_REQUIRED)
     if str(_FAILED) in operation.responses:
+        yield "match-first", "looks at the first tag of If-Match alone (RFC 9110 13.1.1)", _first_tag
         yield "match-stale", "takes each tag that it ever sent (RFC 9110 13.1.1)", _stale_tag
         yield "applies-412", "performs what it refuses with 412", _knowing(_FAILED)
     if any(one.name.lower() == "if-none-match" for one in operation.parameter("header")):
@@ -100,12 +106,16 @@ def _of_conditions(operation: Operation) -> Iterator[_Row]:
 
 def _of_values(operation: Operation) -> Iterator[_Row]:
     if next(iter(operation.bodies), "") == _OCTETS:
+        yield "file-tail", "keeps the end of the file before, where that is longer", _longer
         yield "file-cut", "keeps files without their last byte", _sent(lambda body: body[:-1])
     media_type = next(filter(is_json, operation.bodies), "")
     parts = flat(operation.bodies[media_type].schema).get("properties", {}) if media_type else {}
     formats = {name: flat(one).get("format") for name, one in parts.items() if isinstance(one, dict)}
     doubles = {name for name, one in formats.items() if one == "double"}
     times = {name for name, one in formats.items() if one == "date-time"}
+    if JSON_PATCH in next(iter(operation.bodies), ""):
+        yield "patch-copies", "copies what a JSON patch moves (RFC 6902 4.4)", _sent(lambda body: _steps(body, "copy"))
+        yield "patch-untested", "ignores the tests of a JSON patch (RFC 6902 4.6)", _sent(_steps)
     if doubles:
         yield "digits", "keeps two decimals of doubles", _sent(lambda body: _members(body, doubles, _rounded))
     if times:
@@ -243,6 +253,53 @@ def _applying_unaccepted(request: Request, forward: Forward, _: _Past) -> tuple[
     altered = request.copy()
     altered.put("Accept", "*/*")
     return response, forward(altered).status in _SUCCESS
+
+
+def _first_tag(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
+    altered, wanted = request.copy(), request.field("If-Match") or ""
+    altered.put("If-Match", wanted.partition(",")[0])
+    response = forward(altered if "," in wanted else request)
+    return response, "," in wanted and response.status == _FAILED
+
+
+def _typed(media_type: str) -> _Act:
+    """Return an act that sends what was refused for its media type by another one."""
+
+    def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
+        response, altered = forward(request), request.copy()
+        altered.put("Content-Type", media_type)
+        done = forward(altered) if response.status == _UNSUPPORTED else response
+        return done, done is not response and done.status in _SUCCESS
+
+    return act
+
+
+def _longer(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
+    before = past.writes.get(request.path, [])
+    tail = before[-1].body[len(request.body) :] if before else b""
+    altered = request.copy(body=request.body + tail)
+    altered.put("Content-Length", str(len(altered.body)))
+    response = forward(altered)
+    past.writes[request.path] = [altered]
+    return response, bool(tail) and response.status in _SUCCESS
+
+
+def _spent_key(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
+    response, key = forward(request), _key_in(request)
+    if key and response.status in _REFUSED:
+        past.keyed.setdefault(key, (request, response))
+        return response, False
+    return (past.keyed[key][1], True) if key in past.keyed else (response, False)
+
+
+def _steps(body: bytes, moves: str = "") -> bytes:
+    """Return a JSON patch that has another operation in the place of each move; without a name: one without tests."""
+    steps = _json_of(body)
+    if not isinstance(steps, list) or not all(isinstance(one, dict) for one in steps):
+        return body
+    made = [{**one, "op": moves} if moves and one.get("op") == "move" else one for one in steps]
+    made = made if moves else [one for one in made if one.get("op") != "test"]
+    return json.dumps(made).encode() if made != steps else body
 
 
 def _key_in(request: Request) -> str:

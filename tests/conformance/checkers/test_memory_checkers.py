@@ -15,6 +15,7 @@ _MEMBERS = {
     "id": {"type": "string"}, "name": {"type": "string"}, "rank": {"type": "integer"}, "state": {"type": "string"},
     "is_default": {"type": "boolean"}, "phase": {"enum": ["queued", "running", "done", "cancelled", "archived"]},
 }  # fmt: skip
+_MEMBERS["laps"] = {"type": "integer", "description": "How many; it never falls."}
 _OWN = {"built": {"type": "string", "readOnly": True}, "serial": {"type": "integer", "readOnly": True}}
 _JOB = {"type": "object", "properties": {**_MEMBERS, **_OWN, "kept": {"type": "boolean", "default": False}}}
 _UUID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string", "format": "uuid"}}
@@ -35,7 +36,7 @@ _PATHS = {
         "get": {"responses": _OK},
         "put": {"requestBody": _BODY, "responses": _OK},
         "patch": {"requestBody": _BODY, "responses": _OK},
-        "delete": {"summary": "Delete a job, and its label with it.", "responses": _OK},
+        "delete": {"summary": "Delete a job, and its label and its parts with it; its report stays.", "responses": _OK},
     },
     **{
         f"/jobs/{{id}}/{name}": {
@@ -45,6 +46,14 @@ _PATHS = {
             "delete": {"responses": _OK},
         }
         for name in ("label", "report")
+    },
+    "/jobs/{id}/parts": {
+        "parameters": [_ID],
+        "get": {"responses": {"200": answers({"type": "array"}), "404": {"description": "no such job"}}},
+    },
+    "/jobs/{id}/start": {
+        "parameters": [_ID],
+        "post": {"summary": "409 while another job is `running`.", "responses": {**_OK, "409": {"description": "no"}}},
     },
     "/tags": {"post": {"requestBody": _BODY, "responses": _OK}},
     "/tags/{id}": {"parameters": [_ONCE], "get": {"responses": _OK}, "delete": {"responses": _OK}},
@@ -69,6 +78,15 @@ PATCH, OWN, STATES = (f"description/{name}" for name in ("patch", "read-only", "
 
 def _below(method, status=200, name="label"):
     return method, f"/jobs/1/{name}", {"name": "a"} if method == "PUT" else None, status, {} if status == 200 else None
+
+
+def _parts():
+    return "GET", "/jobs/1/parts", None, 200, []
+
+
+def _started(id_):
+    running = {"id": id_, "phase": "running"}
+    return [("POST", f"/jobs/{id_}/start", None, 200, running), ("GET", f"/jobs/{id_}", None, 200, running)]
 
 
 def _tag():
@@ -151,6 +169,11 @@ _LABEL, _NO_LABEL = _below("PUT", 201), _below("DELETE", 204)
 BROKEN = {
     "deleted, and read": ([_post("1"), _delete("1"), 5.0, _get("1")], GONE),
     "a label is deleted, and read": ([_LABEL, _NO_LABEL, 4.0, _below("GET")], GONE),
+    "parts outlive their job": ([_delete("1"), _get("1", 404), 4.0, _parts()], GONE),
+    "laps fall": ([_get("1", laps=5), _get("1", laps=3)], STATES),
+    "two run where one may": (
+        [_get("1", phase="running"), *_started("2"), _get("1", phase="running")], STATES,
+    ),
     "a label outlives its job": ([_post("1"), _LABEL, _delete("1"), 4.0, _below("GET")], GONE),
     "an identifier is given twice": ([_tag(), ("DELETE", "/tags/1", None, 204, None), _tag()], THERE),
     "deleted where another one is gone": ([_delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")], GONE),
@@ -229,6 +252,12 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "parts of a job that is not gone for sure": [_delete("1"), 4.0, _parts()],
+    "parts of another job": [_delete("1"), _get("1", 404), 4.0, ("GET", "/jobs/2/parts", None, 200, [])],
+    "laps of a job that is put again, and of two": [_get("1", laps=5), _put("1"), _get("1", laps=0), _get("2", laps=3)],
+    "one runs when the other one has ended": [
+        _get("1", phase="running"), *_started("2"), _get("1", phase="done"), _get("2", phase="running"),
+    ],
     "a label that DELETE resets": [_below("PUT", 204), _NO_LABEL, 4.0, _below("GET")],
     "a label that is put again": [_LABEL, _NO_LABEL, _LABEL, 4.0, _below("GET")],
     "a report that stays": [_post("1"), _below("PUT", 201, "report"), _delete("1"), 4.0, _below("GET", 200, "report")],

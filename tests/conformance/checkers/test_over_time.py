@@ -59,6 +59,7 @@ def _broken(tmp_path, exchanges, **described):
 
 
 _GET, _A, _B = "GET /tubes/1 200", {"level": 1}, {"level": 2}
+_C, _SECOND = {"level": 3}, one("PUT /tubes/1 200", _B, _B, if_match='"a"')
 _HEAD, _ACTION = "HEAD /tubes/1 200", "GET /tubes/1/seal 404"
 _REFUSES = one("GET /tubes/2/seal 405", allow="POST")
 _READ, _TAG_A, _TAG_B = one(_GET, _A), one(_GET, _A, etag='"a"'), one(_GET, _B, etag='"b"')
@@ -104,7 +105,11 @@ _KNOWS = [one("GET /tubes/2 200", _A, etag='"k"'), one("PUT /tubes/2 412", body=
         # If-Match: refused; not known to the device; current; after a write; weak; accepted for later.
         [_TAG_A, _REFUSED, _TAG_A],
         [_TAG_A, one("PUT /tubes/1 428", body=_B, if_match='"x"'), _TAG_A],
-        [_TAG_A, one("PUT /tubes/1 200", _B, _B, if_match='"a"'), _TAG_B],
+        [_TAG_A, _SECOND, _TAG_B],
+        [_TAG_A, _SECOND, one("PUT /tubes/1 412", body=_C, if_match='"a"'), _TAG_B],
+        [_TAG_A, _SECOND, _TAG_A, one("PUT /tubes/1 200", _C, _C, if_match='"a"')],
+        [_TAG_A, one("PUT /tubes/1 200", _A, _B, if_match='"a"'), one("PUT /tubes/1 200", _C, _C, if_match='"a"')],
+        [_TAG_A, _SECOND, one("PUT /tubes/1 200", _B, _C, if_match='"a"')],
         [_TAG_A, one("POST /tubes/1/seal 200", _A), one("PUT /tubes/1 200", _B, _B, if_match='"b"')],
         [one(_GET, _A, etag='W/"a"'), one("PUT /tubes/1 412", body=_B, if_match='W/"a"'), one(_GET, _A, etag='W/"a"')],
         [_TAG_A, one("PUT /tubes/1 412", body=_B, if_match='"a"'), _TAG_B],
@@ -154,6 +159,7 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
         ("if-match", [_TAG_A, _WRITTEN]),
         ("if-match", [*_UNSTABLE, *_UNSTABLE]),
         ("if-match", [_TAG_A, one("DELETE /tubes/1 204", if_match='"x"')]),
+        ("if-match", [_TAG_A, _SECOND, one("PATCH /tubes/1 200", _C, _C, if_match='"x", "a"')]),
         ("if-match", [_TAG_A, one("PATCH /tubes/1 412", body=_B, if_match='"x"'), _TAG_B]),
         ("if-match", [_TAG_A, one("DELETE /tubes/1 412", if_match='"x"'), one("GET /tubes/1 404")]),
         ("if-match", [_TAG_A, one("PUT /tubes/1 412", body=_B, if_match='"a"'), _TAG_A]),

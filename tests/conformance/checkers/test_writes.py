@@ -88,6 +88,23 @@ _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
+    "a JSON patch moves, and leaves what it moves": (
+        [
+            _get("/steps", words=["z", "b"]),
+            _patch("/steps", [_op("move", "/note", **{"from": "/words/0"})], words=["z", "b"], note="z"),
+            _get("/steps", words=["z", "b"], note="z"),
+        ], PATCH,
+    ),
+    "a JSON patch that removes, and nothing goes": (
+        [_get("/steps"), ("PATCH", "/steps", [_op("remove", "/note")], 200, {**_FIRST}), _get("/steps")], PATCH,
+    ),
+    "a test that takes a list in any order": (
+        [
+            _get("/steps", words=["a", "b"]),
+            _patch("/steps", [_op("test", "/words", ["b", "a"]), _op("replace", "/gain", 2)], words=["a", "b"], gain=2),
+            _get("/steps", words=["a", "b"], gain=2),
+        ], KEPT,
+    ),
     "readOnly by a merge patch": (
         [_get("/merge"), _patch("/merge", {"built": "roaas-own"}), _get("/merge", built="roaas-own")], OWN,
     ),
@@ -202,6 +219,13 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "a JSON patch moves": [
+        _get("/steps", words=["z", "b"]),
+        _patch("/steps", [_op("move", "/note", **{"from": "/words/0"})], words=["b"], note="z"),
+        _get("/steps", words=["b"], note="z"),
+    ],
+    "a JSON patch removes what has a default": [_get("/steps", count=5), _patch("/steps", [_op("remove", "/count")],
+        count=5), _get("/steps", count=5)],
     "a double as it was, and once as another client wrote it": [
         *(_get("/merge"), _patch("/merge", {"exact": 3.12345678901234}), _get("/merge", exact=3.12345678901234)),
         *(_patch("/merge", {"exact": 2.5}), _get("/merge", exact=2.5000001)),

@@ -1,0 +1,109 @@
+"""Operations that the state of things forbade in the survey: others bring the state about, on things made for that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.api.call_rules import words_of
+from conformance.api.rest.applicable import callable_operations
+from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.statuses import HELD
+from conformance.api.rest.things import collection_of
+from conformance.api.rest.values import Values
+from conformance.api.rest.variations import Kind, Variation
+from conformance.checkers.changes import ANOTHER
+from conformance.documents.openapi import Operation
+from conformance.scenarios.own_things import created_path
+from conformance.scenarios.scenario import NoOccasionError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Probe, Survey, Surveyor
+from conformance.transport.exchange import NoAnswerError, Outgoing
+
+# So many operations are tried, each after so many others.
+_HELD, _OTHERS = 6, 6
+# Operations after which a thing takes no other one.
+_FINAL: Final = frozenset({"cancel", "abort", "stop", "end", "finish", "terminate"})
+
+
+@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
+def held_operations(api: RestInterface, values: Values) -> Survey:
+    """Call what the state forbade on a new thing, after other operations of it and those that the description names."""
+    callable_ = {key: one for key, one in callable_operations(api).items() if not one.motion}
+    surveyor, actions = Surveyor(api, values), [one for one in callable_.values() if _acts(one)]
+    is_held = {one.label: api.usual_status.get(one.label) in HELD and one.label not in api.working for one in actions}
+    for operation in [one for one in actions if is_held[one.label] or ANOTHER.search(one.text)][:_HELD]:
+        api.run.limit.check()
+        with api.run.limit.lifted(), suppress(NoAnswerError):
+            _Held(surveyor, callable_, operation, actions).called()
+    if not surveyor.probes:
+        raise NoOccasionError("the state of no thing forbade an operation")
+    return surveyor.trace
+
+
+def _acts(operation: Operation) -> bool:
+    """Return whether an operation acts without content, and creates nothing."""
+    return operation.method == "POST" and not operation.bodies and "201" not in operation.responses
+
+
+@dataclass
+class _Held:
+    """One operation, with what may bring its state about."""
+
+    surveyor: Surveyor
+    operations: Mapping[tuple[str, str], Operation]
+    operation: Operation
+    actions: list[Operation]
+
+    def __post_init__(self) -> None:
+        self.item = self.operation.template.rpartition("}")[0] + "}"
+        below = [one for one in self.actions if one.template.startswith(f"{self.item}/") and one is not self.operation]
+        self._endings = [one for one in below if words_of(one.template[len(self.item) :]) & _FINAL]
+        # What is beside it, and named by its description, before what is done with the thing itself.
+        said = words_of(self.operation.text)
+        named = [one for one in self.actions if "{" not in one.template and one is not self.operation]
+        found = sorted(named, key=lambda one: -len(said & words_of(one.template)))
+        found = [one for one in found if said & words_of(one.template)]
+        self._others = [*found, *(one for one in below if one not in self._endings)][:_OTHERS]
+
+    def called(self) -> None:
+        """Call it until it is accepted, and then on another thing, where the description speaks of a second one."""
+        path = self._made()
+        if not path and "}" in self.operation.template:
+            return
+        is_done = self._call(self.operation, path).ok
+        for other in self._others if not is_done else ():
+            self._call(other, path)
+            if is_done := self._call(self.operation, path).ok:
+                break
+        second = self._made() if is_done and path and ANOTHER.search(self.operation.text) else ""
+        if second:
+            self._read(path)
+            self._call(self.operation, second)
+            self._read(path)
+        for ending in self._endings:
+            for one in filter(None, (second, path)):
+                self._call(ending, one)
+
+    def _made(self) -> str:
+        """Create a thing for it; return where it is, or nothing."""
+        create = self.operations.get(("POST", collection_of(self.item)))
+        read = self.operations.get(("GET", self.item))
+        return created_path(self.surveyor, create, read) if create is not None and read is not None else ""
+
+    def _read(self, path: str) -> None:
+        read = self.operations["GET", self.item]
+        inputs = usual_inputs(read, self.surveyor.values)[0]
+        self.surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), Outgoing("GET", path))
+
+    def _call(self, operation: Operation, path: str) -> Probe:
+        """Call an operation, of a thing if it is one's."""
+        inputs = usual_inputs(operation, self.surveyor.values)[0]
+        request = written(operation, inputs)
+        if operation.template.startswith(f"{self.item}/"):
+            target = path.rstrip("/") + operation.template[len(self.item) :]
+            request = Outgoing(request.method, target, request.headers, request.body)
+        return self.surveyor.send(operation, Variation(Kind.AGAIN, "", "", inputs), request)
