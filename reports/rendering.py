@@ -9,6 +9,7 @@ from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_enve
 from reports.attestation.statement import RESULT_SUBJECT, sha256
 from reports.certificate.moves_drawn import pictures
 from reports.certificate.page import Seal, certificate_html, certificate_print
+from reports.certificate.states_shown import grid
 from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS
@@ -88,8 +89,9 @@ def _conformance(path: Path, notary: "Notary | None") -> dict[str, str]:
         notary.check(path, octets, document)
     seal = Seal(digest, notary.key if notary else _signed_by(path, digest))
     drawn = pictures(path.parent, document) if "motion" in document["classes"] else []
+    shown = grid(path.parent, document) if "states" in document["classes"] else None
     pages = {
-        "certificate.html": certificate_html(document, seal, drawn),
+        "certificate.html": certificate_html(document, seal, drawn, shown),
         **_in_formats(document, ("markdown", "junit")),
     }
     if seal.key:

@@ -382,10 +382,9 @@ def _notes(run: Run) -> tuple[str, ...]:
         near = difflib.get_close_matches(pattern, labels, 1)
         meant = f"; did you mean {near[0]!r}?" if near else "."
         notes.append(f"The pattern {pattern!r} matches no operation of the description{meant}")
-    if run.allow_motion and not (run.contract.is_claimed or run.statement.motion_map):
-        notes.append(
-            "--allow-motion allows nothing here, as the statement has no motion map: --call allows operations."
-        )
-    if run.contract.is_claimed and not run.allow_motion:
+    maps = run.statement.motion_map or run.statement.state_map
+    if run.allow_motion and not (run.contract.is_claimed or maps):
+        notes.append("--allow-motion allows nothing here, as the statement has no map: --call allows operations.")
+    if not run.allow_motion and (run.contract.is_claimed or maps):
         notes.append("Without --allow-motion nothing was sent that moves the robot; what needs motion is skipped.")
     return tuple(notes)

@@ -26,6 +26,8 @@ TITLE: Final = "its own description"
 MOTION: Final = "motion"
 #: The class that a ROS map claims.
 ROS: Final = "ros-gateway"
+#: The class that a state map claims.
+STATES: Final = "states"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
 #: What a web server does by itself, for a device of either kind.

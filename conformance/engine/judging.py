@@ -150,7 +150,7 @@ def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], tra
     """Judge the traces of scenarios by the contract's rules."""
     run = robot.run
     known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort}
-    maps = {"motion": run.statement.motion_map, "ros": run.statement.ros_map}
+    maps = {"motion": run.statement.motion_map, "ros": run.statement.ros_map, "state_map": run.statement.state_map}
     for rule, scenario in rules:
         recording = traces.played.get(scenario.name)
         lacking = any(name in rule.fixtures for name, found in maps.items() if found is None)

@@ -28,6 +28,7 @@ from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import RosMap
+from conformance.statement.state_map import StateMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
 from conformance.verdict.evidence import Checker, Observers
@@ -116,6 +117,14 @@ def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
     if interfaces.rest is None:
         raise NotPossibleError("the device has no REST interface")
     return MappedDevice(interfaces.rest, motion, binding=binding_of(interfaces.rest))
+
+
+@pytest.fixture(scope="session")
+def state_map(run: Run) -> StateMap:
+    """Return the state map; the class that needs it is judged only where there is one."""
+    if run.statement.state_map is None:
+        raise NotPossibleError("the statement has no state map")
+    return run.statement.state_map
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,7 @@ from conformance.statement.load import Load, ServiceLevel
 from conformance.statement.motion_calls import written_out
 from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import RosMap, read_ros_map
+from conformance.statement.state_map import StateMap
 
 
 class StatementError(TomlFileError):
@@ -62,6 +63,7 @@ class Statement(msgspec.Struct, frozen=True):
         calls: what may be called.
         motion_map: how a device moves of which only its description is known, or None.
         ros_map: what the device, a ROS 2 web gateway, makes of a ROS graph, or None.
+        state_map: which operation the device takes in which of its states, or None.
         slo: service levels by operation, which a load test judges.
     """
 
@@ -73,6 +75,7 @@ class Statement(msgspec.Struct, frozen=True):
     calls: Calls = Calls()
     motion_map: MotionMap | None = None
     ros_map: RosMap | None = None
+    state_map: StateMap | None = None
     slo: dict[str, ServiceLevel] = {}
 
     @property
@@ -192,6 +195,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     auth: Auth | None = None
     motion: Any = None
     ros: Any = None
+    states: StateMap | None = None
     slo: dict[str, Any] = {}
 
     def read(self, contract: Contract, path: Path) -> Statement:
@@ -200,7 +204,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Raises:
             StatementError: it claims an unknown class or profile, or has a map that is invalid or has no use.
         """
-        for name, table in (("motion", self.motion), ("ros", self.ros)):
+        for name, table in (("motion", self.motion), ("ros", self.ros), ("states", self.states)):
             if table is not None and contract.is_claimed:
                 raise StatementError(
                     f"{path}: [{name}] is for a device that is judged by its own description: see [api]"
@@ -211,7 +215,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise StatementError(f"{path}: [motion] {error}") from error
         moves = None if motion is None else fit({"motion": motion}, _Map, str(path), StatementError).motion
         ros = None if self.ros is None else read_ros_map(self.ros, str(path), StatementError)
-        return Statement(**self.common(contract, path), motion_map=moves, ros_map=ros)
+        return Statement(**self.common(contract, path), motion_map=moves, ros_map=ros, state_map=self.states)
 
     def common(self, contract: Contract, path: Path) -> dict[str, Any]:
         """Return the attributes that every statement has, by name.
@@ -256,16 +260,17 @@ class _Addresses(msgspec.Struct, frozen=True):
     auth: Auth | None = None
     motion: Any = None
     ros: Any = None
+    states: Any = None
 
 
 def maps_in(path: Path) -> tuple[str, ...]:
-    """Return which maps a statement on a device with a description has: motion, ros.
+    """Return which maps a statement on a device with a description has: motion, ros, states.
 
     Raises:
         StatementError: the statement cannot be read.
     """
     found = read_toml(path, _Addresses, StatementError)
-    return tuple(name for name in ("motion", "ros") if getattr(found, name) is not None)
+    return tuple(name for name in ("motion", "ros", "states") if getattr(found, name) is not None)
 
 
 def api_of(path: Path) -> Api:

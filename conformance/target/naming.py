@@ -17,7 +17,7 @@ from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_ros, lacking_soap
 from conformance.commandline.help_pages import USUAL_STATEMENT
 from conformance.commandline.out_folder import FolderError, held
-from conformance.contract.described import MOTION, ROS
+from conformance.contract.described import MOTION, ROS, STATES
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
@@ -225,7 +225,7 @@ def _mapped(statement: Path | None, options: DeviceOptions) -> tuple[str, ...]:
         click.UsageError: ROS is not installed.
     """
     maps = maps_in(statement) if statement else ()
-    moves = (MOTION,) if options.moves or "motion" in maps else ()
+    moves = ((MOTION,) if options.moves or "motion" in maps else ()) + ((STATES,) if "states" in maps else ())
     if not (options.ros or options.ros_play):
         return moves
     if "ros" not in maps:
@@ -244,6 +244,7 @@ def _check_map(declared: Statement, contract: Contract) -> None:
     labels = [operation.label for operation in operations_of(contract)]
     calls = [("motion", call) for call in (declared.motion_map.calls if declared.motion_map else ())]
     calls += [("ros.operations", call) for call in (declared.ros_map.calls if declared.ros_map else ())]
+    calls += [("states", call) for call in (declared.state_map.calls if declared.state_map else ())]
     for table, call in calls:
         if not named_by([call], labels):
             near = difflib.get_close_matches(call, labels, 1, 0)

@@ -136,7 +136,8 @@ class Run:
     def mapped(self) -> tuple[str, ...]:
         """The operations that maps in the statement name, of those that may be called in this run."""
         said = self.statement
-        moves = said.motion_map.calls if said.motion_map and self.allow_motion else ()
+        maps = (said.motion_map, said.state_map) if self.allow_motion else ()
+        moves = [call for one in maps if one for call in one.calls]
         acts = self.ros == "play" or (self.ros and self.allow_motion)
         return (*moves, *(said.ros_map.calls if said.ros_map and acts else ()))
 

@@ -68,20 +68,30 @@ def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
         result: the run's result, with the class ``motion``.
     """
     try:
-        octets = unzipped(read_octets(folder / TRACES_NAME, root=folder), zlib.MAX_WBITS | 16)
-        traces = parsed(octets.decode("utf-8"))
-        named = [
-            failure.get("message", "")
-            for one in result["requirements"]
-            if one["class"] == "motion"
-            for failure in one.get("failures", ())
-        ]
-        moves = list(_moves(traces))
+        named = messages(result, "motion")
+        moves = list(_moves(traces_in(folder)))
         ranges = _ranges(moves)
         drawn = [_picture(one, named, ranges) for one in moves]
     except (ReportError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
     return sorted(filter(None, drawn), key=lambda one: not one.failed)[:_MOST]
+
+
+def traces_in(folder: Path) -> dict[str, Any]:
+    """Return the traces of a run by scenario.
+
+    Raises:
+        ReportError, ValueError, RecursionError: they cannot be read.
+    """
+    octets = unzipped(read_octets(folder / TRACES_NAME, root=folder), zlib.MAX_WBITS | 16)
+    found: dict[str, Any] = parsed(octets.decode("utf-8"))
+    return found
+
+
+def messages(result: Mapping[str, Any], of_class: str) -> list[str]:
+    """Return what the findings of a class say."""
+    failures = (one.get("failures", ()) for one in result["requirements"] if one["class"] == of_class)
+    return [failure.get("message", "") for found in failures for failure in found]
 
 
 def _moves(traces: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from reports.certificate.described import WORDS, Described, described
 from reports.certificate.moves_drawn import Picture
+from reports.certificate.states_shown import Grid
 from reports.findings import FOLDED, QUESTIONS, Finding, by_cause, by_requirement, by_topic, findings
 from reports.pages.page import html_page
 
@@ -313,15 +314,18 @@ def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
         yield Untested(reason, because_of, tuple(requirements))
 
 
-def certificate_html(result: Mapping[str, Any], seal: Seal | None = None, drawn: Sequence[Picture] = ()) -> str:
+def certificate_html(
+    result: Mapping[str, Any], seal: Seal | None = None, drawn: Sequence[Picture] = (), grid: Grid | None = None
+) -> str:
     """Return the certificate of a result as an HTML page.
 
     Args:
         result: a valid `roaas-result/1` document.
         seal: the fingerprints to show.
         drawn: how the device moved.
+        grid: what it took in which state.
     """
-    return html_page("certificate.html.j2", seal=seal, drawn=drawn, **page_values(result))
+    return html_page("certificate.html.j2", seal=seal, drawn=drawn, grid=grid, **page_values(result))
 
 
 def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:

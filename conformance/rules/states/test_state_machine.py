@@ -1,0 +1,110 @@
+"""Whether a device takes and refuses operations by its states, and goes from one to the other (state map)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from conformance.scenarios.rule import Note, NotSeen, Outcome, rule
+from conformance.scenarios.states import Step, Walk, walked
+from conformance.statement.state_map import StateMap
+from conformance.verdict.evidence import Case
+
+# What a state that changes by itself may excuse once it does not excuse twice.
+_TWICE = 2
+
+
+def _found(step: Step) -> str:
+    return f"status {step.exchange.response.status}" + ("" if step.taken else ", which is a refusal")
+
+
+@rule("states/taken", on=(walked,))
+def taken(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
+    """Judge whether operations are taken where they must be; a state that ended meanwhile is an excuse."""
+    for step in trace.steps:
+        ended = step.shown[0] != step.state and step.state in state_map.changes
+        if state_map.operations[step.operation].is_taken_in(step.state) and (step.taken or not ended):
+            expected = f"a 2xx for {step.operation} in {step.state}"
+            yield Case(step.taken, step.exchange, expected, _found(step), f"{step.operation} in {step.state}")
+    yield from _unseen(trace)
+
+
+def _unseen(trace: Walk) -> Iterator[Outcome]:
+    """Say what the walk did not show, and where it ended."""
+    seen = {(step.operation, step.state) for step in trace.steps}
+    lacking = [state for state in trace.states if not any((name, state) in seen for name in trace.operations)]
+    if lacking:
+        yield Note(f"No operation was sent in the state {', '.join(lacking)}: the walk did not come there.")
+    if strange := {state for step in trace.steps for state in step.shown} - set(trace.states):
+        yield Note(f"The device showed {', '.join(sorted(strange))}, which the state map does not name.")
+    if trace.last != trace.first:
+        yield Note(f"The device is in the state {trace.last} now; it was {trace.first} before, and no way led back.")
+
+
+@rule("states/refused", on=(walked,))
+def refused(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
+    """Judge whether operations are refused where they must be; in a state that changes by itself, twice."""
+
+    def place(step: Step) -> tuple[str, str]:
+        return step.operation, step.state
+
+    for (name, state), steps in groupby(sorted(trace.steps, key=place), key=place):
+        one, tries = state_map.operations[name], list(steps)
+        if one.is_taken_in(state):
+            continue
+        wrong = [step for step in tries if step.taken or _status(step) not in (one.refusal or (_status(step),))]
+        if state in state_map.changes and wrong and (len(tries) < _TWICE or len(wrong) < len(tries)):
+            yield NotSeen(f"{state} may have ended before {name} came")
+            continue
+        wanted = " or ".join(map(str, one.refusal)) or "4xx"
+        shown = (wrong or tries)[0]
+        expected = f"{wanted} for {name} in {state}"
+        yield Case(not wrong, shown.exchange, expected, f"status {_status(shown)}", f"{name} in {state}")
+
+
+def _status(step: Step) -> int:
+    return step.exchange.response.status
+
+
+@rule("states/keeps", on=(walked,))
+def keeps(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
+    """Judge whether refused operations leave the state as it was."""
+    for step in trace.steps:
+        if not step.taken:
+            may, expected = state_map.following(step.state), f"the state kept by {step.operation} in {step.state}"
+            others = [state for state in step.shown if state not in may]
+            found = f"{', then '.join(step.shown)}"
+            yield Case(not others, step.exchange, expected, found, f"{step.operation} in {step.state}")
+
+
+@rule("states/leads", on=(walked,))
+def leads(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
+    """Judge whether operations that were taken have their effect, and whether it lasts."""
+    for step in trace.steps:
+        one = state_map.operations[step.operation]
+        if not (step.taken and one.is_taken_in(step.state)):
+            continue
+        wanted, within_s = one.to or step.state, one.within_s or state_map.within_s
+        lasts = step.shown[-1] in state_map.following(wanted)
+        expected = f"the state {wanted} within {within_s:g} s after {step.operation} in {step.state}, and afterwards"
+        found = f"{', then '.join(step.shown)}" + ("" if step.arrived else f" after {within_s:g} s")
+        yield Case(step.arrived and lasts, step.exchange, expected, found, f"{step.operation} in {step.state}")
+
+
+@rule("states/order", on=(walked,))
+def order(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
+    """Judge whether the states on the way are those of the map, in its order."""
+    for step in trace.steps:
+        one = state_map.operations[step.operation]
+        if not (step.taken and one.to and one.is_taken_in(step.state)):
+            continue
+        way = [state_map.following(step.state) - {one.to}, *({state} for state in one.via), state_map.following(one.to)]
+        at = 0
+        for state in step.shown:
+            if state in trace.states:
+                at = next((index for index in range(at, len(way)) if state in way[index]), len(way))
+        named = ", ".join((step.state, *one.via, one.to))
+        expected = f"of {named} each at most once, in this order, after {step.operation}"
+        yield Case(
+            at < len(way), step.exchange, expected, ", then ".join(step.shown), f"{step.operation} in {step.state}"
+        )

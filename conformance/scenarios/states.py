@@ -1,0 +1,208 @@
+"""A device is led through its states by its state map, and each operation is sent in each state that is reached."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from conformance.api.rest.interface import RestInterface
+from conformance.observe.clock import WALL_CLOCK, Clock, poll_for
+from conformance.scenarios.motion.binding import Binding, binding_of
+from conformance.scenarios.motion.templates import NoValueError, at
+from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.state_map import StateMap
+from conformance.transport.exchange import Exchange, NoAnswerError
+
+# Between two looks at the state; so long a state that was reached is watched, and one that a refusal left, s.
+_PACE_S: Final = 0.03
+_STAYS_S: Final = 0.3
+_KEEPS_S: Final = 0.1
+# Where a state changes by itself, an operation may come too late for it, and is sent again so often.
+_TRIES: Final = 3
+# So many times as many operations are sent as there are pairs of an operation and a state: some only lead elsewhere.
+_WAYS: Final = 4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One operation that was sent.
+
+    Attributes:
+        operation: its name in the map.
+        state: the state that was read just before.
+        exchange: the request and its response.
+        taken: whether the device took it: a 2xx that says of no failure.
+        shown: the states that were read afterwards, each once in a row.
+        arrived: whether the state to which it leads was seen in time.
+    """
+
+    operation: str
+    state: str
+    exchange: Exchange
+    taken: bool
+    shown: tuple[str, ...]
+    arrived: bool
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A walk through the states.
+
+    Attributes:
+        states: those of the map.
+        operations: by name, the states in which each must be taken.
+        steps: what was sent.
+        first: the state at the beginning.
+        last: the state at the end.
+    """
+
+    states: tuple[str, ...]
+    operations: dict[str, tuple[str, ...]]
+    steps: tuple[Step, ...]
+    first: str
+    last: str
+
+
+class _Walker:
+    """Leads one device.
+
+    Args:
+        api: its interface.
+        states: its map.
+        clock: the run's.
+    """
+
+    def __init__(self, api: RestInterface, states: StateMap, clock: Clock) -> None:
+        self._api, self._map, self._clock = api, states, clock
+        self._binding: Binding = binding_of(api)
+        self._tried: Counter[tuple[str, str]] = Counter()
+        # Where each operation led from a state, as the map says or as it was seen; "": nowhere.
+        self._led: dict[tuple[str, str], str] = {}
+        self.steps: list[Step] = []
+        self.first = self.here = self._read()
+
+    def walk(self) -> None:
+        """Send each operation in each state that can be reached, refused ones first."""
+        most = _WAYS * len(self._map.states) * len(self._map.operations)
+        while (chosen := self._next()) is not None and len(self.steps) < most:
+            self._api.run.limit.check()
+            self._go(chosen)
+
+    def go_back(self) -> None:
+        """Lead the device to its first state, if the map has a way."""
+        for _ in self._map.states:
+            if self.here == self.first or (way := self._way(lambda state: state == self.first)) is None:
+                return
+            self._go(way)
+
+    def _next(self) -> str | None:
+        """Return the operation to send now, "" to wait for a change; None: nothing is left that can be reached."""
+        untried = [name for name in self._map.operations if not self._is_done(name, self.here)]
+        refused = [name for name in untried if not self._map.operations[name].is_taken_in(self.here)]
+        # What leaves the state comes last.
+        stays = [name for name in untried if name not in refused and not self._map.operations[name].to]
+        if found := [*refused, *stays, *untried]:
+            return found[0]
+        return self._way(lambda state: not all(self._is_done(name, state) for name in self._map.operations))
+
+    def _is_done(self, name: str, state: str) -> bool:
+        return self._tried[name, state] >= (_TRIES if state in self._map.changes else 1)
+
+    def _way(self, is_wanted: Callable[[str], bool]) -> str | None:
+        """Return the first operation of the shortest way to a state, "" to wait; None: there is none."""
+        seen, left = {self.here}, deque[tuple[str, str | None]]([(self.here, None)])
+        while left:
+            state, begun_by = left.popleft()
+            if begun_by is not None and is_wanted(state):
+                return begun_by
+            for step, to in self._edges(state):
+                if to not in seen:
+                    seen.add(to)
+                    left.append((to, step if begun_by is None else begun_by))
+        return None
+
+    def _edges(self, state: str) -> Iterator[tuple[str, str]]:
+        for name, one in self._map.operations.items():
+            to = self._led.get((name, state), one.to if one.is_taken_in(state) else "")
+            if to:
+                yield name, to
+        change = self._map.changes.get(state)
+        if change is not None and change.within_s is not None:
+            yield from (("", to) for to in change.to if ("", state) not in self._led)
+
+    def _go(self, name: str) -> None:
+        if not name:
+            before, within_s = self.here, self._map.changes[self.here].within_s or 0.0
+            for _ in poll_for(self._clock, _PACE_S, within_s):
+                self.here = self._read()
+                if self.here != before:
+                    return
+            self._led["", before] = ""
+            return
+        one, before = self._map.operations[name], self._read()
+        self._tried[name, before] += 1
+        made = self._binding.made(name, one.body)
+        exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
+        taken = exchange.response.ok and not self._failed(exchange)
+        wanted = self._map.following(one.to or before) if taken else self._map.following(before)
+        within_s = (one.within_s or self._map.within_s) if taken else _KEEPS_S
+        shown, arrived = [self._read()], False
+        for _ in poll_for(self._clock, _PACE_S, within_s):
+            arrived = shown[-1] in wanted
+            if arrived:
+                break
+            self._look(shown)
+        for _ in poll_for(self._clock, _PACE_S, _STAYS_S if taken else _KEEPS_S):
+            self._look(shown)
+        self.steps.append(Step(name, before, exchange, taken, tuple(shown), arrived or shown[-1] in wanted))
+        self.here = shown[-1]
+        self._led[name, before] = self.here if self.here != before else ""
+
+    def _look(self, shown: list[str]) -> None:
+        state = self._read()
+        if state != shown[-1]:
+            shown.append(state)
+
+    def _read(self) -> str:
+        made = self._binding.made(self._map.read, None)
+        exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
+        try:
+            return str(at(self._binding.content(exchange.response.body), self._map.at))
+        except NoValueError as error:
+            raise NotPossibleError(f"[states] {self._map.read} got {exchange.came}: {error}") from error
+
+    def _failed(self, exchange: Exchange) -> bool:
+        if self._map.failed is None:
+            return False
+        try:
+            said = at(self._binding.content(exchange.response.body), self._map.failed.at)
+        except NoValueError:
+            return False
+        return bool(said != self._map.failed.is_not)
+
+
+@scenario(needs=(Need.REST,), leaves=Leaves.AT_REST, stage=Stage.DRIVE)
+def walked(api: RestInterface, state_map: StateMap) -> Walk:
+    """Send each operation of the state map in each state that can be reached, and return to the first state."""
+    if not api.run.allow_motion:
+        raise NotPossibleError("the operations of [states] act on the device, and --allow-motion was not given")
+    walker = _Walker(api, state_map, WALL_CLOCK)
+    taken_in = {name: one.taken_in or state_map.states for name, one in state_map.operations.items()}
+
+    def seen() -> Walk:
+        return Walk(state_map.states, taken_in, tuple(walker.steps), walker.first, walker.here)
+
+    try:
+        walker.walk()
+        walker.go_back()
+    except BaseException as error:
+        with suppress(NoAnswerError, NotPossibleError):
+            walker.go_back()
+        if isinstance(error, NoAnswerError | NotPossibleError):
+            raise PartialTraceError(seen()) from error
+        raise
+    return seen()

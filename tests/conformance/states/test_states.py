@@ -1,0 +1,112 @@
+"""The class states: a right cell is led through all states, and each fault of its state machine is named."""
+
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
+
+import msgspec
+import pytest
+from cell import FAULTS, MAP, Cell
+from driven_device import driven
+from small_device import certified, small_device
+
+from conformance.contract.pack import Contract
+from conformance.rules.states import test_state_machine
+from conformance.scenarios.rule import Rule
+from conformance.scenarios.states import walked
+from conformance.statement.state_map import StateMap
+from conformance.statement.statement import StatementError, load_statement
+from conformance.verdict.evidence import Case
+from reports.certificate.states_shown import grid
+
+_RULES = [one for one in vars(test_state_machine).values() if isinstance(one, Rule)]
+
+
+@pytest.fixture
+def judged(tmp_path):
+    """Return the outcome of one run over the class, by a device and more of its map."""
+
+    def run(cell, more="", *options):
+        statement = tmp_path / "cell.toml"
+        with small_device(cell.description, cell.routes) as url:
+            statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{MAP}{more}', encoding="utf-8")
+            return certified(statement, tmp_path / "out", "--select", "states", *(options or ("--allow-motion",)))
+
+    return run
+
+
+def _failed(cell, folder):
+    """Return the requirements that a device breaks, without a run of the command."""
+    states = msgspec.convert(tomllib.loads(MAP)["states"], StateMap)
+    with driven(cell.description, cell.routes, folder) as (api, _, _):
+        api.run.allow_motion = True
+        walk = walked.play(api, states)
+    judged = {one.requirement: list(one.judge(walk, states)) for one in _RULES}
+    assert all(any(isinstance(one, Case) for one in found) for found in judged.values())
+    return {
+        name.partition("/")[2]
+        for name, found in judged.items()
+        if not all(one.holds for one in found if isinstance(one, Case))
+    }
+
+
+def test_a_right_cell_is_led_through_all_states_and_back(judged, tmp_path):
+    cell = Cell()
+    outcome = judged(cell)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert outcome.requirement("states/refused")["cases"] == 15
+    assert cell.state == "ready"
+    shown = grid(tmp_path / "out", outcome.result)
+    assert shown is not None
+    assert "".join(cell.sign[:3] for cell in shown.rows["POST /reset"]) == "✓ r·✓ r✓ r✓ t"
+
+
+@pytest.fixture(scope="module")
+def failed_by(tmp_path_factory):
+    """Return the requirements that each fault breaks; the devices are led at the same time, as each mostly waits."""
+    folders = {fault: tmp_path_factory.mktemp("cell") for fault in FAULTS}
+    with ThreadPoolExecutor(len(FAULTS)) as pool:
+        return dict(zip(FAULTS, pool.map(lambda fault: _failed(Cell(fault), folders[fault]), FAULTS), strict=True))
+
+
+@pytest.mark.parametrize(("fault", "requirement"), FAULTS.items())
+def test_a_fault_is_named(failed_by, fault, requirement):
+    assert requirement in failed_by[fault]
+    assert failed_by[fault] <= {requirement, "leads", "order", "keeps"}
+
+
+def test_a_program_that_ends_by_itself_is_no_fault(judged):
+    more = 'running = { to = ["ready"], within_s = 2 }\n'
+    outcome = judged(Cell(program_s=0.4), more)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+
+
+def test_nothing_is_sent_without_permission(judged):
+    cell = Cell()
+    outcome = judged(cell, "", "--never", "/nothing")
+    assert outcome.exit_code == 4
+    assert "--allow-motion" in outcome.text
+    assert cell.sent == []
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ('[states]\nread = "GET /cell"\nat = "/state"\noperations = {}\n', "fewer than two states"),
+        ('[states]\nread = "GET /cell"\nat = "state"\noperations = {}\n', "state"),
+        (
+            '[states]\nread = "GET /cell"\nat = "/s"\n[states.operations]\n"POST /a" = { to = "b", form = ["a"] }\n',
+            "form",
+        ),
+    ],
+)
+def test_a_wrong_map_is_told(tmp_path, table, said):
+    path = tmp_path / "cell.toml"
+    path.write_text(table, encoding="utf-8")
+    with pytest.raises(StatementError, match=said):
+        load_statement(path, Contract.load())
+
+
+def test_an_operation_that_the_description_lacks_is_told(judged):
+    outcome = judged(Cell(), '[states.operations."POST /strat"]\nto = "running"\n')
+    assert outcome.exit_code == 2
+    assert "did you mean 'POST /start'" in outcome.text
