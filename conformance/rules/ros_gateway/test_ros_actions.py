@@ -39,13 +39,9 @@ def once(trace: Goals) -> Iterator[Outcome]:
             continue
         wanted = 2 if one.course is Course.FIRST else 1
         goals = [heard for heard in one.heard if heard.what == "goal"]
-        yield Case(
-            len(goals) == wanted,
-            one.exchange,
-            f"{wanted} goal{'s' * (wanted > 1)} at {one.body.action} for {wanted} accepted",
-            observed=f"{len(goals)} goals",
-            cause="lost" if len(goals) < wanted else "doubled",
-        )
+        expected = f"{wanted} goal{'s' * (wanted > 1)} at {one.body.action} for {wanted} accepted"
+        cause = "lost" if len(goals) < wanted else "doubled"
+        yield Case(len(goals) == wanted, one.exchange, expected, f"{len(goals)} goals", cause)
         wanted_fields = mapped(json.loads(one.value), one.body)
         wrong = next(changed(mapped(goals[0].content, one.body), wanted_fields), None) if goals else None
         found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""

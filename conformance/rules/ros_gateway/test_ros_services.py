@@ -67,13 +67,8 @@ def once(trace: Services) -> Iterator[Outcome]:
         if one.server not in _RESPONDS or not one.answer or not one.succeeded:
             continue
         requests = [heard for heard in one.heard if heard.what == "request"]
-        yield Case(
-            len(requests) == 1,
-            one.attempt,
-            f"one call of {one.body.service} for one accepted request",
-            observed=f"{len(requests)} calls",
-            cause="lost" if not requests else "doubled",
-        )
+        expected, cause = f"one call of {one.body.service} for one accepted request", "doubled" if requests else "lost"
+        yield Case(len(requests) == 1, one.attempt, expected, f"{len(requests)} calls", cause)
         if requests:
             yield from _as_sent(one, requests[0])
     for crowd in trace.crowds:

@@ -17,7 +17,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import document_of, succeeded
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
@@ -139,16 +139,20 @@ class _Sender:
         self._serve()
         yield self._reached(Course.REACHED)
         feedback, result = [self._new("Feedback") for _ in range(_FEEDBACKS)], self._new("Result")
-        step = {"feedback": feedback, "gap_s": _GAP_S, "result": result}
-        yield self._followed(Course.SUCCEEDS, step)
-        yield self._followed(Course.ABORTS, {"gap_s": _RUNS_S, "end": "abort", "result": self._new("Result")})
-        yield self._followed(Course.REJECTED, {"reject": True})
-        if self._body.cancel:
-            canceled = {"feedback": feedback[:1], "end": "never", "result": self._new("Result")}
-            yield self._followed(Course.CANCELED, canceled)
-            goes_on = {"gap_s": _GOES_ON_S, "refuse_cancel": True, "result": self._new("Result")}
-            yield self._followed(Course.GOES_ON, goes_on)
-            yield from self._two()
+        steps: dict[Course, dict[str, Any]] = {
+            Course.SUCCEEDS: {"feedback": feedback, "gap_s": _GAP_S, "result": result},
+            Course.ABORTS: {"gap_s": _RUNS_S, "end": "abort", "result": self._new("Result")},
+            Course.REJECTED: {"reject": True},
+            Course.CANCELED: {"feedback": feedback[:1], "end": "never", "result": self._new("Result")},
+            Course.GOES_ON: {"gap_s": _GOES_ON_S, "refuse_cancel": True, "result": self._new("Result")},
+            Course.FIRST: {},
+        }
+        for course, step in list(steps.items())[: None if self._body.cancel else 3]:
+            for _ in range(TRIES):
+                goals = self._two() if course is Course.FIRST else [self._followed(course, step)]
+                if not any(gave_up(sent, self._body) for one in goals for sent in (one.exchange, one.cancel)):
+                    break
+            yield from goals
         self._gateway.robot.tell("forget", name=self._body.action)
         self._serve()
         yield self._reached(Course.BACK)
@@ -203,7 +207,7 @@ class _Sender:
         heard = tuple(robot.heard(self._body.action, 2, _MORE_S))
         return replace(goal, looks=tuple(looks), cancel=cancel, heard=heard)
 
-    def _two(self) -> Iterator[Goal]:
+    def _two(self) -> list[Goal]:
         """Send two goals, cancel the first, and follow both; then cancel the second."""
         robot, body = self._gateway.robot, self._body
         steps = [{"end": "never", "result": self._new("Result")} for _ in range(2)]
@@ -212,15 +216,15 @@ class _Sender:
         second = self._goal(Course.SECOND, value, exchange, steps[1])
         if not (first.accepted and second.accepted):
             # A server, or a gateway, may take one goal at a time.
-            return
+            return []
         cancel = self._cancel(first)
         ended = self._watched(first, WALL_CLOCK.now() + body.within_s + _LATE_S, self._has_ended)
         went_on = self._watched(second, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
         heard = tuple(robot.heard(body.action, 4, _MORE_S))
-        yield replace(first, looks=tuple(ended), cancel=cancel, heard=heard)
-        yield replace(second, looks=tuple(went_on), heard=heard)
         self._cancel(second)
         robot.heard(body.action, 2, _MORE_S)
+        first = replace(first, looks=tuple(ended), cancel=cancel, heard=heard)
+        return [first, replace(second, looks=tuple(went_on), heard=heard)]
 
     def _cancel(self, goal: Goal) -> Exchange | None:
         made = self._of(goal, self._body.cancel)

@@ -24,6 +24,8 @@ _Operation = TypeVar("_Operation")
 CROWD: Final = 32
 # From one look at the gateway to the next, s.
 PACE_S: Final = 0.03
+#: A busy machine may need so much longer to show what comes at last, s.
+PATIENCE_S: Final = 10.0
 _DISCOVERY_S: Final = 15.0
 _KEYS: Final[dict[type, str]] = {
     Reads: "topic", Publishes: "publishes", Calls: "service", Acts: "action", Lists: "lists"

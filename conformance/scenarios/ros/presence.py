@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import value_at
-from conformance.scenarios.ros.gateway import PACE_S, Gateway
+from conformance.scenarios.ros.gateway import PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import differences, document_of, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
@@ -147,7 +147,7 @@ class _Topics:
             if body.topic not in values:
                 value = values[body.topic] = self._message(body.type)
                 self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, **quality)
-        until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values())
+        until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values()) + PATIENCE_S
         found: dict[str, Presence] = {}
         for turn in itertools.count(1):
             # Round after round, so that no message becomes too old while another one is awaited; several times, as a

@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
-from conformance.scenarios.ros.web import succeeded
+from conformance.scenarios.ros.web import TRIES, gave_up, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
@@ -85,7 +85,6 @@ class Called:
         server: what the server did.
         request, answer: JSON of what was sent, and of what the server responded; empty: nothing.
         attempt: what the gateway responded.
-        took: how long that took, s.
         ended: when it came.
         heard: what the server got.
         beside: requests to others at that time.
@@ -97,7 +96,6 @@ class Called:
     request: str
     answer: str
     attempt: Attempt
-    took: float
     ended: float
     heard: tuple[Heard, ...] = ()
     beside: tuple[Beside, ...] = ()
@@ -228,8 +226,12 @@ class _Caller:
         """Call a server that gives a response of its own to this call."""
         complete = self._complete("Response", answer.value)
         script = [{"answer": complete, "delay_s": delay_s}, {"answer": {}}]
-        self._gateway.robot.tell("script", name=self._body.service, script=script)
-        return self._called(server, request.value, complete)
+        for _ in range(TRIES):
+            self._gateway.robot.tell("script", name=self._body.service, script=script)
+            called = self._called(server, request.value, complete)
+            if not gave_up(called.attempt, self._body):
+                break
+        return called
 
     def _usual(self) -> tuple[Sample, Sample]:
         return self._requests.usual(), self._responses.usual()
@@ -243,12 +245,11 @@ class _Caller:
         robot, body = self._gateway.robot, self._body
         request = self._complete("Request", request)
         robot.heard(body.service)
-        began = WALL_CLOCK.now()
         attempt = self._sent(self._gateway.request(self._call, body, request), body.within_s + _LATE_S)
         ended = WALL_CLOCK.now()
         heard = () if answer is None else tuple(robot.heard(body.service, 3, _MORE_S))
         text = "" if answer is None else json.dumps(answer)
-        return Called(self._call, body, server, json.dumps(request), text, attempt, ended - began, ended, heard)
+        return Called(self._call, body, server, json.dumps(request), text, attempt, ended, heard)
 
     def _sent(self, made: Any, timeout_s: float) -> Attempt:
         try:
@@ -260,33 +261,20 @@ class _Caller:
 
     def _never_answered(self) -> Called:
         """Call a server that never responds, and read other resources until the gateway gives the call up."""
-        robot, body, clock = self._gateway.robot, self._body, WALL_CLOCK
+        robot, body = self._gateway.robot, self._body
         others = self._others()
         # Measured once: afterwards, a call may hold all others up for good.
         self._usual_s = self._usual_s or [self._read(call, read, 0.0).took for call, read in others]
         request = self._complete("Request", self._requests.usual().value)
         robot.tell("script", name=body.service, script=[{"never": True}])
         robot.heard(body.service)
-        began = clock.now()
-        made = self._gateway.request(self._call, body, request)
+        made, text = self._gateway.request(self._call, body, request), json.dumps(request)
         with meanwhile(self._gateway.api.client, made, body.within_s + _LATE_S) as hanging:
             heard = robot.heard(body.service, 1, body.within_s)
             beside = tuple(
                 self._read(call, read, took) for (call, read), took in zip(others, self._usual_s, strict=True) if heard
             )
-        attempt, ended = hanging.result()
-        return Called(
-            self._call,
-            body,
-            Server.SILENT,
-            json.dumps(request),
-            "",
-            attempt,
-            ended - began,
-            ended,
-            tuple(heard),
-            beside,
-        )
+        return Called(self._call, body, Server.SILENT, text, "", *hanging.result(), tuple(heard), beside)
 
     def _others(self) -> list[tuple[str, Reads | Lists]]:
         found = self._gateway.ros.operations.items()

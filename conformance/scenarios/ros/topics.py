@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition, value_at
-from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
+from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
 from conformance.scenarios.ros.web import differences, document_of, equal, succeeded
@@ -26,7 +26,7 @@ from conformance.verdict.effort import Effort
 _NEEDS: Final = (Need.REST,)
 # A message is published again so often, for gateways that subscribe when they are asked, or wait for the next one, s.
 _REPEAT_S: Final = 0.1
-_REPEAT_LARGE_S: Final = 0.5
+_REPEAT_LARGE_S: Final = 1.0
 # A large one that may be lost on the way is waited for so long, s.
 _LARGE_S: Final = 2.5
 # Reads in a row that show the same wrong message: it is not on its way any more.
@@ -131,6 +131,7 @@ class _Reader:
         published = self.gateway.robot.publish(reads.topic, reads.type, sample.value, repeat_s=repeat_s)
         reliably = published.reliably or sample.kind is not Kind.LARGE
         until = published.at + (max(reads.max_age_s or 0.0, reads.within_s) if reliably else _LARGE_S)
+        until += 0.0 if sample.kind is Kind.NON_FINITE else PATIENCE_S
         wrong: list[tuple[float, str]] = []
         earlier = 0
         while True:

@@ -24,6 +24,8 @@ from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Attempt, Exchange
 
 _SHOWN: Final = 80
+#: A request that fails after longer than that, ms, is sent so often, as its deadline may have passed.
+_SOON_MS, TRIES = 1000.0, 3
 _UUID: Final = 16
 #: What non-finite numbers are as strings: in JSON by the map, in XML by XML Schema (3.2.5).
 _NAMES: Final = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf, "INF": math.inf, "-INF": -math.inf}
@@ -65,6 +67,12 @@ def succeeded(attempt: Attempt, body: Body) -> bool:
         return False
     failure = body.failure
     return failure is None or value_at(document_of(attempt.response.body).value, failure.at) not in failure.values
+
+
+def gave_up(attempt: Attempt | None, body: Body) -> bool:
+    """Return whether a request failed after a while, as one does whose deadline passes on a busy machine."""
+    is_late = isinstance(attempt, Exchange) and attempt.response.elapsed_ms > _SOON_MS
+    return attempt is not None and is_late and not succeeded(attempt, body)
 
 
 def document_of(octets: bytes) -> Document:

@@ -196,6 +196,7 @@ def ros_map(style: Style, domain_id: int) -> str:
             "type": end.type,
             "at": style.call_at,
             "result": style.result_at,
+            "timeout_s": 2.5 * DEADLINE_S,
         }
     goals = style.goals.format(ACTION.name)
     operations[f"POST {goals}"] = {
