@@ -118,7 +118,8 @@ class _Reader:
         for sample in samples:
             shown = self.of(sample)
             yield shown
-            lost += sample.kind is not Kind.LARGE and not shown.was_shown and self.is_stale(shown.exchange)
+            waited_s = 0.0 if shown.was_shown else shown.sent - shown.published
+            lost += sample.kind is not Kind.LARGE and waited_s > self.reads.within_s
             if lost >= _GIVES_UP:
                 return
             self.contents.add(self.content(shown.exchange))
@@ -131,16 +132,17 @@ class _Reader:
         published = self.gateway.robot.publish(reads.topic, reads.type, sample.value, repeat_s=repeat_s)
         reliably = published.reliably or sample.kind is not Kind.LARGE
         until = published.at + (max(reads.max_age_s or 0.0, reads.within_s) if reliably else _LARGE_S)
-        until += 0.0 if sample.kind is Kind.NON_FINITE else PATIENCE_S
+        patience_s = 0.0 if sample.kind is Kind.NON_FINITE else PATIENCE_S
         wrong: list[tuple[float, str]] = []
         earlier = 0
         while True:
             sent = clock.now()
             exchange = self.gateway.read(self.call, self.reads)
             is_shown = self.shows(exchange, value, sample.kind)
-            if is_shown or sent > until:
+            is_stale = self.is_stale(exchange)
+            if is_shown or sent > until + is_stale * patience_s:
                 break
-            if self.is_stale(exchange):
+            if is_stale:
                 wrong, earlier = [], earlier + 1
             else:
                 here = self.content(exchange)
