@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from conformance.contract.toml_file import Finite, NotNegative
+from conformance.measures.samples import FARTHEST
 
 #: One limit for both directions, or the least and the greatest velocity, m/s or rad/s. It has no bounds of its own:
 #: msgspec 0.22 reads them from the wrong place in a union with a tuple, and crashes.
@@ -89,6 +90,18 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
     navigation_angular_rad_s: float | None = None
     linear_declared: bool
     angular_declared: bool
+
+    def rest(self, component: int, sigmas: float = FARTHEST, factor: float = 1.0) -> float:
+        """Return how far a component of a velocity (index into Velocity) may be off rest, m/s or rad/s.
+
+        Args:
+            component: index into Velocity.
+            sigmas: how many times its noise.
+            factor: how many times its tolerance.
+        """
+        if component < _ANGULAR:
+            return factor * self.tolerance_linear_m_s + sigmas * self.noise.linear_m_s
+        return factor * self.tolerance_angular_rad_s + sigmas * self.noise.angular_rad_s
 
     @property
     def arrival(self) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.letting_go import JUDGED, certain_s
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.transport.exchange import Exchange
@@ -47,35 +48,6 @@ class ConcurrentGoal:
 
 
 @dataclass(frozen=True)
-class Accepted:
-    """A velocity that the robot accepted.
-
-    Attributes:
-        velocity: the velocity in the PUT.
-        exchange: the PUT's request and response.
-    """
-
-    velocity: Velocity
-    exchange: Exchange
-
-
-@dataclass(frozen=True)
-class VelocityRead:
-    """A GET of the velocity.
-
-    Attributes:
-        sent, received: times of request and response, s of the run's clock.
-        velocity: the measured velocity; None where the response cannot be read.
-        exchange: the GET's request and response.
-    """
-
-    sent: float
-    received: float
-    velocity: Velocity | None
-    exchange: Exchange
-
-
-@dataclass(frozen=True)
 class ConcurrentVelocities:
     """Several clients' simultaneous PUTs of different velocities to a robot at rest.
 
@@ -86,13 +58,13 @@ class ConcurrentVelocities:
         last: whether this is the last try: reads that show no accepted velocity then count as a failure.
     """
 
-    accepted: tuple[Accepted, ...]
+    accepted: tuple[Command, ...]
     sent: float
     answered: float
-    reads: tuple[VelocityRead, ...]
+    reads: tuple[Turn, ...]
     last: bool
 
-    def read(self, one: VelocityRead) -> ConcurrentVelocities:
+    def read(self, one: Turn) -> ConcurrentVelocities:
         """Return a copy with one more GET of the velocity."""
         return replace(self, reads=(*self.reads, one))
 
@@ -107,14 +79,14 @@ class ConcurrentVelocities:
         """
         return math.inf if limits.hold_s is None else self.sent + certain_s(limits.hold_s, JUDGED)
 
-    def reached(self, limits: Limits) -> VelocityRead | None:
+    def reached(self, limits: Limits) -> Turn | None:
         """Return the GET that shows an accepted velocity, or None."""
         read = self.reads[-1] if self.reads else None
         if read is None or read.velocity is None:
             return None
         return read if any(is_near(limits, read.velocity, one.velocity, _NEAR) for one in self.accepted) else None
 
-    def missed(self, limits: Limits) -> VelocityRead | None:
+    def missed(self, limits: Limits) -> Turn | None:
         """Return the last GET that shows a wrong velocity while the robot had to drive an accepted one, or None.
 
         A mixture (one client's linear part with another's angular part) counts at once. Any other velocity counts only
@@ -123,7 +95,7 @@ class ConcurrentVelocities:
         settled, ends = self.settled(limits), self.ends(limits)
         if self.reached(limits) is not None or self.is_unreadable:
             return None
-        late = [one for one in self.reads if one.sent >= settled and one.received <= ends]
+        late = [one for one in self.reads if one.at >= settled and one.received <= ends]
         if not late or not (self.last or self._is_mixture(limits, late[-1].velocity)):
             return None
         return late[-1]

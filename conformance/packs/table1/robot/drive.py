@@ -8,12 +8,13 @@ from typing import Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.robot import drive_rules, windows
-from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Sighting, Trace, Turn
+from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Trace, Turn
 from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 # A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02
@@ -163,9 +164,7 @@ class Drive:
 
     def glance(self) -> None:
         """GET the velocity alone, which is faster than a whole look."""
-        at = self.clock.now()
-        velocity, exchange = self.robot.velocity()
-        self.trace = self.trace.looked(Turn(None, at, velocity, exchange, None, exchange))
+        self.trace = self.trace.looked(Turn(None, self.clock.now(), *self.robot.velocity()))
 
     def stop(self, moving: Velocity, by: Way = "velocity") -> bool:
         """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
@@ -280,16 +279,17 @@ class Drive:
             self.look()
 
     def saw(self, shows: str, expected: str, observed: str = "", cause: str = "", *, holds: bool | None) -> None:
-        """Record what the last look shows about a requirement; the arguments are those of Sighting."""
-        exchange = self.trace.turns[-1].velocity_exchange
-        seen = Sighting(shows, holds, exchange, expected, observed, cause)
-        self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
+        """Record what the last look shows about a requirement, as in Case; None: it came too late to tell."""
+        if holds is not None:
+            self._saw(shows, Case(holds, self.trace.turns[-1].velocity_exchange, expected, observed, cause))
 
     def refused(self, shows: str, expected: str) -> None:
         """Record that the robot rejected the last command, which a requirement forbids."""
         exchange = self.trace.commands[-1].exchange
-        seen = Sighting(shows, holds=False, exchange=exchange, expected=expected, cause=exchange.came)
-        self.trace = replace(self.trace, sightings=(*self.trace.sightings, seen))
+        self._saw(shows, Case(holds=False, exchange=exchange, expected=expected, cause=exchange.came))
+
+    def _saw(self, shows: str, seen: Case) -> None:
+        self.trace = replace(self.trace, sightings=(*self.trace.sightings, (shows, seen)))
 
     @property
     def whole(self) -> Trace:

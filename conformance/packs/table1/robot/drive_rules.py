@@ -54,9 +54,7 @@ def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = T
     for reach in trace.reaches:
         for id_ in reach.shows:
             yield id_, _OUTLASTED if reach.outlasted else arrival(trace, reach, limits)
-    for one in trace.sightings:
-        if one.holds is not None:
-            yield one.shows, Case(one.holds, one.exchange, one.expected, one.observed, one.cause)
+    yield from trace.sightings
     if way:
         yield from _ways(trace, limits)
 
@@ -172,7 +170,7 @@ def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
 
 
 def _same(
-    readings: Sequence[Velocity], wanted: Velocity, by: tuple[Limits, int], exchange: Exchange, expected: str
+    readings: Sequence[Velocity], wanted: Velocity, by: tuple[Limits, int], exchange: Exchange | None, expected: str
 ) -> Case:
     limits, samples = by
     measured = middle(readings)

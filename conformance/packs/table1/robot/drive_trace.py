@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from conformance.packs.table1.robot.robot import Odometry, Velocity
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 #: All components of a velocity, its linear part, its angular part.
 ALL, LINEAR_PART, ANGULAR_PART = slice(None), slice(0, 3), slice(3, 6)
@@ -35,7 +36,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Turn:
-    """One look: a GET of each resource that shows the velocity, one after another.
+    """One look: a GET of each resource that shows the velocity, one after another, or of the velocity alone.
 
     Attributes:
         odometry: the odometry, read first; None where it cannot be read.
@@ -49,9 +50,14 @@ class Turn:
     at: float
     velocity: Velocity | None
     velocity_exchange: Exchange
-    linear: Velocity | None
-    linear_exchange: Exchange
+    linear: Velocity | None = None
+    linear_exchange: Exchange | None = None
     commands: int = 0
+
+    @property
+    def received(self) -> float:
+        """Return when the velocity had arrived, s of the run's clock."""
+        return self.at + self.velocity_exchange.response.elapsed_ms / 1000
 
 
 @dataclass(frozen=True)
@@ -78,33 +84,13 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """What one look shows about a requirement.
-
-    Attributes:
-        shows: id of the requirement.
-        holds: whether the robot meets it; None where the readings came too late to tell.
-        exchange: the last reading.
-        expected: what the requirement demands here.
-        observed: what the robot showed.
-        cause: sightings with the same cause become one finding.
-    """
-
-    shows: str
-    holds: bool | None
-    exchange: Exchange
-    expected: str
-    observed: str = ""
-    cause: str = ""
-
-
-@dataclass(frozen=True)
 class Trace:
     """The commands and readings of one drive so far.
 
     Attributes:
         begun: start of the drive, s of the run's clock.
-        commands, turns, reaches, sightings: all of these, in order.
+        commands, turns, reaches: all of these, in order.
+        sightings: what single looks show, each with the id of its requirement.
         odometry: the odometry of all looks in which it could be read.
         measured: the velocity read with each odometry; the odometry's own where the velocity could not be read.
         outlasted: whether responses take longer than the robot holds a velocity: the pose then cannot be predicted.
@@ -116,7 +102,7 @@ class Trace:
     odometry: tuple[Odometry, ...] = ()
     measured: tuple[Velocity, ...] = ()
     reaches: tuple[Reach, ...] = ()
-    sightings: tuple[Sighting, ...] = ()
+    sightings: tuple[tuple[str, Case], ...] = ()
     outlasted: bool = False
 
     def commanded(self, command: Command) -> Trace:

@@ -151,7 +151,7 @@ class LetGo:
         hold_s = limits.hold_s
         certain = self.answered + _AT_LEAST_S if hold_s is None else self.full + certain_s(hold_s, JUDGED)
         for count, turn in enumerate(self.turns, 1):
-            if turn.at + turn.velocity_exchange.response.elapsed_ms / 1000 > certain:
+            if turn.received > certain:
                 return None
             if self.holds_by(limits, count) is False:
                 return turn

@@ -16,6 +16,7 @@ from conformance.measures.samples import FARTHEST
 from conformance.observe.clock import WALL_CLOCK, Clock, Patience
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot import abilities
+from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
 from conformance.packs.table1.statement import said_of
@@ -80,10 +81,7 @@ def is_near(limits: Limits, measured: Velocity, wanted: Velocity, factor: float 
         factor: multiple of the tolerance.
         samples: number of samples in the median; the more, the smaller is the noise.
     """
-    noise = limits.noise
-    off = FARTHEST / math.sqrt(samples)
-    linear = factor * limits.tolerance_linear_m_s + off * noise.linear_m_s
-    angular = factor * limits.tolerance_angular_rad_s + off * noise.angular_rad_s
+    linear, angular = (limits.rest(part, FARTHEST / math.sqrt(samples), factor) for part in (AHEAD, ABOUT))
     return all(
         abs(one - other) <= factor * limits.tolerance * abs(other) + room
         for one, other, room in zip(measured, wanted, (linear,) * 3 + (angular,) * 3, strict=True)
@@ -257,9 +255,10 @@ class Robot:
 
     def share_of_limits(self, linear: float, angular: float) -> Velocity:
         """Return a velocity of given shares of the limits, as far as the robot can drive it."""
-        return self.drivable(Velocity(linear_x=self._share(0, linear), angular_z=self._share(5, angular)))
+        return self.drivable(Velocity(linear_x=self.share(AHEAD, linear), angular_z=self.share(ABOUT, angular)))
 
-    def _share(self, component: int, share: float) -> float:
+    def share(self, component: int, share: float) -> float:
+        """Return a share of the limit of a component; of the other one where it has none in that direction."""
         least, greatest = self.limits.range_of(component)
         return share * ((greatest or -least) if share > 0 else (-least or greatest))
 
@@ -282,4 +281,4 @@ class Robot:
     @property
     def reverses(self) -> bool:
         """Return whether the robot can drive back."""
-        return self.limits.range_of(0)[0] < 0
+        return self.limits.range_of(AHEAD)[0] < 0

@@ -13,8 +13,9 @@ from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock, poll
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
-from conformance.packs.table1.robot.standstill_trace import GOAL, Attempt, Rest, Standing
+from conformance.packs.table1.robot.standstill_trace import GOAL, Attempt, Standing, rest
 from conformance.packs.table1.robot.stopping import bring_to_rest, halt
+from conformance.verdict.evidence import Case
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class _Waiting:
     attempt: Attempt
     until: float
     goal: bool
-    repeat: Callable[[], Iterable[Rest]]
+    repeat: Callable[[], Iterable[Case]]
 
 
 class Standstill:
@@ -50,7 +51,7 @@ class Standstill:
         self._api, self._clock = api, clock
         self._waiting: list[_Waiting] = []
         # What moved while another check read the robot.
-        self._moved: Rest | None = None
+        self._moved: Case | None = None
         self._looked_at = -1
 
     def begin(self) -> str:
@@ -65,7 +66,7 @@ class Standstill:
         return bring_to_rest(self._api)
 
     def attempted(
-        self, requirement: str, after: str, repeat: Callable[[], Iterable[Rest]], *, seconds: float, goal: bool = False
+        self, requirement: str, after: str, repeat: Callable[[], Iterable[Case]], *, seconds: float, goal: bool = False
     ) -> None:
         """Note an attempt that was made just now.
 
@@ -104,56 +105,63 @@ class Standstill:
         if not waiting:
             return
         try:
-            rest = self._moved or self._watch()
+            seen = self._moved or self._watch()
         finally:
             self._waiting, self._moved = [], None
         attempts = [one.attempt for one in waiting]
-        if rest.found:
+        if not seen.holds:
             for index, one in enumerate(waiting):
                 bring_to_rest(self._api)
                 attempts[index] = replace(one.attempt, alone=tuple(one.repeat()))
             bring_to_rest(self._api)
-        self.watched += (Standing(rest, tuple(attempts)),)
+        self.watched += (Standing(seen, tuple(attempts)),)
 
     @property
     def _until(self) -> float:
         """Return when the last effect would have shown, s of the run's clock."""
         return max(one.until for one in self._waiting)
 
-    def _watch(self) -> Rest:
+    def _watch(self) -> Case:
         drive = Drive(Robot(self._api, self._clock))
         for _ in poll(self._clock, 0.0, lambda: self._clock.now() > self._until):
             moved = self._look(drive)
             if moved is not None:
                 return moved
-        return Rest("", drive.trace.turns[-1].velocity_exchange, "")
+        return rest("", drive.trace.turns[-1].velocity_exchange, "")
 
-    def _look(self, drive: Drive) -> Rest | None:
+    def _look(self, drive: Drive) -> Case | None:
         """Return readings that show motion or a goal; None if there is neither."""
-        rest = read_rest(drive, "", goal=any(one.goal for one in self._waiting))
-        return rest if rest.found else None
+        seen = read_rest(drive, "", goal=any(one.goal for one in self._waiting))
+        return None if seen.holds else seen
 
 
-def read_rest(drive: Drive, after: str, *, goal: bool = False) -> Rest:
+def glance_rest(robot: Robot, after: str) -> Case:
+    """Read the velocity, and where it is not rest, read again whether the robot is at rest."""
+    velocity, read = robot.velocity()
+    at_rest = velocity is None or robot.near(velocity, STILL)
+    return rest(after, read, "") if at_rest else read_rest(Drive(robot), after)
+
+
+def read_rest(drive: Drive, after: str, *, goal: bool = False) -> Case:
     """Read whether the robot is at rest, and with ``goal`` also whether it has a goal."""
     still, seen = drive.sees(STILL)
     exchange = drive.trace.turns[-1].velocity_exchange
     if still is False:
-        return Rest(after, exchange, f"the velocity ({seen})")
+        return rest(after, exchange, f"the velocity ({seen})")
     active, shown = drive.robot.goal() if goal else (None, exchange)
-    return Rest(after, shown, "" if active is None else GOAL)
+    return rest(after, shown, "" if active is None else GOAL)
 
 
-def watch_rest(drive: Drive, after: str, seconds: float, *, goal: bool = False) -> Rest:
+def watch_rest(drive: Drive, after: str, seconds: float, *, goal: bool = False) -> Case:
     """Read for so many seconds whether the robot stays at rest; return the first reading that shows motion or a goal.
 
     If there is none, return the last reading.
     """
     until = drive.clock.now() + seconds
     while True:
-        rest = read_rest(drive, after, goal=goal)
-        if rest.found or drive.clock.now() > until:
-            return rest
+        seen = read_rest(drive, after, goal=goal)
+        if not seen.holds or drive.clock.now() > until:
+            return seen
 
 
 def _stays(drive: Drive) -> bool | None:

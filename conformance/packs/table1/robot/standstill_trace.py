@@ -5,33 +5,23 @@ from dataclasses import dataclass
 from typing import Final
 
 from conformance.scenarios.rule import NotTested
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Unanswered
 from conformance.verdict.evidence import Case
 
 #: What is found of a robot that rests and has a goal.
 GOAL: Final = "an active goal"
 
 
-@dataclass(frozen=True)
-class Rest:
-    """Readings of a robot after requests that must leave the robot at rest.
+def rest(after: str, exchange: Exchange | Unanswered | None, found: str, cause: str = "moves") -> Case:
+    """Return what a robot shows after requests that must leave the robot at rest.
 
-    Attributes:
+    Args:
         after: the requests, as the end of a sentence "rest after …".
         exchange: the reading that shows motion or a goal, the request that caused them, or the last reading.
         found: the velocity or the goal that the robot shows; empty: it is at rest without a goal.
         cause: as in Case.
     """
-
-    after: str
-    exchange: Exchange
-    found: str
-    cause: str = "moves"
-
-    @property
-    def case(self) -> Case:
-        """Return the readings as a judged case."""
-        return Case(not self.found, self.exchange, f"rest after {self.after}", self.found, self.cause)
+    return Case(not found, exchange, f"rest after {after}", found, cause)
 
 
 @dataclass(frozen=True)
@@ -40,13 +30,13 @@ class Attempt:
 
     Attributes:
         requirement: id of the requirement that says so.
-        after: as in Rest.
+        after: the requests, as the end of a sentence "rest after …".
         alone: readings after the same requests were repeated with a watch of their own; empty: not repeated.
     """
 
     requirement: str
     after: str
-    alone: tuple[Rest, ...] = ()
+    alone: tuple[Case, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,7 +48,7 @@ class Standing:
         attempts: all attempts before the watch. If the robot moved in the watch, each was repeated alone.
     """
 
-    rest: Rest
+    rest: Case
     attempts: tuple[Attempt, ...]
 
 
@@ -72,12 +62,12 @@ def stays(trace: tuple[Standing, ...], requirement: str) -> Iterator[Case | NotT
     for one in trace:
         mine = [attempt for attempt in one.attempts if attempt.requirement == requirement]
         for attempt in mine:
-            yield from (rest.case for rest in attempt.alone)
-        if not any(rest.found for attempt in one.attempts for rest in attempt.alone):
-            rest, first = one.rest, one.attempts[0]
-            if not rest.found or first.requirement == requirement:
-                after = " and after ".join(dict.fromkeys(one.after for one in one.attempts)) if rest.found else ""
-                yield from (Rest(after or attempt.after, rest.exchange, rest.found).case for attempt in mine)
+            yield from attempt.alone
+        if all(seen.holds for attempt in one.attempts for seen in attempt.alone):
+            seen, first = one.rest, one.attempts[0]
+            if seen.holds or first.requirement == requirement:
+                after = "" if seen.holds else " and after ".join(dict.fromkeys(one.after for one in one.attempts))
+                yield from (rest(after or attempt.after, seen.exchange, seen.observed) for attempt in mine)
             elif mine:
                 yield NotTested(
                     "the robot moved once after several attempts, and none of them moved it when repeated alone: "

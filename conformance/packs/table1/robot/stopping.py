@@ -77,9 +77,7 @@ def leave_at_rest(api: RestInterface) -> str:
 def _slowest(api: RestInterface) -> Velocity:
     """Return the highest velocity that counts as rest, twice the noise of a sample."""
     limits = said_of(api.run).limits
-    linear = limits.tolerance_linear_m_s + 3 * limits.noise.linear_m_s
-    angular = limits.tolerance_angular_rad_s + 3 * limits.noise.angular_rad_s
-    return Velocity(linear, linear, linear, angular, angular, angular)
+    return Velocity(*(limits.rest(component, sigmas=3) for component in range(len(STILL))))
 
 
 def _shows(answer: Response) -> bool:

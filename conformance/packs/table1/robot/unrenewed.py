@@ -4,7 +4,6 @@ import math
 import random
 from typing import Final
 
-from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.letting_go import Way
 from conformance.packs.table1.robot.robot import Robot, Velocity
@@ -49,13 +48,10 @@ def unrenewed(
 
 def slow(robot: Robot, seed: int) -> list[Velocity]:
     """Return a slow drive and a slow turn that can be told from rest, each in the direction that the seed says."""
-    limits, noise, chance = robot.limits, robot.limits.noise, random.Random(f"{seed}/slow")  # noqa: S311 - no secret
+    limits, chance = robot.limits, random.Random(f"{seed}/slow")  # noqa: S311 - no secret
     found: list[Velocity] = []
-    for component, off in (
-        (AHEAD, limits.tolerance_linear_m_s + FARTHEST * noise.linear_m_s),
-        (ABOUT, limits.tolerance_angular_rad_s + FARTHEST * noise.angular_rad_s),
-    ):
+    for component in (AHEAD, ABOUT):
         end = chance.choice([one for one in limits.range_of(component) if one] or [0.0])
-        size = min(max(_SLOW * abs(end), _TOLD * off), _MOST * abs(end))
+        size = min(max(_SLOW * abs(end), _TOLD * limits.rest(component)), _MOST * abs(end))
         found.append(robot.only(component, math.copysign(size, end)))
     return found

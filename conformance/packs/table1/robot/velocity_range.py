@@ -2,7 +2,6 @@
 
 from typing import Final
 
-from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import Robot, Velocity
@@ -26,11 +25,7 @@ def slowest_along(robot: Robot, component: int) -> Velocity:
 
 
 def _slowest(robot: Robot, component: int) -> float:
-    limits, noise = robot.limits, robot.limits.noise
-    linear = component < len("xyz")
-    tolerance = limits.tolerance_linear_m_s if linear else limits.tolerance_angular_rad_s
-    off = tolerance + FARTHEST * (noise.linear_m_s if linear else noise.angular_rad_s)
-    return min(_MOVES * off, 0.5 * fastest(robot, component))
+    return min(_MOVES * robot.limits.rest(component), 0.5 * fastest(robot, component))
 
 
 def fastest(robot: Robot, component: int, sign: int = 1) -> float:
@@ -48,9 +43,8 @@ def handy(robot: Robot, share: float) -> Velocity:
     A robot that cannot turn without driving turns in its narrowest circle.
     """
     component = handiest(robot.statement.motion)
-    least, greatest = robot.limits.range_of(component)
     part = 1.0 if component >= len("xyz") else _SLOWER
-    return robot.only(component, part * share * ((greatest or -least) if share > 0 else (-least or greatest)))
+    return robot.only(component, part * robot.share(component, share))
 
 
 def both(robot: Robot) -> Velocity:

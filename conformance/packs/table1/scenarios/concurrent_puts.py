@@ -10,14 +10,9 @@ from typing import Any, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.observe.clock import poll, poll_for
-from conformance.packs.table1.robot.concurrent_puts import (
-    Accepted,
-    ConcurrentGoal,
-    ConcurrentVelocities,
-    GoalRead,
-    VelocityRead,
-)
+from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
 from conformance.packs.table1.robot.delivery import path_of
+from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
@@ -113,19 +108,18 @@ def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool)
     """PUT velocities at the same moment, and read until the robot reaches one, or it may have ended by itself."""
     sent = robot.clock.now()
     attempts = _put_together(robot, VELOCITY, [velocity.twist for velocity in velocities])
+    answered = robot.clock.now()
     accepted = tuple(
-        Accepted(velocity, one)
+        Command(velocity, sent, answered, one)
         for velocity, one in zip(velocities, attempts, strict=True)
         if isinstance(one, Exchange) and one.response.ok
     )
-    put = ConcurrentVelocities(accepted, sent, robot.clock.now(), (), last)
+    put = ConcurrentVelocities(accepted, sent, answered, (), last)
     if not accepted:
         return put
     until = min(put.answered + robot.settle_s, put.ends(robot.limits))
     for _ in poll(robot.clock, _VELOCITY_STEP_S, lambda: robot.clock.now() > until):
-        requested = robot.clock.now()
-        velocity, exchange = robot.velocity()
-        put = put.read(VelocityRead(requested, robot.clock.now(), velocity, exchange))
+        put = put.read(Turn(None, robot.clock.now(), *robot.velocity()))
         if put.is_unreadable or put.reached(robot.limits) is not None:
             break
     return put

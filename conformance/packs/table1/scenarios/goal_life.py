@@ -22,10 +22,10 @@ from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoa
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
-from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
@@ -229,7 +229,7 @@ def cancel(robot: Robot) -> Cancelled:
     return Cancelled(exchange, read, gone, drive.trace, late)
 
 
-def _cancel_again(robot: Robot, body: dict[str, Any]) -> Rest:
+def _cancel_again(robot: Robot, body: dict[str, Any]) -> Case:
     """Command a velocity, put a goal in its place, cancel it, and watch whether motion or a goal comes back."""
     robot.put_velocity(slow_turn(robot))
     put_goal(robot, body)

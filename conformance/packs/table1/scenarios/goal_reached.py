@@ -11,6 +11,7 @@ from conformance.api.soap.service import SoapService
 from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.observe.clock import poll
 from conformance.packs.table1.robot import soap_services
+from conformance.packs.table1.robot.abilities import ABOUT
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.geometry import Pose, middle_of, wrapped
@@ -102,10 +103,9 @@ def _turning_before(robot: Robot, effort: Effort) -> Command | None:
     """Command a velocity just before the goal; return None if that shows nothing or takes too much time."""
     limits = robot.limits
     turning = robot.share_of_limits(0.0, 0.4)
-    seen_from_rest = limits.tolerance_angular_rad_s + FARTHEST * limits.noise.angular_rad_s
     if effort.name == "quick" or limits.hold_s is None:
         return None
-    if turning.angular_z < 4 * seen_from_rest:
+    if turning.angular_z < 4 * limits.rest(ABOUT):
         return None
     sent = robot.clock.now()
     exchange = robot.put_velocity(turning)

@@ -15,12 +15,12 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
-from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.robot.taken import goal_has_effect, turned_goal, velocity_has_effect
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 _AFTER: Final = "PUTs that were answered 406"
 # No robot has its responses in this format.
@@ -41,7 +41,7 @@ class NotAcceptable:
     path: str
     exchange: Exchange
     has_effect: bool | None = None
-    rest: Rest | None = None
+    rest: Case | None = None
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
@@ -53,13 +53,13 @@ def not_acceptable(api: RestInterface, robot: Robot, standstill: Standstill) -> 
         seconds = robot.limits.settle_s
         repeat = partial(_repeat, api, robot)
         standstill.attempted("http/not-acceptable-undone", _AFTER, repeat, seconds=seconds, goal=True)
-    if any(rest.found for rest in rests):
+    if not all(rest.holds for rest in rests):
         # By this attempt, or by an earlier one: each is repeated alone.
         standstill.watch()
     return puts
 
 
-def _repeat(api: RestInterface, robot: Robot) -> list[Rest]:
+def _repeat(api: RestInterface, robot: Robot) -> list[Case]:
     """Send the same PUTs again, and watch the robot for the settle time after each."""
     return [one.rest for one in _put_each(api, robot, robot.limits.settle_s) if one.rest is not None]
 
@@ -92,7 +92,7 @@ def _put_each(api: RestInterface, robot: Robot, watched_s: float) -> tuple[NotAc
         if exchange.response.status == HTTPStatus.NOT_ACCEPTABLE:
             rest = watch_rest(Drive(robot), f"PUT {path} that was answered 406", watched_s, goal=True)
         done.append(NotAcceptable(path, exchange, effect, rest))
-        if rest is not None and rest.found:
+        if rest is not None and not rest.holds:
             if watched_s:
                 bring_to_rest(api)
             break

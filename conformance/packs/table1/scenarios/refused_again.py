@@ -30,7 +30,6 @@ from conformance.packs.table1.robot.refused_requests import NO_FRAME, Refused, R
 from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
 from conformance.packs.table1.robot.soap_services import send_delivery
 from conformance.packs.table1.robot.standstill import read_rest
-from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.goal_life import await_motion, put_new
@@ -38,6 +37,7 @@ from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import NoOccasionError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import Case
 
 _AFTER: Final = "requests that were refused before, sent again"
 # Another client of the robot orders once; a robot that takes refused requests for orders does so again.
@@ -106,7 +106,7 @@ class RefusedAgain:
         cancelled: GET of the goal after it was cancelled, and its id.
     """
 
-    rests: tuple[Rest, ...] = ()
+    rests: tuple[Case, ...] = ()
     ordered: tuple[Ordered, ...] = ()
     unseen: str = ""
     renamed: Put | None = None
@@ -188,13 +188,13 @@ class _Player:
     def rest(self) -> None:
         """Send the requests at rest, and read the robot; if it moves or has a goal, send them one by one."""
         chosen = self._chosen()
-        rests: tuple[Rest, ...] = (self._rest(chosen),) if chosen else ()
-        if any(rest.found for rest in rests):
+        rests: tuple[Case, ...] = (self._rest(chosen),) if chosen else ()
+        if not all(rest.holds for rest in rests):
             # Another client may have moved the robot.
             rests = tuple(self._alone(chosen)) or (self._rest(chosen),)
         self.trace = replace(self.trace, rests=rests)
 
-    def _rest(self, chosen: list[Refused]) -> Rest:
+    def _rest(self, chosen: list[Refused]) -> Case:
         """Send the requests at rest, and read the robot."""
         bring_to_rest(self.api)
         exchanges = [self._send(one) for one in chosen]
@@ -203,14 +203,14 @@ class _Player:
             bring_to_rest(self.api)
         return read_rest(Drive(self.robot), _AFTER, goal=True)
 
-    def _alone(self, chosen: list[Refused]) -> Iterator[Rest]:
+    def _alone(self, chosen: list[Refused]) -> Iterator[Case]:
         """Send each request that would act with a look of its own; yield the readings that show an effect."""
         for one in chosen:
             if one.acts:
                 bring_to_rest(self.api)
                 exchange = self._send(one)
                 seen = read_rest(Drive(self.robot), one.what, goal=True)
-                if seen.found and (is_refused(exchange) or self._is_wrong(one)):
+                if not seen.holds and (is_refused(exchange) or self._is_wrong(one)):
                     yield replace(seen, exchange=exchange, cause=one.what)
 
     def observer(self, probe: RosProbe, senders: list[DeliverySender]) -> DeliveryObserver | None:

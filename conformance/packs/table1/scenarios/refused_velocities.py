@@ -11,14 +11,14 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.invalid_bodies import elsewhere
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.standstill import Standstill, read_rest, watch_rest
-from conformance.packs.table1.robot.standstill_trace import Rest
+from conformance.packs.table1.robot.standstill import Standstill, glance_rest, watch_rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
+from conformance.verdict.evidence import Case
 
 # No robot of this contract is as fast, even if its statement declares no limit: m/s and rad/s.
 _BEYOND_ANY: Final = 1e3
@@ -59,8 +59,8 @@ class RefusedVelocities:
     """
 
     beyond: tuple[tuple[Velocity, Exchange], ...] = ()
-    rests: tuple[Rest, ...] = ()
-    settled: Rest | None = None
+    rests: tuple[Case, ...] = ()
+    settled: Case | None = None
     all_actuated: bool = False
     unactuated: tuple[Unactuated, ...] = ()
 
@@ -76,7 +76,7 @@ def refused_velocities(robot: Robot, effort: Effort, standstill: Standstill) -> 
     return player.trace
 
 
-def _repeat(robot: Robot, effort: Effort) -> list[Rest]:
+def _repeat(robot: Robot, effort: Effort) -> list[Case]:
     """Send the same velocities again, and watch the robot for the settle time."""
     player = _Player(robot, effort)
     player.play()
@@ -117,10 +117,7 @@ class _Player:
             self.trace = replace(self.trace, beyond=(*self.trace.beyond, (velocity, exchange)))
             if not is_refused(exchange):
                 robot.put_velocity(STILL)
-        seen, read = robot.velocity()
-        after = f"a refused velocity, {velocity}"
-        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL) else read_rest(Drive(robot), after)
-        self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
+        self._look(f"a refused velocity, {velocity}")
 
     def _send_elsewhere(self, method: str, target: str, value: dict[str, Any]) -> None:
         """Send a valid velocity by a method or to a path that the robot must refuse, and read the robot."""
@@ -130,12 +127,14 @@ class _Player:
         if not is_refused(exchange):
             robot.put_velocity(STILL)  # a vendor's own, or a redirect
             return
-        after = f"{method} {target}, which was refused"
-        seen, read = robot.velocity()
-        rest = Rest(after, read, "") if seen is None or robot.near(seen, STILL) else read_rest(Drive(robot), after)
-        self.trace = replace(self.trace, rests=(*self.trace.rests, rest))
-        if rest.found:
+        if not self._look(f"{method} {target}, which was refused"):
             robot.put_velocity(STILL)
+
+    def _look(self, after: str) -> bool:
+        """Return whether the robot is at rest after a request, and record it."""
+        seen = glance_rest(self.robot, after)
+        self.trace = replace(self.trace, rests=(*self.trace.rests, seen))
+        return seen.holds
 
     def _actuate(self, component: int) -> None:
         """PUT velocities in a component, until the robot reaches one."""

@@ -10,7 +10,7 @@ from conformance.packs.table1.robot.letting_go import Way
 from conformance.packs.table1.robot.robot import Robot, Velocity
 from conformance.packs.table1.robot.velocity_range import direction, fastest, reach, slowest
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.run import Run
 
@@ -24,10 +24,8 @@ def straight(robot: Robot, run: Run) -> Driven:
         raise NotPossibleError("the statement says that the robot cannot drive straight ahead")
     make_room(robot)
     drive = Drive(robot)
-    try:
+    with partial_trace(lambda: Driven(drive.whole)):
         _play(robot, drive, run)
-    except Exception as error:
-        raise PartialTraceError(Driven(drive.whole)) from error
     return Driven(drive.whole)
 
 

@@ -25,7 +25,7 @@ from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.trace import Driven
-from conformance.scenarios.scenario import PartialTraceError, scenario
+from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
@@ -65,14 +65,12 @@ def turn(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -
     turning = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
         turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
-    try:
+    with partial_trace(lambda: turning.recorded):
         turning.play()
         turning.drive.aside = lambda _turn: None
         send_known(robot, soap, refused)
         turning.refused = deque(refused.chosen(soap.there.values(), run.effort))
         turning.play_letting_go(run)
-    except Exception as error:
-        raise PartialTraceError(turning.recorded) from error
     return turning.recorded
 
 
@@ -83,11 +81,9 @@ def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
     driving = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
         make_room(robot)
-    try:
+    with partial_trace(lambda: driving.recorded):
         for axis in further:
             driving.along(axis)
-    except Exception as error:
-        raise PartialTraceError(driving.recorded) from error
     return driving.recorded
 
 

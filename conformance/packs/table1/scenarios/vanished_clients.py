@@ -9,10 +9,10 @@ from conformance.packs.table1.robot.goal import goal_body
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY, Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
-from conformance.packs.table1.robot.standstill_trace import Rest
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.raw import PartialRequest
+from conformance.verdict.evidence import Case
 
 _AFTER: Final = "clients vanished in the middle of a request"
 # For so long the robot is watched after the requests, before what comes next; s.
@@ -51,24 +51,24 @@ _AWAY_M: Final = 1.0
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
-def vanished_clients(robot: Robot, standstill: Standstill) -> tuple[Rest, ...]:
+def vanished_clients(robot: Robot, standstill: Standstill) -> tuple[Case, ...]:
     """Send velocities of which some bytes are missing, and close the connection, at rest."""
     _vanish(robot, *_PARTS)
     rest = watch_rest(Drive(robot), _AFTER, _watch_s(robot))
     standstill.attempted("safety/client-vanished", _AFTER, partial(_repeat, robot), seconds=robot.limits.settle_s)
-    if rest.found:
+    if not rest.holds:
         # By this attempt, or by an earlier one: each is repeated alone.
         standstill.watch()
     return (rest,)
 
 
-def _repeat(robot: Robot) -> list[Rest]:
+def _repeat(robot: Robot) -> list[Case]:
     """Send the same requests again, and watch after each; at last for the settle time, unless one moved the robot."""
     drive = Drive(robot)
     for part in _PARTS:
         _vanish(robot, part)
         rest = watch_rest(drive, f"PUT {part.path} of which some bytes were not sent", _watch_s(robot))
-        if rest.found:
+        if not rest.holds:
             return [rest]
     return [watch_rest(drive, _AFTER, robot.limits.settle_s)]
 

@@ -79,9 +79,7 @@ class Drive(drive.Drive):
     def judged(self) -> dict[str, bool]:
         """Whether each requirement holds that the drive was to show."""
         found: dict[str, bool] = {}
-        shown = {id_ for reach in self.trace.reaches for id_ in reach.shows} | {
-            one.shows for one in self.trace.sightings
-        }
+        shown = {id_ for reach in self.trace.reaches for id_ in reach.shows} | dict(self.trace.sightings).keys()
         for id_, one in every_outcome(self.trace, self.robot.limits, way=False):
             if isinstance(one, Case) and id_ in shown:
                 found[id_] = found.get(id_, True) and one.holds

@@ -64,10 +64,10 @@ def _told():
 def test_an_attempt_is_not_begun_before_the_last_command_has_had_its_time():
     with _told() as (api, robot):
         assert Standstill(api).begin() == ""
-        assert watch_rest(Drive(robot), "an attempt", _SETTLE_S).found == ""
+        assert watch_rest(Drive(robot), "an attempt", _SETTLE_S).holds
 
 
 def test_what_a_cancelled_goal_had_commanded_does_not_come_back():
     with _told() as (_, robot):
         assert cancel(robot).gone
-        assert watch_rest(Drive(robot), "the goal was cancelled", _SETTLE_S).found == ""
+        assert watch_rest(Drive(robot), "the goal was cancelled", _SETTLE_S).holds

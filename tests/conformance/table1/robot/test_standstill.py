@@ -8,7 +8,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill, watch_rest
-from conformance.packs.table1.robot.standstill_trace import Rest, stays
+from conformance.packs.table1.robot.standstill_trace import stays
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.verdict.evidence import Case
 
@@ -70,7 +70,7 @@ class Trial:
         self.act()
         standstill.attempted(self.requirement, "a trial", self.repeat, seconds=_WATCH_S, goal=goal)
 
-    def repeat(self) -> list[Rest]:
+    def repeat(self) -> list[Case]:
         self.repeated_at.append(time.monotonic())
         self.act()
         return [watch_rest(Drive(Robot(self.api)), "a trial", 2 * _LATER_S)]

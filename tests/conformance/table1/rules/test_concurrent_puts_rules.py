@@ -6,13 +6,8 @@ import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits
-from conformance.packs.table1.robot.concurrent_puts import (
-    Accepted,
-    ConcurrentGoal,
-    ConcurrentVelocities,
-    GoalRead,
-    VelocityRead,
-)
+from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
+from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.rules.rest_resources import test_several_clients as rules
 from conformance.packs.table1.statement import Statement
@@ -47,8 +42,8 @@ def test_one_goal_of_several_clients_is_one_goal(goal, holds):
 
 
 def _velocities(*reads, last=False, accepted=(_ONE, _OTHER)):
-    made = tuple(VelocityRead(at, at + 0.01, velocity, exchange()) for at, velocity in reads)
-    return ConcurrentVelocities(tuple(Accepted(one, exchange()) for one in accepted), 0.0, 0.1, made, last)
+    made = tuple(Turn(None, at, velocity, exchange()) for at, velocity in reads)
+    return ConcurrentVelocities(tuple(Command(one, 0.0, 0.1, exchange()) for one in accepted), 0.0, 0.1, made, last)
 
 
 @pytest.mark.parametrize(
@@ -70,4 +65,4 @@ def test_one_velocity_of_several_clients_is_reached(put, shown):
     assert [one.holds for one in outcomes if isinstance(one, Case)] == ([] if shown is None else [shown])
     undecided = put.last and not put.is_decided(_STATEMENT.limits)
     assert any(isinstance(one, Note) for one in outcomes) == undecided
-    assert undecided == (put.last and bool(put.reads) and put.reads[-1].sent == 2.9)
+    assert undecided == (put.last and bool(put.reads) and put.reads[-1].at == 2.9)

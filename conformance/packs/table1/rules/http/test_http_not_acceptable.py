@@ -21,7 +21,7 @@ def not_acceptable_undone(trace: Puts) -> Iterator[Outcome]:
     rests = [one.rest for one in trace if one.rest is not None]
     if not rests:
         yield Note("no PUT of a velocity or a goal is answered 406")
-    yield from (rest.case for rest in rests if not rest.found)
+    yield from (rest for rest in rests if rest.holds)
 
 
 @rule("http/not-acceptable-undone", on=(standing,))

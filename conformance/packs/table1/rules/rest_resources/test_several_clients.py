@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.robot.concurrent_puts import Accepted, ConcurrentGoal, ConcurrentVelocities, GoalRead
+from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
 from conformance.packs.table1.robot.drive_rules import ECHO
+from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.goal import NEW, REPEATED
 from conformance.packs.table1.robot.message_shapes import TWIST, read_as
 from conformance.packs.table1.robot.robot import Velocity
@@ -48,14 +49,14 @@ def one_velocity_is_reached(trace: tuple[ConcurrentVelocities, ...], run: Run) -
         expected = f"the velocity of one client: {' or '.join(f'({each.velocity})' for each in one.accepted)}"
         reached, missed = one.reached(limits), one.missed(limits)
         if reached is not None:
-            yield Case(True, reached.exchange, expected)
+            yield Case(True, reached.velocity_exchange, expected)
         elif missed is not None:
-            yield Case(False, missed.exchange, expected, f"the velocity ({missed.velocity})")
+            yield Case(False, missed.velocity_exchange, expected, f"the velocity ({missed.velocity})")
         elif one.last and not one.is_decided(limits):
             yield Note("a velocity that several clients put ended before it was seen to be reached")
 
 
-def _echoed(accepted: Accepted) -> Iterator[Case]:
+def _echoed(accepted: Command) -> Iterator[Case]:
     """Yield whether the velocity in the response, if any, is the one that was sent."""
     twist, problem = read_as(accepted.exchange.response, TWIST)
     if not problem:

@@ -7,14 +7,14 @@ from typing import Final
 import pytest
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
-from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
+from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.standing import standing
 from conformance.packs.table1.scenarios.vanished_clients import vanished_clients
 from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.transport.raw import PartialRequest
-from conformance.verdict.evidence import Judge
+from conformance.verdict.evidence import Case, Judge
 
 pytestmark = pytest.mark.needs("rest")
 # The usual time may be a tenth of a millisecond; a scheduler's turn on a busy machine is no failure, s.
@@ -24,12 +24,12 @@ _TRIES: Final = 3
 
 
 @rule("safety/client-vanished", on=(vanished_clients,))
-def client_vanished(trace: tuple[Rest, ...]) -> Iterator[Outcome]:
+def client_vanished(trace: tuple[Case, ...]) -> Iterator[Outcome]:
     """Judge that the robot is at rest after requests of which some bytes did not arrive.
 
     Motion may be the effect of an earlier attempt: it is judged when each attempt has been repeated alone.
     """
-    return (rest.case for rest in trace if not rest.found)
+    return (rest for rest in trace if rest.holds)
 
 
 @rule("safety/client-vanished", on=(standing,))

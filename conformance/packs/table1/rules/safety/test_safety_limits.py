@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.robot.standstill_trace import Rest, Standing, stays
+from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.packs.table1.scenarios.refused_velocities import RefusedVelocities, refused_velocities
 from conformance.packs.table1.scenarios.standing import standing
@@ -21,7 +21,7 @@ def limits_refused(trace: RefusedVelocities) -> Iterator[Outcome]:
 @rule("safety/refused-keeps", on=(refused_velocities,))
 def refused_keeps(trace: RefusedVelocities) -> Iterator[Outcome]:
     """Judge that the robot is at rest after each rejected velocity."""
-    yield from (rest.case for rest in (*trace.rests, *_settled(trace)))
+    yield from (*trace.rests, *_settled(trace))
 
 
 @rule("safety/refused-keeps", on=(standing,))
@@ -33,7 +33,7 @@ def refused_keeps_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
 @rule("safety/limits-hold", on=(refused_velocities,))
 def limits_hold(trace: RefusedVelocities) -> Iterator[Outcome]:
     """Judge that a robot without declared limits does not drive at a velocity that no robot reaches."""
-    yield from (rest.case for rest in _settled(trace))
+    yield from _settled(trace)
 
 
 @rule("safety/unactuated-refused", on=(refused_velocities,))
@@ -49,5 +49,5 @@ def unactuated_refused(trace: RefusedVelocities) -> Iterator[Outcome]:
             yield Note(f"the robot reaches {one.velocity}, which its statement leaves out")
 
 
-def _settled(trace: RefusedVelocities) -> tuple[Rest, ...]:
+def _settled(trace: RefusedVelocities) -> tuple[Case, ...]:
     return () if trace.settled is None else (trace.settled,)

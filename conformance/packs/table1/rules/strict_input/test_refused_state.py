@@ -7,7 +7,7 @@ from typing import Final
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.robot.standstill_trace import GOAL, Rest, Standing, stays
+from conformance.packs.table1.robot.standstill_trace import GOAL, Standing, stays
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain, refused_again
 from conformance.packs.table1.scenarios.standing import standing
@@ -19,9 +19,9 @@ _VELOCITY: Final = "strict-input/velocity-refused"
 
 
 @rule(_VELOCITY, on=(invalid_velocities,))
-def velocity_refused(trace: tuple[Rest, ...]) -> Iterator[Outcome]:
+def velocity_refused(trace: tuple[Case, ...]) -> Iterator[Outcome]:
     """Judge that the robot is at rest after each invalid velocity."""
-    return (rest.case for rest in trace)
+    yield from trace
 
 
 @rule(_VELOCITY, on=(standing,))
@@ -33,13 +33,13 @@ def velocity_refused_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
 @rule(_VELOCITY, on=(refused_again,))
 def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot stays at rest, without a goal, when what it has refused is sent again."""
-    return (rest.case for rest in trace.rests)
+    yield from trace.rests
 
 
 @rule("strict-input/goal-refused", on=(refused_again,))
 def goal_refused_again(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot sets, keeps or loses no goal by goals and cancels that it has refused, sent again."""
-    yield from (rest.case for rest in trace.rests if rest.found in {"", GOAL})
+    yield from (rest for rest in trace.rests if rest.observed in {"", GOAL})
     yield from (_kept(one) for one in trace.during if _about_goal(one))
 
 
