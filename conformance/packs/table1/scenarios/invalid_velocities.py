@@ -5,7 +5,6 @@ from http import HTTPStatus
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.invalid_bodies import invalid_bodies, put_body
 from conformance.packs.table1.robot.robot import LINEAR, VELOCITY, Robot
 from conformance.packs.table1.robot.standstill import Standstill, glance_rest
@@ -25,22 +24,14 @@ def invalid_velocities(api: RestInterface, robot: Robot, standstill: Standstill)
     rests: list[Case] = []
     with partial_trace(lambda: tuple(rests)):
         _send(api, robot, rests)
-    repeat = partial(_repeat, api, robot)
+    # A robot that accepts the last request after all would move within the settle time.
+    repeat = partial(_send, api, robot, [])
     standstill.attempted("strict-input/velocity-refused", _AFTER, repeat, seconds=robot.limits.settle_s)
     return tuple(rests)
 
 
-def _repeat(api: RestInterface, robot: Robot) -> list[Case]:
-    """Send the same requests again, and watch the robot for the settle time."""
-    rests: list[Case] = []
-    sent = _send(api, robot, rests)
-    # A robot that accepts the last request after all would move within the settle time.
-    Drive(robot).keep(robot.limits.settle_s)
-    return [*rests, _read(robot, sent)] if sent else rests
-
-
-def _send(api: RestInterface, robot: Robot, rests: list[Case]) -> list[tuple[str, Exchange]]:
-    """Send invalid velocities, and append a reading after each; return those since the robot was last stopped."""
+def _send(api: RestInterface, robot: Robot, rests: list[Case]) -> list[Case]:
+    """Send invalid velocities, append a reading after each to ``rests``, and return them."""
     fast = robot.share_of_limits(0.4, 0.4)
     sent: list[tuple[str, Exchange]] = []
     for path, valid, number in ((VELOCITY, fast.twist, "linear.x"), (LINEAR, fast.linear, "x")):
@@ -50,7 +41,7 @@ def _send(api: RestInterface, robot: Robot, rests: list[Case]) -> list[tuple[str
             if not rests[-1].holds:
                 bring_to_rest(api)
                 sent.clear()
-    return sent
+    return rests
 
 
 def _read(robot: Robot, sent: list[tuple[str, Exchange]]) -> Case:

@@ -2,11 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Final
 
 from conformance.api.rest.calls import JSON
-from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.invalid_bodies import elsewhere
 from conformance.packs.table1.robot.message_shapes import body_of
@@ -71,16 +69,9 @@ def refused_velocities(robot: Robot, effort: Effort, standstill: Standstill) -> 
     player = _Player(robot, effort)
     with partial_trace(lambda: player.trace):
         player.play()
-    repeat = partial(_repeat, robot, effort)
-    standstill.attempted("safety/refused-keeps", _AFTER, repeat, seconds=robot.limits.settle_s)
+    again = _Player(robot, effort)
+    standstill.attempted("safety/refused-keeps", _AFTER, again.rests, seconds=robot.limits.settle_s)
     return player.trace
-
-
-def _repeat(robot: Robot, effort: Effort) -> list[Case]:
-    """Send the same velocities again, and watch the robot for the settle time."""
-    player = _Player(robot, effort)
-    player.play()
-    return [*player.trace.rests, watch_rest(Drive(robot), _AFTER, robot.limits.settle_s)]
 
 
 @dataclass
@@ -90,6 +81,11 @@ class _Player:
     robot: Robot
     effort: Effort
     trace: RefusedVelocities = RefusedVelocities()
+
+    def rests(self) -> tuple[Case, ...]:
+        """Play, and return the readings after each velocity beyond the limits."""
+        self.play()
+        return self.trace.rests
 
     def play(self) -> None:
         robot = self.robot
@@ -175,10 +171,8 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
 
 
 def _reaches(robot: Robot, wanted: Velocity) -> bool:
-    """Return whether the robot reaches an accepted velocity; stop it then."""
-    for _ in poll_for(robot.clock, 0.02, robot.settle_s):
-        velocity, _ = robot.velocity()
-        if velocity is not None and not robot.near(velocity, STILL) and robot.near(velocity, wanted):
-            robot.put_velocity(STILL)
-            return True
-    return False
+    """Return whether the robot reaches an accepted velocity, which is not near rest; stop it then."""
+    reached = not robot.near(wanted, STILL) and Drive(robot).reach(wanted)
+    if reached:
+        robot.put_velocity(STILL)
+    return reached

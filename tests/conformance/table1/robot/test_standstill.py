@@ -5,9 +5,7 @@ from toy_body import interface_of
 from toy_messages import STILL, ZERO, goal
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.robot import Robot
-from conformance.packs.table1.robot.standstill import Standstill, watch_rest
+from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.standstill_trace import stays
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.verdict.evidence import Case
@@ -62,8 +60,8 @@ def standstill(api: RestInterface) -> Standstill:
 class Trial:
     """An attempt that must leave the robot at rest; it can be repeated."""
 
-    def __init__(self, api: RestInterface, requirement: str, act=lambda: None) -> None:
-        self.api, self.requirement, self.act = api, requirement, act
+    def __init__(self, requirement: str, act=lambda: None) -> None:
+        self.requirement, self.act = requirement, act
         self.repeated_at: list[float] = []
 
     def attempt(self, standstill: Standstill, *, goal: bool = False) -> None:
@@ -73,7 +71,7 @@ class Trial:
     def repeat(self) -> list[Case]:
         self.repeated_at.append(time.monotonic())
         self.act()
-        return [watch_rest(Drive(Robot(self.api)), "a trial", 2 * _LATER_S)]
+        return []
 
 
 def _counts(standstill: Standstill) -> dict[str, int]:
@@ -94,8 +92,8 @@ def test_nothing_is_judged_where_nothing_was_tried(body, standstill):
     assert (_counts(standstill), body.told) == ({_CANCEL: 0, _REFUSED: 0}, [])
 
 
-def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs(body, api, standstill):
-    trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs(body, standstill):
+    trials = [Trial(_CANCEL), Trial(_REFUSED)]
     for trial in trials:
         trial.attempt(standstill, goal=True)
     begun = time.monotonic()
@@ -110,8 +108,8 @@ def test_a_robot_that_stays_is_watched_as_long_as_the_last_trial_needs(body, api
     assert body.told == []
 
 
-def test_of_what_was_tried_the_one_that_moves_the_robot_is_found(body, api, standstill):
-    innocent, guilty = Trial(api, _CANCEL), Trial(api, _REFUSED, body.drive)
+def test_of_what_was_tried_the_one_that_moves_the_robot_is_found(body, standstill):
+    innocent, guilty = Trial(_CANCEL), Trial(_REFUSED, body.drive)
     innocent.attempt(standstill)
     guilty.attempt(standstill)
     standstill.watch()
@@ -119,8 +117,8 @@ def test_of_what_was_tried_the_one_that_moves_the_robot_is_found(body, api, stan
     assert len(innocent.repeated_at) == len(guilty.repeated_at) == 1
 
 
-def test_one_push_is_one_failure(body, api, standstill):
-    trials = [Trial(api, _CANCEL), Trial(api, _REFUSED)]
+def test_one_push_is_one_failure(body, standstill):
+    trials = [Trial(_CANCEL), Trial(_REFUSED)]
     for trial in trials:
         trial.attempt(standstill)
     body.drive()
@@ -131,22 +129,22 @@ def test_one_push_is_one_failure(body, api, standstill):
 
 
 @pytest.mark.parametrize("counts", [True, False])
-def test_a_goal_that_comes_back_counts_where_one_was_cancelled(body, api, standstill, counts):
-    Trial(api, _CANCEL).attempt(standstill, goal=counts)
+def test_a_goal_that_comes_back_counts_where_one_was_cancelled(body, standstill, counts):
+    Trial(_CANCEL).attempt(standstill, goal=counts)
     body.goal_at = time.monotonic() + _LATER_S
     standstill.watch()
     assert _failures(standstill) == ({_CANCEL} if counts else set())
 
 
 @pytest.mark.parametrize("what", ["drives_at", "goal_at"])
-def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(body, api, standstill, what):
-    Trial(api, _CANCEL).attempt(standstill)
+def test_a_robot_that_moves_or_has_a_goal_is_not_left_as_it_is(body, standstill, what):
+    Trial(_CANCEL).attempt(standstill)
     setattr(body, what, 0.0)
     assert not standstill.lasts
 
 
-def test_what_moved_while_something_else_was_read_is_found(body, api, standstill):
-    Trial(api, _REFUSED).attempt(standstill)
+def test_what_moved_while_something_else_was_read_is_found(body, standstill):
+    Trial(_REFUSED).attempt(standstill)
     body.drives_at = 0.0
     standstill.look()
     body.drives_at = float("inf")

@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY
-from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.not_acceptable import NotAcceptable, not_acceptable
-from conformance.packs.table1.scenarios.standing import standing
+from conformance.packs.table1.scenarios.standing import later
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.verdict.evidence import Case
 
@@ -24,10 +23,7 @@ def not_acceptable_undone(trace: Puts) -> Iterator[Outcome]:
     yield from (rest for rest in rests if rest.holds)
 
 
-@rule("http/not-acceptable-undone", on=(standing,))
-def not_acceptable_undone_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
-    """Judge that the robot stays at rest after all PUTs that it answered 406."""
-    return stays(trace, "http/not-acceptable-undone")
+not_acceptable_undone_later = later("http/not-acceptable-undone")
 
 
 @rule("rest-resources/velocity-converges", on=(not_acceptable,))

@@ -5,30 +5,18 @@ from collections.abc import Iterator
 
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.scenarios.straight import straight
-from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.trace import Driven, shown
 from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import NotClaimed, Outcome, Rule, rule
-from conformance.scenarios.scenario import Scenario
+from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-
-def _shown(name: str, *scenarios: Scenario) -> Rule:
-    """Return a rule that judges one requirement by the traces of these drive scenarios."""
-    requirement = f"rest-resources/{name}"
-
-    def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
-        return outcomes(requirement, trace.drive, said_of(run).limits)
-
-    return rule(requirement, on=scenarios)(judge)
-
-
-velocity_put = _shown("velocity-put", straight, velocity_walk)
-velocity_integers = _shown("velocity-integers", turn)
-velocity_converges = _shown("velocity-converges", straight, turn, further_axes, velocity_walk)
-velocity_range = _shown("velocity-range", straight, turn, further_axes)
+velocity_put = shown("rest-resources/velocity-put", straight, velocity_walk)
+velocity_integers = shown("rest-resources/velocity-integers", turn)
+velocity_converges = shown("rest-resources/velocity-converges", straight, turn, further_axes, velocity_walk)
+velocity_range = shown("rest-resources/velocity-range", straight, turn, further_axes)
 
 
 @rule("rest-resources/velocity-both", on=(turn,))
@@ -42,7 +30,7 @@ def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
     yield from found
 
 
-velocity_odometry = _shown("velocity-odometry", straight, turn, velocity_walk)
+velocity_odometry = shown("rest-resources/velocity-odometry", straight, turn, velocity_walk)
 
 
 @rule("rest-resources/velocity-odometry", on=(turn,))
@@ -68,8 +56,8 @@ def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
         yield Case(False, stale[-1].exchange, expected, seen, "after a pause")
 
 
-linear_put = _shown("linear-put", turn, velocity_walk)
-linear_keeps_angular = _shown("linear-keeps-angular", turn, velocity_walk)
-linear_agrees = _shown("linear-agrees", straight, turn, velocity_walk)
-pose_motion = _shown("pose-motion", straight, turn, further_axes, velocity_walk)
-pose_rotation = _shown("pose-rotation", turn, velocity_walk)
+linear_put = shown("rest-resources/linear-put", turn, velocity_walk)
+linear_keeps_angular = shown("rest-resources/linear-keeps-angular", turn, velocity_walk)
+linear_agrees = shown("rest-resources/linear-agrees", straight, turn, velocity_walk)
+pose_motion = shown("rest-resources/pose-motion", straight, turn, further_axes, velocity_walk)
+pose_rotation = shown("rest-resources/pose-rotation", turn, velocity_walk)

@@ -7,12 +7,11 @@ from typing import Final
 from conformance.packs.table1.robot.drive_rules import outcomes
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, GoalReached
 from conformance.packs.table1.robot.robot import STILL
-from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.standing import standing
+from conformance.packs.table1.scenarios.standing import later
 from conformance.packs.table1.scenarios.straight import straight
-from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.trace import Driven, shown
 from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
@@ -30,22 +29,10 @@ _LATE_RESPONSES: Final = 2
 _LATE = NotTested("responses came too late to measure how long a velocity holds")
 
 
-@rule("safety/stop", on=(straight, turn, further_axes, velocity_walk))
-def stop(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that zero velocity stops the robot before its watchdog would."""
-    return outcomes("safety/stop", trace.drive, said_of(run).limits)
-
-
-@rule("safety/limits-hold", on=(straight, turn, further_axes, velocity_walk))
-def limits_hold(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that a robot without declared limits is no faster than commanded."""
-    return outcomes("safety/limits-hold", trace.drive, said_of(run).limits)
-
-
-@rule("safety/refused-keeps", on=(turn, velocity_walk))
-def refused_keeps(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot keeps its velocity when it rejects another one."""
-    return outcomes("safety/refused-keeps", trace.drive, said_of(run).limits)
+# Zero velocity stops the robot before its watchdog would.
+stop = shown("safety/stop", straight, turn, further_axes, velocity_walk)
+limits_hold = shown("safety/limits-hold", straight, turn, further_axes, velocity_walk)
+refused_keeps = shown("safety/refused-keeps", turn, velocity_walk)
 
 
 @rule("safety/renewal", on=(turn,))
@@ -166,7 +153,4 @@ def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
         yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)
 
 
-@rule("safety/cancel-stays", on=(standing,))
-def cancel_stays(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
-    """Judge that neither motion nor a goal comes back after a goal was cancelled."""
-    return stays(trace, "safety/cancel-stays")
+cancel_stays = later("safety/cancel-stays")

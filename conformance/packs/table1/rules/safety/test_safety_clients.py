@@ -7,8 +7,7 @@ from typing import Final
 import pytest
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
-from conformance.packs.table1.robot.standstill_trace import Standing, stays
-from conformance.packs.table1.scenarios.standing import standing
+from conformance.packs.table1.scenarios.standing import later
 from conformance.packs.table1.scenarios.vanished_clients import vanished_clients
 from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.client import HttpClient
@@ -32,10 +31,7 @@ def client_vanished(trace: tuple[Case, ...]) -> Iterator[Outcome]:
     return (rest for rest in trace if rest.holds)
 
 
-@rule("safety/client-vanished", on=(standing,))
-def client_vanished_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
-    """Judge that the robot stays at rest after requests of which some bytes did not arrive."""
-    return stays(trace, "safety/client-vanished")
+client_vanished_later = later("safety/client-vanished")
 
 
 @pytest.mark.phase("reading")

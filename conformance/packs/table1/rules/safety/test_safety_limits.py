@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.robot.standstill_trace import Standing, stays
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.packs.table1.scenarios.refused_velocities import RefusedVelocities, refused_velocities
-from conformance.packs.table1.scenarios.standing import standing
+from conformance.packs.table1.scenarios.standing import later
 from conformance.scenarios.rule import NotClaimed, Note, Outcome, rule
 from conformance.verdict.evidence import Case
 
@@ -24,10 +23,7 @@ def refused_keeps(trace: RefusedVelocities) -> Iterator[Outcome]:
     yield from (*trace.rests, *_settled(trace))
 
 
-@rule("safety/refused-keeps", on=(standing,))
-def refused_keeps_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
-    """Judge that the robot stays at rest after all rejected velocities."""
-    return stays(trace, "safety/refused-keeps")
+refused_keeps_later = later("safety/refused-keeps")
 
 
 @rule("safety/limits-hold", on=(refused_velocities,))

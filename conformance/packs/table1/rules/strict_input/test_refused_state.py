@@ -7,10 +7,10 @@ from typing import Final
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.robot.standstill_trace import GOAL, Standing, stays
+from conformance.packs.table1.robot.standstill_trace import GOAL
 from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain, refused_again
-from conformance.packs.table1.scenarios.standing import standing
+from conformance.packs.table1.scenarios.standing import later
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.evidence import Case
@@ -24,10 +24,7 @@ def velocity_refused(trace: tuple[Case, ...]) -> Iterator[Outcome]:
     yield from trace
 
 
-@rule(_VELOCITY, on=(standing,))
-def velocity_refused_later(trace: tuple[Standing, ...]) -> Iterator[Outcome]:
-    """Judge that the robot stays at rest after all invalid velocities."""
-    return stays(trace, _VELOCITY)
+velocity_refused_later = later(_VELOCITY)
 
 
 @rule(_VELOCITY, on=(refused_again,))
