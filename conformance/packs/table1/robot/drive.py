@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from http import HTTPStatus
-from typing import Final
+from typing import Any, Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.robot import drive_rules, windows
@@ -48,6 +48,7 @@ class Drive:
         self,
         velocity: Velocity,
         *,
+        linear: bool = False,
         integers: bool = False,
         xml: bool = False,
         fresh: bool = False,
@@ -57,6 +58,7 @@ class Drive:
 
         Args:
             velocity: a velocity within the robot's limits.
+            linear: PUT its linear part alone.
             integers: write whole numbers without a fraction.
             xml: send it as XML, if the robot sends its own as XML and takes it.
             fresh: send it on a connection that is closed afterwards.
@@ -66,40 +68,23 @@ class Drive:
             NotPossibleError: the robot pursues a goal, so that it cannot be driven.
         """
         sent = self.clock.now()
+        path = LINEAR if linear else VELOCITY
+        value: dict[str, Any] = velocity.linear if linear else velocity.twist
         if integers:
-            whole = {part: {axis: int(value) for axis, value in side.items()} for part, side in velocity.twist.items()}
-            exchange = self.robot.put(VELOCITY, whole)
-        else:
-            as_xml = put_as_xml(self.robot, VELOCITY, velocity.twist, before=before) if xml else None
-            if as_xml is None or not as_xml.response.ok:
-                before()
-            exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_velocity(velocity, fresh=fresh)
-        return self._commanded(Command(velocity, sent, self.clock.now(), exchange, integers=integers))
-
-    def command_linear(self, velocity: Velocity, *, xml: bool = False) -> bool:
-        """PUT the linear part of a velocity; return whether the response conforms to the contract.
-
-        Args:
-            velocity: a velocity within the robot's limits.
-            xml: send it as XML, if the robot sends its own as XML and takes it.
-
-        Raises:
-            NotPossibleError: the robot pursues a goal, so that it cannot be driven.
-        """
-        sent = self.clock.now()
-        as_xml = put_as_xml(self.robot, LINEAR, velocity.linear) if xml else None
-        exchange = as_xml if as_xml and as_xml.response.ok else self.robot.put_linear(velocity)
-        return self._commanded(Command(velocity, sent, self.clock.now(), exchange, linear_only=True))
+            value = {part: {axis: int(one) for axis, one in side.items()} for part, side in velocity.twist.items()}
+        exchange = put_as_xml(self.robot, path, value, before=before) if xml else None
+        if exchange is None or not exchange.response.ok:
+            before()
+            exchange = self.robot.put(path, value, fresh=fresh)
+        command = Command(velocity, sent, self.clock.now(), exchange, linear_only=linear, integers=integers)
+        self.trace = self.trace.commanded(command)
+        if exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
+            raise NotPossibleError("the robot follows a goal of its own")
+        return drive_rules.answer_of(command).holds
 
     def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
         """Record a command that other code sent at the time ``sent`` (s of the run's clock) as the last command."""
         self.trace = self.trace.commanded(Command(velocity, sent, self.clock.now(), exchange))
-
-    def _commanded(self, command: Command) -> bool:
-        self.trace = self.trace.commanded(command)
-        if command.exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
-            raise NotPossibleError("the robot follows a goal of its own")
-        return drive_rules.answer_of(command).holds
 
     def _renew(self) -> None:
         """Send the last command again as it was sent, as another resource or format could hide a fault of this one."""
@@ -181,7 +166,7 @@ class Drive:
         for _ in range(_STOPS):
             if not self.command(moving):
                 return False
-            if not (self.command_linear(STILL) if by == "linear" else self.command(STILL, xml=by == "xml")):
+            if not self.command(STILL, linear=by == "linear", xml=by == "xml"):
                 return False
             last = self.trace.commands[-1]
             if not self.robot.is_late(last.exchange):

@@ -178,6 +178,10 @@ class LetGo:
         period = min(lasted / max(1, len(samples) - 1), windows.LONGEST_SAMPLE_S)
         return hold + max(0.4 * hold, 0.5 * limits.settle_s, windows.LONGEST_SAMPLE_S) + 2 * period
 
+    def is_spoilt(self, limits: Limits) -> bool:
+        """Return whether the velocity seemed to hold too short or too long, and the readings do not prove it."""
+        return self.is_void(limits) and bool(self.early(limits) or self.late(limits))
+
     def is_void(self, limits: Limits) -> bool:
         """Return whether a response, or the suite, was so slow that the readings prove nothing about the hold time."""
         gap = _GAP * (limits.hold_s or 0.0)

@@ -163,13 +163,13 @@ def arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
     """
     back = bent._replace(angular_z=0.0)
     drive.refresh(bent)
-    if not drive.command_linear(before):
+    if not drive.command(before, linear=True):
         return
     for attempt in range(_TRIES):
         if attempt or robot.usual_s > _QUICK_S:
             # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
             drive.refresh(bent)
-        drive.command_linear(back)
+        drive.command(back, linear=True)
         drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
         keeps, found = drive.sees(bent, 1.5, part=ANGULAR_PART, until=drive.holds_until)
         if keeps is not None:

@@ -1,10 +1,11 @@
 """The slowest and fastest velocities of the range that a robot declares; it must accept and reach them."""
 
+from collections.abc import Iterator
 from typing import Final
 
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, turn_beside
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.robot import Robot, Velocity
+from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 # Where no limits are declared the robot may be slower than the figures that it is judged by.
 _UNDECLARED: Final = 0.6
@@ -78,6 +79,18 @@ def reach(drive: Drive, velocity: Velocity, *ids: str) -> bool:
         drive.refused(ids[0] if ids else "rest-resources/velocity-range", expected)
         return False
     return drive.reach(velocity, *(ids or ("rest-resources/velocity-converges", "rest-resources/velocity-range")))
+
+
+def there_and_back(drive: Drive, changes: int) -> Iterator[tuple[int, Velocity]]:
+    """Yield the number of each change and a velocity that the robot has: along an arc, then rest, and back."""
+    robot = drive.robot
+    for change in range(changes):
+        arc = robot.share_of_limits(0.3, -0.4)
+        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
+        for wanted in (moving, STILL):
+            drive.command(wanted)
+            drive.reach(wanted)
+            yield change, wanted
 
 
 def direction(robot: Robot) -> int:

@@ -103,7 +103,7 @@ class VelocityMachine(RuleBasedStateMachine):
             return True  # too narrow a circle for the angular part, or too fast a curve
         self._drive.refresh(self._wanted)
         self._walk.prelude()
-        if not self._drive.command_linear(wanted, xml=self._as_xml(wanted)):
+        if not self._drive.command(wanted, linear=True, xml=self._as_xml(wanted)):
             return False
         self._wanted = wanted
         if not self._drive.reach(wanted, "rest-resources/linear-put", part=LINEAR_PART):

@@ -19,7 +19,8 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.plan import reachable
-from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot
+from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -68,26 +69,20 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
         return ()  # the formats are compared at rest in any case
     make_room(robot)
     drive = Drive(robot)
-    arc = robot.share_of_limits(0.3, -0.4)
     compared: list[FormatsRead] = []
     # What every first reading so far was out by, of each resource after each kind of change.
     suspects: dict[tuple[str, bool], Found] = {}
-    for change in range(_CHANGES):
-        # There and back, which needs no more room.
-        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
-        for wanted in (moving, STILL):
+    for change, wanted in there_and_back(drive, _CHANGES):
+        robot.clock.sleep(robot.sample_s if change else 0.0)
+        for call in calls:
+            key = (call.operation.id, wanted == STILL)
             drive.command(wanted)
-            drive.reach(wanted)
-            robot.clock.sleep(robot.sample_s if change else 0.0)
-            for call in calls:
-                key = (call.operation.id, wanted == STILL)
-                drive.command(wanted)
-                found = one_turn(api, call, _others(call))[0]
-                before = suspects.get(key, {}) if change else found
-                suspects[key] = {place: item for place, item in found.items() if place in before}
-            for call in () if change else calls:
-                compared += _compared(api, call, partial(drive.command, wanted))
-        if not any(suspects.values()):
+            found = one_turn(api, call, _others(call))[0]
+            before = suspects.get(key, {}) if change else found
+            suspects[key] = {place: item for place, item in found.items() if place in before}
+        for call in () if change else calls:
+            compared += _compared(api, call, partial(drive.command, wanted))
+        if wanted == STILL and not any(suspects.values()):
             return tuple(compared)
     by_id = {call.operation.id: call for call in calls}
     left = ((by_id[id_], item) for (id_, _), found in suspects.items() for item in found.values())

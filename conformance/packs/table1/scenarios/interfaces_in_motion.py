@@ -19,9 +19,10 @@ from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.message_shapes import GOAL_AND_STATUS
-from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import STILL, Robot
 from conformance.packs.table1.robot.soap_services import ask, returned
 from conformance.packs.table1.robot.state_over_soap import STATES, StateRead, agreed, compare, for_good, read_state
+from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.effort import Effort
@@ -41,35 +42,29 @@ def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateR
     """Read pose and velocity on an arc, where each component that the robot has is not zero, and at rest after it."""
     make_room(robot)
     drive = Drive(robot)
-    arc = robot.share_of_limits(0.3, -0.4)
     reads: list[StateRead] = []
     # What every first reading so far was out by, of each state after each kind of change; None: not read yet.
     suspects: dict[tuple[str, bool], StateRead | None] = {
         (name, moves): None for name in STATES for moves in (True, False)
     }
-    for change in range(_CHANGES):
-        # There and back, which needs no more room.
-        moving = robot.drivable(Velocity(*(-part if change % 2 else part for part in arc)))
-        for wanted in (moving, STILL):
+    for change, wanted in there_and_back(drive, _CHANGES):
+        # The first time as soon as may be; then when both interfaces must have heard of it.
+        pause_s = robot.sample_s if change else 0.0
+        lasted = drive.hold(wanted)
+        drive.clock.sleep(pause_s)
+        for name in [name for name, moves in suspects if moves == (wanted != STILL)]:
             drive.command(wanted)
-            drive.reach(wanted)
-            # The first time as soon as may be; then when both interfaces must have heard of it.
-            pause_s = robot.sample_s if change else 0.0
-            lasted = drive.hold(wanted)
-            drive.clock.sleep(pause_s)
-            for name in [name for name, moves in suspects if moves == (wanted != STILL)]:
-                drive.command(wanted)
-                read = read_state(robot, subscribers, name, pause_s, lasted)
-                del suspects[name, wanted != STILL]
-                if read is not None:
-                    reads += for_good([read])
-                    suspects |= {(name, wanted != STILL): read} if read.differs else {}
-            for _ in range(0 if change else _TIMES if wanted == moving else 1):
-                for name in STATES:
-                    # A state that differs costs three tries each time.
-                    if not any(one.name == name and (one.broken or one.differs) for one in reads):
-                        reads += compare(robot, subscribers, name, partial(drive.command, wanted), lasted)
-        if not suspects:
+            read = read_state(robot, subscribers, name, pause_s, lasted)
+            del suspects[name, wanted != STILL]
+            if read is not None:
+                reads += for_good([read])
+                suspects |= {(name, wanted != STILL): read} if read.differs else {}
+        for _ in range(0 if change else 1 if wanted == STILL else _TIMES):
+            for name in STATES:
+                # A state that differs costs three tries each time.
+                if not any(one.name == name and (one.broken or one.differs) for one in reads):
+                    reads += compare(robot, subscribers, name, partial(drive.command, wanted), lasted)
+        if wanted == STILL and not suspects:
             break
     return (*reads, *(replace(one, broken="") for one in suspects.values() if one is not None))
 

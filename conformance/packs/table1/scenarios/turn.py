@@ -209,7 +209,7 @@ class _Turning:
         If ``renewed``, the linear part is renewed by its own resource as well, for longer than it holds.
         """
         drive, ahead = self.drive, self.robot.share_of_limits(_ASIDE, 0.0)
-        if not drive.command_linear(ahead):
+        if not drive.command(ahead, linear=True):
             return
         drive.reach(ahead, "rest-resources/linear-put", part=LINEAR_PART)
         keeps, seen = drive.sees(ahead, 1.5, part=ANGULAR_PART)
@@ -226,7 +226,7 @@ class _Turning:
         in_time = True
         while drive.clock.now() < until:
             before = drive.trace.sent
-            drive.command_linear(ahead)
+            drive.command(ahead, linear=True)
             in_time = in_time and drive.trace.answered < before + certain_s(hold_s)
             drive.keep(_AGAIN * hold_s)
         lasts, seen = drive.sees(ahead, 2, part=LINEAR_PART, until=drive.trace.sent + certain_s(hold_s))
@@ -306,7 +306,7 @@ class _Turning:
             return None
         full = last.sent
         if by == "linear":
-            drive.command_linear(turning)
+            drive.command(turning, linear=True)
         answered = drive.trace.commands[-1].answered
         first, resumed, due = len(drive.trace.turns), None, None
         ends = answered + self._ends_s

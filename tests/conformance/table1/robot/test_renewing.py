@@ -30,7 +30,7 @@ def test_a_velocity_in_xml_is_renewed_in_xml():
     declared = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.3, hold_s=0.2)
     with serving(body.answer, "application/xml") as url, closing(HttpClient(url, Connection())) as client:
         drive = Drive(Robot(RestInterface(Run(statement=Statement(declared=declared), allow_motion=True), client)))
-        drive.command_linear(_WANTED, xml=True)
+        drive.command(_WANTED, linear=True, xml=True)
         assert not drive.reach(_WANTED, "rest-resources/linear-put")
     first, *again = body.taken
     assert again

@@ -51,7 +51,7 @@ def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     for tries in trace.let_go:
         last = tries[-1]
         early = last.early(limits)
-        if last.is_void(limits) and (early is not None or last.late(limits) is not None):
+        if last.is_spoilt(limits):
             yield _LATE
         elif early is None and limits.hold_s is not None and not last.was_held(limits):
             late = "responses came too late to see a velocity in its hold time"
@@ -79,7 +79,7 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
     for tries in trace.let_go:
         last = tries[-1]
         late = last.late(limits)
-        if last.is_void(limits) and (late is not None or last.early(limits) is not None):
+        if last.is_spoilt(limits):
             yield _LATE
             continue
         seen = late or last.turns[-1]
