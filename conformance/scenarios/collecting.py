@@ -1,5 +1,6 @@
 """The pytest plugin that collects rules as checks: each plays its scenario once per run and judges the trace."""
 
+import sys
 from typing import Any
 
 import pytest
@@ -8,6 +9,15 @@ from conformance.scenarios.rule import Rule, record
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.evidence import Judge
+
+
+def _is_imported(rule: Rule, module: str) -> bool:
+    """Return whether a rule is another module's: its function stands there, and so does the rule itself.
+
+    Where a function of another module has only made it, the rule stands nowhere else.
+    """
+    home = rule.judge.__module__
+    return home != module and any(one is rule for one in vars(sys.modules[home]).values())
 
 
 class RulesPlugin:
@@ -24,7 +34,7 @@ class RulesPlugin:
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
     ) -> list[pytest.Item] | None:
         """Make one pytest item for each scenario of a rule."""
-        if not isinstance(obj, Rule) or obj.judge.__module__ != collector.obj.__name__:
+        if not isinstance(obj, Rule) or _is_imported(obj, collector.obj.__name__):
             return None
         return [self._item(collector, name, obj, scenario) for scenario in obj.on]
 
