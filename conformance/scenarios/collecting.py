@@ -11,7 +11,7 @@ from conformance.scenarios.stage import Need
 from conformance.verdict.evidence import Judge
 
 
-def _is_imported(rule: Rule, module: str) -> bool:
+def is_imported(rule: Rule, module: str) -> bool:
     """Return whether a rule is another module's: its function stands there, and so does the rule itself.
 
     Where a function of another module has only made it, the rule stands nowhere else.
@@ -34,7 +34,7 @@ class RulesPlugin:
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
     ) -> list[pytest.Item] | None:
         """Make one pytest item for each scenario of a rule."""
-        if not isinstance(obj, Rule) or _is_imported(obj, collector.obj.__name__):
+        if not isinstance(obj, Rule) or is_imported(obj, collector.obj.__name__):
             return None
         return [self._item(collector, name, obj, scenario) for scenario in obj.on]
 

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from conformance.packs.table1.scenarios.standing import later
+from conformance.scenarios.collecting import is_imported
 from conformance.scenarios.plan import Step, ordered, told
 from conformance.scenarios.rule import Note, NotTested, record, rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, Recordings, scenario
@@ -33,6 +35,13 @@ def test_a_scenario_is_played_once_and_judged_by_each_rule():
         trace = recordings.of(counting, fixtures.__getitem__).trace
         assert [one.holds for one in is_two.outcomes(trace, fixtures.__getitem__)] == [True]
     assert (_PLAYED, is_two.fixtures) == ([1], ("limit",))
+
+
+def test_a_rule_is_collected_where_it_stands_and_not_where_it_is_imported():
+    made_elsewhere = later("safety/cancel-stays")
+    assert not is_imported(is_two, __name__)
+    assert not is_imported(made_elsewhere, __name__)
+    assert is_imported(is_two, "another")
 
 
 def _fails(error: Exception) -> None:
