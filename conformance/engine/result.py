@@ -175,8 +175,10 @@ def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
     """Return what was called of an API that is judged by its own description, under its key."""
     if robot.log is None or robot.rest is None:
         return {}
+    findings = [cause.finding for cause in causes]
     return {
-        "api": robot.log.document(robot.rest.call_rules, [cause.finding for cause in causes], robot.rest.usual_status)
+        "api": robot.log.document(robot.rest.call_rules, findings, robot.rest.usual_status),
+        **({"ros": robot.ros_ends.document(findings)} if robot.ros_ends else {}),
     }
 
 

@@ -26,6 +26,7 @@ from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import Recorder
+from conformance.engine.ros_ends import RosEnds
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.motion_map import MotionMap
 from conformance.transport.client import Connection, HttpClient
@@ -53,6 +54,7 @@ class RobotUnderTest:
         connection: the settings that all clients share.
         rest: client of its REST interface, or None; ``connect`` sets it.
         log: what was sent to each operation of a device that claims no contract, else None.
+        ros_ends: what was compared by a ROS map, or None.
         permission: what may be sent; every request passes it.
         refusals: whether the device accepts the run's credentials.
         is_at_rest: whether the run has sent nothing that may move the device, or has stopped it since.
@@ -62,6 +64,7 @@ class RobotUnderTest:
     connection: Connection = field(default_factory=Connection)
     rest: RestInterface | None = None
     log: OperationLog | None = None
+    ros_ends: RosEnds | None = None
     permission: Permission = field(init=False)
     refusals: RefusalListener = field(init=False)
     is_at_rest: bool = True
@@ -136,6 +139,9 @@ class RobotUnderTest:
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
             self.run.judge.concerned = lambda request: sorted(self.log.concerned(request)) if self.log else ()
+            if self.run.ros and self.run.statement.ros_map is not None:
+                self.ros_ends = RosEnds(self.run.statement.ros_map, self.run.judge.concerned)
+                self.run.judge.judged = self.ros_ends.judged
         with self._told(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
 

@@ -154,6 +154,7 @@ class Judge:
         met: findings of the running check, newest last.
         ended_by: the finding after which the robot stopped responding, or None.
         concerned: returns the labels of the operations of a description that a request concerns.
+        judged: is told of each case: its requirement and its exchange.
     """
 
     def __init__(self, known: Collection[str] | Mapping[str, Requirement]) -> None:
@@ -164,6 +165,7 @@ class Judge:
         self._faults: dict[str, tuple[dict[str, None], set[str]]] = {}
         self.ended_by: Finding | None = None
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
+        self.judged: Callable[[str, Attempt | None], None] = lambda _requirement, _exchange: None
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._renamed, self._twins = renamed(self._ledger), twins(self._ledger)
         # The requirement that is about missing responses of one kind, and about nothing else.
@@ -256,6 +258,7 @@ class Judge:
         evidence.cases += cases
         evidence.parts[part] = evidence.parts.get(part, 0) + cases
         evidence.checks.add(self.check_name)
+        self.judged(requirement, exchange)
         if exchange is not None:
             for occasion in self._occasions if exchange is self._newest else (occasion_of(exchange),):
                 evidence.occasions[occasion] += cases

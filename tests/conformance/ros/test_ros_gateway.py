@@ -87,6 +87,14 @@ def test_a_failure_shows_both_ends(tmp_path, domain_id):
     assert own, done.stdout
     assert web, done.stdout
     assert int(own[1]) != int(web[1]) == int(float(own[1]))
+    ends = {one["operation"]: one for one in json.loads((tmp_path / "out" / "result.json").read_text())["ros"]}
+    assert own[1] in ends["GET /basic"]["differs"]["ros"]
+    assert web[1] in ends["GET /basic"]["differs"]["web"]
+    assert ends["POST /velocity"]["compared"] > 0
+    assert "differs" not in ends["POST /velocity"]
+    page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
+    row = page.partition('id="ros"')[2].partition("</tr>")[2].partition("</tr>")[0]
+    assert re.search(f"GET /basic.*reads.*BasicTypes.*web says.*{web[1]}.*ROS says.*{own[1]}", row, re.DOTALL), row
 
 
 def test_what_is_missing_is_named(tmp_path, domain_id):

@@ -1,0 +1,75 @@
+"""What result.json says of each operation of a ROS map: what was compared, and the first thing that differs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final
+
+from conformance.contract.described import ROS
+from conformance.statement.motion_calls import NAME, names_operation
+from conformance.statement.ros_map import Acts, RosMap
+from conformance.transport.exchange import Attempt, Request
+from conformance.verdict.finding import Finding
+
+# The kind of an operation by the key that names its end, as readers are told it.
+_DOES: Final = {
+    "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to", "lists": "lists",
+}  # fmt: skip
+#: Of these, what is expected is what the web said, and what was observed is what ROS saw.
+_SEEN_ON_ROS: Final = frozenset(
+    f"{ROS}/{name}"
+    for name in (
+        "write-exact", "once", "order", "refused-nothing", "service-once", "goal-once", "goal-cancel", "subscriptions",
+    )
+)  # fmt: skip
+
+
+class RosEnds:
+    """Counts the cases of each operation of a ROS map.
+
+    Args:
+        ros: the map.
+        concerned: returns the labels of the description's operations that a request concerns.
+    """
+
+    def __init__(self, ros: RosMap, concerned: Callable[[Request], Iterable[str]]) -> None:
+        self._ros, self._concerned = ros, concerned
+        self._compared: Counter[str] = Counter()
+
+    def judged(self, requirement: str, exchange: Attempt | None) -> None:
+        """Count a case."""
+        if exchange is not None and requirement.startswith(f"{ROS}/"):
+            self._compared.update(self._calls(exchange.request))
+
+    def _calls(self, request: Request) -> list[str]:
+        """Return the operations of the map that a request concerns: of several in one template, the one it names."""
+        labels = list(self._concerned(request))
+        found: dict[str, str] = {}
+        for call, one in self._ros.operations.items():
+            more = (one.state.read if one.state else "", one.cancel) if isinstance(one, Acts) else ()
+            found |= {each: call for each in (call, *more) if any(names_operation(each, label) for label in labels)}
+        path = request.target.partition("?")[0]
+        named = [found[each] for each in found if not NAME.search(each) and path.endswith(each.partition(" ")[2])]
+        return list(dict.fromkeys(named or found.values()))
+
+    def document(self, findings: Iterable[Finding]) -> list[dict[str, Any]]:
+        """Return a row for each operation: its end on ROS, how many cases were judged, and the first finding."""
+        of_ros = sorted((one for one in findings if one.requirement.startswith(f"{ROS}/")), key=lambda one: one.number)
+        return list(self._rows([(one, self._calls(one.exchange.request)) for one in of_ros if one.exchange]))
+
+    def _rows(self, findings: list[tuple[Finding, list[str]]]) -> Iterator[dict[str, Any]]:
+        for call, one in self._ros.operations.items():
+            key = next(key for key in _DOES if hasattr(one, key))
+            mine = [finding for finding, calls in findings if call in calls]
+            row = {"operation": call, "does": _DOES[key], "name": getattr(one, key), "compared": self._compared[call]}
+            row |= {"type": one.type} if key != "lists" else {}
+            if mine:
+                web, ros = mine[0].observed, f"expected: {mine[0].expected}"
+                if mine[0].requirement in _SEEN_ON_ROS:
+                    # The response is the web's, what came of it ROS's.
+                    response, _, seen = web.partition(": ")
+                    web, ros = f"{ros}; {response}" if seen else ros, seen or web
+                numbers = [finding.number for finding in mine]
+                row |= {"findings": numbers, "differs": {"web": web, "ros": ros, "requirement": mine[0].requirement}}
+            yield row
