@@ -24,14 +24,16 @@ from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
-# Of a schema, as many fields and levels are read; a comment names so many ends of the graph.
+# Of a schema, as many fields, levels and objects are read; a comment names so many ends of the graph.
 _LEAVES: Final = 500
 _DEPTH: Final = 8
+_PLACES: Final = 50
 _NAMED: Final = 3
 # A type with fewer fields is not known by them.
 _FEW: Final = 4
-# A read; what is on the graph is found so soon; nothing more came for so long, s.
+# A read, and all of them; what is on the graph is found so soon; nothing more came for so long, s.
 _READ_S: Final = 3.0
+_READS_S: Final = 60.0
 _DISCOVERY_S: Final = 15.0
 _SETTLES_S: Final = 1.0
 # What each node has, and parts of actions.
@@ -59,10 +61,10 @@ class Graph(NamedTuple):
 
     def fitting(self, schema: Schema | None, ends: dict[str, str], part: str = "") -> dict[str, Fit]:
         """Return how a schema has the fields of each end's type, or of a part of it, by name."""
-        found = {}
+        found, places = {}, _places(schema or {})
         for name, type_ in ends.items():
             with suppress(ProbeError):  # the type is not installed
-                fit = _fit(schema, self.definition(type_ + part))
+                fit = _fit(places, self.definition(type_ + part))
                 if fit is not None and not (part and fit.lacks):
                     found[name] = fit
         return found
@@ -108,8 +110,9 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
         ProbeError: the suite's node cannot be started.
     """
     read: dict[str, Any] = {}
+    until = WALL_CLOCK.now() + _READS_S
     for one in operations:
-        if one.method == "GET" and one.shape is not None and "{" not in one.template and not one.never:
+        if WALL_CLOCK.now() < until and one.method == "GET" and one.shape is not None and "{" not in one.template:
             # A gateway may subscribe only when somebody asks.
             with suppress(NoAnswerError):
                 exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
@@ -305,46 +308,59 @@ def _is_word(short: str, long: str) -> bool:
     return short == long or (len(short) > 2 and long.startswith(short))  # noqa: PLR2004 - shorter ones begin anything
 
 
-def _fit(schema: Schema | None, definition: Definition, message: str = "") -> Fit | None:
+def _places(schema: Schema) -> dict[str, dict[str, Schema]]:
+    """Return each object in a schema by its position: the fields below it, by their positions in it."""
+    leaves = dict(_leaves(schema))
+    steps = [at.split("/")[:-1] for at in leaves]
+    places = sorted({"/".join(one[:end]) for one in steps for end in range(1, len(one) + 1)})
+    return {
+        place: {at.removeprefix(place): leaf for at, leaf in leaves.items() if at.startswith(f"{place}/")}
+        for place in places[:_PLACES]
+    }
+
+
+def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: str = "") -> Fit | None:
     """Return how a schema has the fields of a message, where in it it has most; None: it is another message.
 
     Args:
-        schema: of a body, or an item of an array.
+        places: of the schema.
         definition: of a type.
         message: a type in it; empty: itself.
     """
     own = dict(_own_leaves(definition, message))
     if not own:
         return Fit("", {}, 0, 0, {})
-    leaves = dict(_leaves(schema or {}))
-    steps = [at.split("/")[:-1] for at in leaves]
+    by_key: dict[str, set[str]] = {}
+    for pointer in own:
+        steps = pointer.split("/")[1:]
+        for first in range(len(steps)):
+            by_key.setdefault(_key("".join(steps[first:])), set()).add(pointer)
     best: Fit | None = None
-    for place in sorted({"/".join(one[:end]) for one in steps for end in range(1, len(one) + 1)}):
-        below = {at.removeprefix(place): leaf for at, leaf in leaves.items() if at.startswith(f"{place}/")}
-        pairs, forms = _pairs(below, own), dict[str, str]()
+    for place, below in places.items():
+        pairs, forms = _pairs(below, by_key), dict[str, str]()
         lacks = len(own) - len(pairs)
         # A part of a message is all that the body has, and no small part of another one.
-        fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(leaves))
+        fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(places[""]))
         larger = len(pairs) > (best.size if best else 0)
         if fits and larger and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items()):
             best = Fit(place, _fields(pairs, own), len(pairs), lacks, forms)
     return best
 
 
-def _pairs(leaves: Collection[str], own: Collection[str]) -> dict[str, str]:
+def _pairs(leaves: Collection[str], by_key: dict[str, set[str]]) -> dict[str, str]:
     """Return the position in a message of each field of a schema that has one.
 
     A field is known by its path however its words are written, or by the end of a path that no other field has.
+
+    Args:
+        leaves: the schema's fields.
+        by_key: those of the message, by their paths and all ends of these.
     """
-    by_key: dict[str, set[str]] = {}
-    for pointer in own:
-        steps = pointer.split("/")[1:]
-        for first in range(len(steps)):
-            by_key.setdefault(_key("".join(steps[first:])), set()).add(pointer)
     found: dict[str, str] = {}
     for web in leaves:
-        named = by_key.get(_key(web), set())
-        exact = {pointer for pointer in named if _key(pointer) == _key(web)} or named
+        key = _key(web)
+        named = by_key.get(key, set())
+        exact = {pointer for pointer in named if _key(pointer) == key} or named
         if len(exact) == 1 and not exact <= {*found.values()}:
             found[web] = next(iter(exact))
     return found
@@ -408,7 +424,7 @@ def _has_type(leaf: Schema, shape: Shape, definition: Definition, forms: dict[st
     if shape.is_array:
         if items is None or not shape.is_message:
             return items is not None and _has_type(items, Shape(shape.item), definition, forms)
-        found = _fit(items, definition, shape.item)
+        found = _fit(_places(items), definition, shape.item)
         forms |= found.forms if found else {}
         return found is not None and not (found.at or found.fields or found.lacks)
     if shape.item in LONG:

@@ -14,7 +14,7 @@ from processes import ended
 from ros_probe.process import RosProcess
 
 #: What no description says.
-UNSAID = ("max_age_s", "rejected")
+UNSAID = ("max_age_s", "rejected", "timeout_s")
 
 
 def _proposed(url, folder, domain_id):
