@@ -97,11 +97,10 @@ def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether new messages are returned in time: each at last, and half of them soon, as a machine is busy."""
     took: dict[str, list[tuple[float, Case]]] = {}
     for one, older in _with_older(trace):
-        reads = reads_of(ros, one.operation)
+        reads, took_s = reads_of(ros, one.operation), one.sent - one.published if one.earlier else 0.0
         within_s = reads.max_age_s or reads.within_s
         expected = f"{one.what} on {one.topic} within {within_s:g} s of its publication"
         if one.was_shown:
-            took_s = one.sent - one.published if one.earlier else 0.0
             case = Case(False, one.exchange, expected, f"an older one until {took_s:.1f} s after it", one.operation)
             took.setdefault(one.operation, []).append((took_s - within_s - SLACK_S, case))
         elif not one.reliably:

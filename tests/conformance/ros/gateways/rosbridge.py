@@ -58,7 +58,7 @@ class _Client:
     loop: asyncio.AbstractEventLoop
     sending: asyncio.Queue[dict[str, Any]] = field(default_factory=lambda: asyncio.Queue(_WAITING))
     subscriptions: dict[str, _Subscription] = field(default_factory=dict)
-    goals: dict[str, Goal] = field(default_factory=dict)
+    goals: dict[str, tuple[Goal, Any]] = field(default_factory=dict)
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message, unless a slow client has too many waiting."""
@@ -155,7 +155,7 @@ class _Client:
             self.send(result | {"values": f"action {end.ros} does not exist", "status": 0})
             return
         _, goal, accepted = sent
-        self.goals[name] = goal
+        self.goals[name] = goal, accepted
         if not await asyncio.wrap_future(accepted):
             self.send(result | {"values": "goal was rejected", "status": 0})
             return
@@ -170,7 +170,9 @@ class _Client:
         self.send(result | {"values": values, "status": goal.status, "result": True})
 
     async def _cancel_action_goal(self, said: dict[str, Any]) -> None:
-        if not await asyncio.wrap_future(self.ros.cancel(self.goals[said["id"]])):
+        goal, accepted = self.goals[said["id"]]
+        await asyncio.wrap_future(accepted)  # a busy server may take its time
+        if not await asyncio.wrap_future(self.ros.cancel(goal)):
             raise RefusedError("the goal cannot be canceled")
 
 
