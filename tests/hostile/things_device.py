@@ -181,8 +181,6 @@ class Things:
             self.there[max(self.there)]["label"] = value["label"]
         if self.fault == "creation restores" and self.last_id - 2 in self.there:
             self.there[self.last_id - 2] = {**self.there[self.last_id - 2], "label": "roaas"}
-        if self.fault == "creation revives" and self.deleted:
-            self.there.update(self.deleted)
         if value.get("primary"):
             for one in self.there.values():
                 one["primary"] = False
@@ -208,8 +206,6 @@ class Things:
         if "jobs" in self.style and key in self.there and self.now() - self.there[key].get("_made", self.now()) > 0.5:
             del self.there[key]
         if key not in self.there:
-            if "soft" in self.style and key in self.deleted:
-                return self.answer({**self.deleted[key], "state": "deleted"})
             return self.refuse(404)
         thing = self.there[key]
         if self.fault == "GET mixes up after a DELETE" and self.deleted:

@@ -125,8 +125,7 @@ class Written:
         for name in list(defaults):
             if self.fault == f"default of {name} by {where}":
                 defaults[name] = before.get(name, not defaults[name])
-        base = dict(before) if "shown" in self.style else {}
-        return {**defaults, **base, **value} if self.fault == "PUT merges" else {**defaults, **value}
+        return {**defaults, **value}
 
     async def body(self, request):
         """Return the JSON of a request; None where it is none."""

@@ -1,27 +1,21 @@
-"""Six devices that are right and unusual, each with faults that a name turns on."""
+"""Four devices that are right and unusual, each with faults that a name turns on."""
 
 import asyncio
 import itertools
-import json
 import shutil
-import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from aiohttp import web
 from flask import Flask, Response, jsonify, request
-from jsonschema import Draft202012Validator
 from serving_apps import behind_nginx, described_app, description, responses, serving_app
 from starlette.responses import JSONResponse, PlainTextResponse, StreamingResponse
 from starlette.routing import Route
-from toy_server import Handler, server_of
 from uvicorn.middleware.wsgi import WSGIMiddleware
 
 _NONE = {"description": "there is none"}
 _TEXT, _INTEGER = {"type": "string"}, {"type": "integer"}
-TOKEN = "open sesame".replace(" ", "-")
 
 
 def _path(name: str, schema: Any) -> dict[str, Any]:
@@ -58,104 +52,6 @@ def unions(faults: Collection[str], _: Path) -> Iterator[str]:
     routes = [Route("/video/{camera}", one), Route("/names", named)]
     with serving_app(described_app(description(paths), routes)) as url:
         yield url
-
-
-@contextmanager
-def openapi_3_0(faults: Collection[str], _: Path) -> Iterator[str]:
-    """Tools with nullable, discriminator, readOnly, writeOnly and exclusiveMinimum as a boolean (aiohttp's router)."""
-    kinds = ("gripper", "drill")
-    base = {
-        "type": "object",
-        "required": ["id", "kind", "secret", "force"],
-        "properties": {
-            "id": {"type": "integer", "readOnly": True},
-            "kind": {"type": "string"},
-            "secret": {"type": "string", "writeOnly": True},
-            "force": {"type": "number", "minimum": 0, "exclusiveMinimum": True},
-            "owner": {"type": "string", "nullable": True},
-        },
-    }
-    tool = {
-        "oneOf": [{"$ref": f"#/components/schemas/{kind}"} for kind in kinds],
-        "discriminator": {"propertyName": "kind"},
-    }
-    schemas = {kind: {"allOf": [base, {"properties": {"kind": {"enum": list(kinds)}}}]} for kind in kinds}
-    body = {"required": True, "content": {"application/json": {"schema": tool}}}
-    made = {"201": {"description": "", "content": {"application/json": {"schema": tool}}}, "422": _NONE}
-    paths = {
-        "/tools": {
-            "get": {"responses": responses({"type": "array", "items": tool})},
-            "post": {"requestBody": body, "responses": made},
-        },
-        "/tools/{id}": {
-            "get": {"parameters": [_path("id", _INTEGER)], "responses": responses(tool, _404=_NONE, _422=_NONE)}
-        },
-    }
-    document = description(paths, "3.0.3", components={"schemas": schemas})
-    force = {"type": "number", "minimum" if "a bound that is taken" in faults else "exclusiveMinimum": 0}
-    taken = {"kind": {"enum": list(kinds)}, "secret": _TEXT, "force": force, "owner": {"type": ["string", "null"]}}
-    valid = Draft202012Validator({"type": "object", "required": ["kind", "secret", "force"], "properties": taken})
-    tools: list[dict[str, Any]] = [{"id": 0, "kind": "drill", "force": 1.5, "owner": None}]
-    if "null that is not allowed" in faults:
-        tools[0]["kind"] = None
-
-    async def add(asked: web.Request) -> web.Response:
-        try:
-            value = json.loads(await asked.read())
-        except ValueError:
-            return web.Response(status=422)
-        if not valid.is_valid(value):
-            return web.Response(status=422)
-        kept = {name: value[name] for name in ("kind", "force", "owner") if name in value}
-        tools.append({"id": len(tools), **kept})
-        return web.json_response(tools[-1], status=201)
-
-    async def one(asked: web.Request) -> web.Response:
-        try:
-            number = int(asked.match_info["id"])
-        except ValueError:
-            return web.Response(status=422)
-        return web.json_response(tools[number]) if 0 <= number < len(tools) else web.Response(status=404)
-
-    async def listed(_: web.Request) -> web.Response:
-        return web.json_response(tools)
-
-    async def told(_: web.Request) -> web.Response:
-        return web.json_response(document)
-
-    app = web.Application()
-    app.add_routes(
-        [
-            web.get("/openapi.json", told),
-            web.get("/tools", listed),
-            web.post("/tools", add),
-            web.get("/tools/{id}", one),
-        ]
-    )
-    with _serving_aiohttp(app) as url:
-        yield url
-
-
-@contextmanager
-def _serving_aiohttp(app: web.Application) -> Iterator[str]:
-    loop = asyncio.new_event_loop()
-
-    @web.middleware
-    async def with_host(asked: web.Request, handler: Any) -> Any:
-        # RFC 9112 3.2; aiohttp itself takes a request without one.
-        if len(asked.headers.getall("Host", ())) != 1:
-            return web.Response(status=400)
-        return await handler(asked)
-
-    app.middlewares.append(with_host)
-    runner = web.AppRunner(app)
-    loop.run_until_complete(runner.setup())
-    site = web.TCPSite(runner, "127.0.0.1", 0)
-    loop.run_until_complete(site.start())
-    threading.Thread(target=loop.run_forever, daemon=True).start()
-    yield f"http://127.0.0.1:{runner.addresses[0][1]}"
-    asyncio.run_coroutine_threadsafe(runner.cleanup(), loop).result(10)
-    loop.call_soon_threadsafe(loop.stop)
 
 
 @contextmanager
@@ -214,46 +110,6 @@ def swagger(faults: Collection[str], _: Path) -> Iterator[str]:
 
     with serving_app(WSGIMiddleware(app)) as url:
         yield url
-
-
-class _Guarded(Handler):
-    """Serves a state to clients with a key in the query or with a bearer token (http.server)."""
-
-    default_request_version = "HTTP/1.1"
-
-    def answer(self) -> None:
-        path, _, query = self.path.removeprefix(f"http://{self.headers.get('Host')}").partition("?")
-        lengths, coding = self.headers.get_all("Content-Length", []), self.headers.get("Transfer-Encoding")
-        if len(self.headers.get_all("Host", [])) != 1 or len(lengths) > 1 or coding or self.headers.defects:
-            self.close_connection = True
-            self.send(400)
-        elif path == "/openapi.json":
-            self.send(200, json.dumps(self.server.document).encode())
-        elif path != "/state":
-            self.send(404, b"{}")
-        elif self.command not in {"GET", "HEAD"}:
-            self._refuse(405, "Allow", "GET, HEAD")
-        elif f"key={TOKEN}" in query.split("&") or self.headers.get("Authorization") == f"Bearer {TOKEN}":
-            self.send(200, b'{"on": 1}' if "a number for a boolean" in self.server.faults else b'{"on": true}')
-        else:
-            self._refuse(401, "WWW-Authenticate", "Bearer")
-
-    def _refuse(self, status: int, name: str, value: str) -> None:
-        self.send_response(status)
-        self.send_header(name, value)
-        self.send_header("Content-Length", "0")
-        self.end_headers()
-
-
-@contextmanager
-def guarded(faults: Collection[str], _: Path) -> Iterator[str]:
-    """A state behind an API key in the query or a bearer token."""
-    state = responses({"type": "object", "properties": {"on": {"type": "boolean"}}}, _401=_NONE)
-    schemes = {"key": {"type": "apiKey", "in": "query", "name": "key"}, "token": {"type": "http", "scheme": "bearer"}}
-    document = description({"/state": {"get": {"responses": state}}}, components={"securitySchemes": schemes})
-    document["security"] = [{"key": []}, {"token": []}]
-    with server_of(_Guarded, document=document, faults=faults) as server:
-        yield server.url
 
 
 async def _dripping(piece: bytes) -> Any:
