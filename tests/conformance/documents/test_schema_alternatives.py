@@ -34,3 +34,10 @@ CASES = (
 @pytest.mark.parametrize(("alternatives", "value", "said"), CASES)
 def test_the_alternative_that_fits_best_is_named(word, alternatives, value, said):
     assert said in shape_of(modern({word: alternatives})).problem(value, "it")
+
+
+def test_a_discriminator_chooses_where_several_alternatives_allow_a_value():
+    tool = _object(kind={"enum": ["gripper", "drill"]})
+    chosen = {"oneOf": [tool, dict(tool)], "discriminator": {"propertyName": "kind"}}
+    assert shape_of(modern(chosen)).problem({"kind": "drill"}, "it") == ""
+    assert shape_of(modern({"oneOf": chosen["oneOf"]})).problem({"kind": "drill"}, "it")
