@@ -127,6 +127,8 @@ class Changes:
         """Take a request that was accepted, or may have been."""
         template = operation.template.rstrip("/") if operation is not None else ""
         above, item = path.rpartition("/")[0], template.rpartition("/")[0]
+        if operation is not None and occasion.response.ok and state_of(operation) == self._states.get(item, "-"):
+            yield from self._fallen(occasion, item, above)
         if operation is not None and occasion.response.ok and item in self._states:
             yield from self._told(occasion, operation, above, self._states[item])
         elif operation is not None and occasion.response.ok and template in self._states:
@@ -171,7 +173,7 @@ class Changes:
         if len(self._there) < _MOST_THINGS:
             self._there[path] = ""
         template = operation.template.rstrip("/")
-        yield from self._fallen(occasion, operation, path)
+        yield from self._fallen(occasion, template, path)
         if template in self._states and (state := _state_in(occasion, self._states[template])):
             yield from self._state(occasion, operation, path, state)
 
@@ -206,16 +208,16 @@ class Changes:
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
         self._known[path] = _State(now, occasion.response.received_s)
 
-    def _fallen(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
-        """Judge members of which the description says that they never become less."""
-        names, answer = self._growing.get(operation.template.rstrip("/"), frozenset()), occasion.response
+    def _fallen(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
+        """Judge members of a thing of which the description says that they never become less."""
+        names, answer = self._growing.get(template, frozenset()), occasion.response
         value = read_json(answer.body).value if names and is_json(answer.media_type) else None
         now = {name: one for name, one in represented(value, names).items() if name in names and is_number(one)}
         before, at_s = self._grown.get(path, ({}, 0.0))
         if occasion.sent_s >= at_s and now:
             for name in now.keys() & before.keys():
                 expected = f"at least {before[name]} as {name}, which never falls by the description"
-                holds, cause = now[name] >= before[name], f"{operation.label} {name} falls"
+                holds, cause = now[name] >= before[name], f"{template} {name} falls"
                 yield occasion.case("description/states", holds, expected, f"{now[name]} as {name}", cause=cause)
             self._grown[path] = now, answer.received_s
 

@@ -67,7 +67,8 @@ class _Held:
         named = [one for one in self.actions if "{" not in one.template and one is not self.operation]
         found = sorted(named, key=lambda one: -len(said & words_of(one.template)))
         found = [one for one in found if said & words_of(one.template)]
-        self._others = [*found, *(one for one in below if one not in self._endings)][:_OTHERS]
+        # One of them may want another one before it.
+        self._others = [*found, *([one for one in below if one not in self._endings] * 2)][:_OTHERS]
 
     def called(self) -> None:
         """Call it until it is accepted, and then on another thing, where the description speaks of a second one."""

@@ -205,6 +205,8 @@ class _Thing:
             # A JSON patch has no members: the first one that changes something.
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._refused(change, refusable)
+            # The writes below restore what these have changed.
+            self._at_once(change, bodies)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
             for turn, body in enumerate(
@@ -216,7 +218,6 @@ class _Thing:
                     if old not in {"", self.tag} and change is changes[0] and not is_behind:
                         is_behind = True
                         self._behind(change, bodies[-1], old)
-            self._at_once(change, bodies)
             waits = True
             for body in self._special(change):
                 before, until = self._members(), time.monotonic() + _SETTLES_S

@@ -5,28 +5,38 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
-from contextlib import suppress
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listing_of, page_of
+from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import Values
 from conformance.documents.json_schema import is_number
 from conformance.documents.json_text import shown
-from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
+from conformance.scenarios.own_things import created_path
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.survey import Surveyor
+from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 _CSV: Final = "text/csv"
 # A table may round what JSON has in full.
 _NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}
 _LARGEST: Final = 1 << 20
+# So many things with texts in quotes are created, and by these words a description says what separates values.
+_CREATED: Final = 2
+_COMMAS: Final = re.compile(r"RFC\s*4180|\bcommas?\b|`\w+(?:,\s?\w+)+`", re.IGNORECASE)
+# A table may shorten a text, or keep programs from reading it as a formula.
+_FORMULA: Final = ("=", "+", "-", "@", "\t")
 
 
 @dataclass(frozen=True)
@@ -49,20 +59,40 @@ class Table:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
     """Read each list that is declared as CSV and as JSON; what differs counts if it differs again."""
-    found = list[Table]()
-    for read in operations_of(api.run.contract):
-        declared = read.formats
-        is_both = _CSV in declared and any(map(is_json, declared))
-        if read.method != "GET" or not is_both or not allowed(api, read) or read.label in api.streams:
-            continue
-        api.run.limit.check()
-        with suppress(NoAnswerError):  # the survey tells what breaks a connection
-            first = _compared(api, values, read)
-            again = _compared(api, values, read) if first is not None and first.fault else first
-            found += [one for one in (again,) if one is not None]
+    found, operations = list[Table](), callable_operations(api)
+    gets = [one for (method, _), one in operations.items() if method == "GET"]
+    reads = [one for one in gets if _CSV in one.formats and any(map(is_json, one.formats))]
+    with _quoted_texts(api, values, operations if reads else {}):
+        for read in reads:
+            api.run.limit.check()
+            with suppress(NoAnswerError):  # the survey tells what breaks a connection
+                first = _compared(api, values, read)
+                again = _compared(api, values, read) if first is not None and first.fault else first
+                found += [one for one in (again,) if one is not None]
     if not found:
         raise NoOccasionError("no list is declared as CSV and as JSON, and was the same twice")
     return tuple(found)
+
+
+@contextmanager
+def _quoted_texts(
+    api: RestInterface, values: Values, operations: Mapping[tuple[str, str], Operation]
+) -> Iterator[None]:
+    """Let there be things whose texts have quotes, as far as the device takes them and deletes them afterwards."""
+    lives = [
+        (create, read, delete)
+        for (method, path), read in operations.items()
+        for create, delete in [(operations.get(("POST", collection_of(path))), operations.get(("DELETE", path)))]
+        if method == "GET" and create is not None and delete is not None and len(read.parameter("path")) == 1
+    ][:_CREATED]
+    made = list[tuple[Operation, Operation, str]]()
+    with suppress(NoAnswerError):
+        made += [(read, delete, created_path(Surveyor(api, values), create, read)) for create, read, delete in lives]
+    yield
+    with suppress(NoAnswerError):
+        for read, delete, path in made:
+            if path:
+                Writer(api, values).conditional(delete, read, path)
 
 
 def _compared(api: RestInterface, values: Values, read: Operation) -> Table | None:
@@ -83,7 +113,11 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
         return None
     text = answer.body.decode("utf-8-sig", "replace") if len(answer.body) <= _LARGEST else ""
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
-    columns = _columns(rows[0], items) if rows else {}
+    columns, head = _columns(rows[0], items) if rows else {}, ",".join(rows[0]) if rows else ""
+    other = next((one for one in ";\t|" if len(_columns(head.split(one), items)) > len(columns)), "")
+    if other and _COMMAS.search(read.text):
+        expected = "values that commas separate, as the description says (RFC 4180 2)"
+        return Table(read.label, table, expected, f"{other!r} between the names in the first line")
     if len(columns) < 2:  # noqa: PLR2004 - one name may be chance
         return None
     is_paged = pages[0].goes_on or (listing_of(read) is not None and len(rows) - 1 > len(items))
@@ -111,6 +145,14 @@ def _differences(
             other = _number(text) if isinstance(value, int | float) and is_number(value) else None
             if other is not None and not math.isclose(float(value or 0), other, **_NEAR):
                 yield f"{text} as {name} in row {number}, and {shown(value)} in JSON"
+            if isinstance(value, str) and '"' in value and not _is_shown(value.strip(), text):
+                yield f"{shown(text)} as {name} in row {number}, and {shown(value)} in JSON"
+
+
+def _is_shown(value: str, text: str) -> bool:
+    """Return whether a table shows a text, in short or in another encoding as well."""
+    is_free = value.startswith(_FORMULA) or "\ufffd" in text or not value.isprintable()
+    return is_free or value == text or value.startswith(text.rstrip(". \u2026"))
 
 
 def _number(text: str) -> float | None:

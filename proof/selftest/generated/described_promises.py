@@ -70,9 +70,13 @@ def _rows(operation: Operation) -> Iterator[_Row]:
         yield from _of_conditions(operation)
     if operation.method in {"PUT", "PATCH", "POST"}:
         if str(_NOT_ACCEPTABLE) in declared:
-            yield "applies-406", "performs what it refuses with 406", _applying_unaccepted
+            yield "applies-406", "performs what it refuses with 406", _resent(_NOT_ACCEPTABLE, "Accept", "*/*")
         if str(_UNSUPPORTED) in declared and operation.bodies:
-            yield "type-any", "takes its content by any media type", _typed(next(iter(operation.bodies)))
+            yield (
+                "type-any",
+                "takes its content by any media type",
+                _resent(_UNSUPPORTED, "Content-Type", next(iter(operation.bodies)), is_told=True),
+            )
         yield from _of_values(operation)
 
 
@@ -88,6 +92,7 @@ def _of_reads(operation: Operation) -> Iterator[_Row]:
     yield "digest", "sends the digest of something else (RFC 9530)", _edited(_other_digest)
     if _CSV in operation.formats:
         yield "row-lost", "leaves out the last row of a table", _edited(_fewer_rows)
+        yield "row-quotes", "sends quotes in quoted values as they are (RFC 4180 2)", _edited(_single_quotes)
     if kinds_of(operation.shape or {}) == {"array"}:
         yield "list-other", "shows other numbers in lists than in their items", _edited(_other_numbers)
 
@@ -246,13 +251,18 @@ def _stale_copy(request: Request, forward: Forward, past: _Past) -> tuple[Respon
     return altered, True
 
 
-def _applying_unaccepted(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
-    response = forward(request)
-    if response.status != _NOT_ACCEPTABLE:
-        return response, False
-    altered = request.copy()
-    altered.put("Accept", "*/*")
-    return response, forward(altered).status in _SUCCESS
+def _resent(status: int, name: str, value: str, *, is_told: bool = False) -> _Act:
+    """Return an act that performs what is refused with a status by another header field; ``is_told``: and says so."""
+
+    def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
+        response, altered = forward(request), request.copy()
+        if response.status != status:
+            return response, False
+        altered.put(name, value)
+        done = forward(altered)
+        return (done if is_told else response), done.status in _SUCCESS
+
+    return act
 
 
 def _first_tag(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
@@ -260,18 +270,6 @@ def _first_tag(request: Request, forward: Forward, _: _Past) -> tuple[Response, 
     altered.put("If-Match", wanted.partition(",")[0])
     response = forward(altered if "," in wanted else request)
     return response, "," in wanted and response.status == _FAILED
-
-
-def _typed(media_type: str) -> _Act:
-    """Return an act that sends what was refused for its media type by another one."""
-
-    def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
-        response, altered = forward(request), request.copy()
-        altered.put("Content-Type", media_type)
-        done = forward(altered) if response.status == _UNSUPPORTED else response
-        return done, done is not response and done.status in _SUCCESS
-
-    return act
 
 
 def _longer(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
@@ -361,6 +359,11 @@ def _fewer_rows(answer: Response) -> None:
     lines = answer.body.splitlines(keepends=True)
     if answer.media_type == _CSV and len(lines) > 2:  # noqa: PLR2004 - the names, and two rows
         answer.body = b"".join(lines[:-1])
+
+
+def _single_quotes(answer: Response) -> None:
+    if answer.media_type == _CSV:
+        answer.body = answer.body.replace(b'""', b'"')
 
 
 def _other_numbers(answer: Response) -> None:

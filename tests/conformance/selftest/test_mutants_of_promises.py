@@ -38,6 +38,11 @@ _ROWS = {
     "range-stale:GET /zones/{id}/map": ([_MAP, _PART], (*_PART[:2], {**_PART[2], "If-Range": '"x"'}, None), 206),
     "digest:GET /log": ([_READ], ("GET", "/log", {}, None), 200),
     "row-lost:GET /zones": ([_READ], ("GET", "/zones", {"Accept": "text/csv"}, None), 200),
+    "row-quotes:GET /zones": (
+        [_READ, (*_PUT[:3], {"name": 'a"b'})],
+        ("GET", "/zones", {"Accept": "text/csv"}, None),
+        200,
+    ),
     "list-other:GET /zones": ([_READ], ("GET", "/zones", {}, None), 200),
     "key-again:POST /zones": ([_keyed("a", _OTHER), _keyed("b", _OTHER)], _keyed("a", _OTHER), 201),
     "key-any-body:POST /zones": ([_keyed("a", _OTHER), _keyed("a", _OTHER)], _keyed("a", {"name": "n"}), 201),
