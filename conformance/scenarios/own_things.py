@@ -260,9 +260,11 @@ class _Thing:
     def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
         """Write by two clients at the same moment that have the same copy, of which one has to be refused."""
         names = {one.name.lower() for one in change.parameter("header")}
-        if self._current() and "if-match" in names and len(bodies) > 1:
+        now = self._members()
+        others = [one for one in bodies if any(not same(now.get(name), one[name]) for name in one)]
+        if self._current() and "if-match" in names and len(others) > 1:
             inputs = usual_inputs(change, self.surveyor.values)[0]
-            own = [written(change, replace(inputs, body=body)) for body in bodies[:2]]
+            own = [written(change, replace(inputs, body=body)) for body in others[:2]]
             fields = [tuple(one for one in own[0].headers if one[0].lower() != "if-match"), self._current()]
             requests = [replace(one, target=self.target, headers=(*fields[0], *fields[1])) for one in own]
             send_together([[(self.api.client, one) for one in requests]])
