@@ -11,18 +11,15 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import isclose
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from urllib.parse import urlsplit
 
-from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
+from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
 from conformance.documents.wsdl import Wsdl
-from conformance.documents.xml import NotXmlError, elements, local, parse
+from conformance.documents.xml import local
 from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, Simple, is_alike, number_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
-
-if TYPE_CHECKING:
-    from lxml import etree
 
 # Other values that have to be kept before one has to be, and how often another one is read before it counts.
 _KEPT: Final = 2
@@ -31,7 +28,6 @@ _SEEN: Final = 2
 _LOST: Final = 6
 # Of so many values that are read at once, one may be read later: by a read that went wrong.
 _FEW: Final = 3
-_LONGEST: Final = 65_536
 _MOST: Final = 1_000
 # Nouns of what is kept as it is given, and is no state of the world.
 _KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
@@ -128,13 +124,13 @@ class SoapMemory:
         path = urlsplit(request.url).path
         if request.method != "POST" or path not in self._paths:
             return
-        payload = _payload(request.body)
+        payload = payload_of(request.body)
         act = self._acts.get((path, str(payload.tag))) if payload is not None else None
         if payload is None or act is None or not isinstance(attempt, Exchange):
             if not isinstance(attempt, Exchange) and not (act and act.role is Role.READS):
                 self._forget()
             return
-        answer, sent = _payload(attempt.response.body), texts_of(payload)
+        answer, sent = payload_of(attempt.response.body), texts_of(payload)
         is_fault = answer is not None and local(str(answer.tag)) == "Fault"
         if act.role is Role.READS:
             if answer is not None and attempt.response.ok and not is_fault:
@@ -271,18 +267,6 @@ class SoapMemory:
                     observed = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
                     cause = f"{thing.creator.label} {act.label}"
                     yield case(f"soap/{name}", False, exchange, expected, observed, cause)  # noqa: FBT003 - see Case
-
-
-def _payload(octets: bytes) -> etree._Element | None:
-    """Return the first element in the Body of a message; None if it is no message that a checker reads."""
-    if not 0 < len(octets) <= _LONGEST:
-        return None
-    try:
-        root = parse(octets, comments=False)
-    except NotXmlError:
-        return None
-    body = next((one for one in elements(root) if local(str(one.tag)) == "Body"), None)
-    return next(iter(elements(body)), None) if body is not None else None
 
 
 def _is_near(simple: Simple, text: str, got: str) -> bool:

@@ -55,6 +55,7 @@ class SoapOperation:
         input_action, output_action: wsam:Action of the input and of the output, or None.
         messages: local names of the input and output messages.
         parts: names of the parts of the input and the output message.
+        faults: tags of the elements that its declared faults have in their detail.
     """
 
     name: str
@@ -68,6 +69,7 @@ class SoapOperation:
     output_action: str | None = None
     messages: tuple[str, ...] = ()
     parts: tuple[tuple[str, ...], ...] = ()
+    faults: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -348,7 +350,14 @@ class _Reader:
             actions.get("output"),
             tuple(map(name, messages)),
             tuple(tuple(map(name, one.iterfind(clark(WSDL, "part")))) for one in messages),
+            frozenset(self._faults(declared)),
         )
+
+    def _faults(self, declared: etree._Element) -> Iterator[str]:
+        for given in declared.iterfind(clark(WSDL, "fault")):
+            message = self._named("w:message", given, "message")
+            for part in message.iterfind(clark(WSDL, "part")) if message is not None else ():
+                yield qname(part, part.get("element")) or ""
 
     def _headers(self, bound: etree._Element) -> Iterator[str]:
         """Yield the tags of the header blocks of a request (WSDL 1.1, 3.7)."""

@@ -35,6 +35,7 @@ _FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
 # Of one operation, at standard: invalid messages of each kind; and how often the usual one is sent.
 _MOST: Final = 4
 _USUAL: Final = 6
+_REPEATED: Final = 2
 # One operation may take so long, s.
 _BUDGET_S: Final = 20.0
 # With a limit in time, all others than the usual messages end at this share of it: few other checks come after them.
@@ -239,7 +240,9 @@ def _groups(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterato
     effort = caller.api.run.effort
     # What was created may be there only once, and what was removed is not there any more.
     is_once = role_of(operation.name) in {Role.CREATES, Role.REMOVES}
-    for _ in range(0 if effort.name == "quick" or is_once else _USUAL - 1):
+    # At quick, what may not be repeatable is repeated too: what wrong messages do to it shows only beside that.
+    quick = _REPEATED if role_of(operation.name) is Role.OTHER else 0
+    for _ in range(0 if is_once else quick if effort.name == "quick" else _USUAL - 1):
         if label_of(port, operation) not in caller.lost:
             message = caller.messages.message(port, operation, node)
             caller.send(port, operation, kind, "a valid message", message)

@@ -12,7 +12,7 @@ from lxml import etree
 
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of
-from conformance.documents.xml import local
+from conformance.documents.xml import NotXmlError, elements, local, parse
 from conformance.documents.xsd_shapes import Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
@@ -22,6 +22,8 @@ REFERS: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name|channe
 SETTLES_S: Final = 1.0
 # Elements of a message that are nested deeper are not compared.
 _DEEPEST: Final = 6
+# A longer message is not read, octets.
+_LONGEST: Final = 65_536
 
 
 class Role(StrEnum):
@@ -124,6 +126,18 @@ def _values(declared: Element, depth: int = 0, *, needed: bool = True) -> Iterat
         yield local(declared.tag).lower(), kind.text, needed
     for child in declared.children if depth < _DEEPEST else ():
         yield from _values(child, depth + 1, needed=needed and bool(child.minimum))
+
+
+def payload_of(octets: bytes) -> etree._Element | None:
+    """Return the first element in the Body of a message; None if it is none, or a long one."""
+    if not 0 < len(octets) <= _LONGEST:
+        return None
+    try:
+        root = parse(octets, comments=False)
+    except NotXmlError:
+        return None
+    body = next((one for one in elements(root) if local(str(one.tag)) == "Body"), None)
+    return next(iter(elements(body)), None) if body is not None else None
 
 
 def texts_of(payload: etree._Element) -> dict[str, list[str]]:

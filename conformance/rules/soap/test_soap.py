@@ -11,6 +11,7 @@ from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import elements, local, text_of
+from conformance.rules.soap.own_state import unexplained
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
@@ -33,6 +34,7 @@ _VALUES = re.compile(r"'(?!\{)[^']*'|(?<=fault: ).*|\d+(?=, column|\)|$)", re.DO
 # How a device says that it lacks an operation (ONVIF Core, 5.11.2; WS-Addressing SOAP Binding, 6.4.2).
 _OPTIONAL = re.compile(r"not\s?(?:supported|implemented)", re.IGNORECASE)
 _VALID = frozenset({Kind.USUAL, Kind.TRIED})
+_ASKED = frozenset({Kind.USUAL, Kind.VARIED})
 Trace = tuple[SoapProbe, ...]
 
 
@@ -211,10 +213,9 @@ def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a message that the WSDL allows is accepted; a device need not have all that a standard's has."""
     found = services_of(run.contract)
     lacking = {one for one in trace if found is not None and found.foreign and _OPTIONAL.search(_came(one))}
-    asked = [one for one in trace if one.kind in {Kind.USUAL, Kind.VARIED} and one.exchange and one not in lacking]
+    asked = [one for one in unexplained(trace, found) if one.kind in _ASKED and one.exchange and one not in lacking]
     yield from _told(asked, "success", lambda one: "" if one.succeeded else _came(one))
-    usual = [one for one in asked if one.kind is Kind.USUAL]
-    accepted = {one.operation for one in usual}
+    accepted = {one.operation for one in trace if one.kind is Kind.USUAL}
     for label in dict.fromkeys(one.operation for one in trace if one.kind in _VALID):
         if label not in accepted:
             name = label.rpartition("/")[2]
@@ -279,7 +280,7 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
 
 
 @rule("soap/recovers", on=_ON)
-def recovers(trace: Trace) -> Iterator[Outcome]:
+def recovers(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a valid message is answered after wrong ones as it was before them."""
     before = {one.operation: one.succeeded for one in trace if one.kind is Kind.USUAL}
 
@@ -288,7 +289,8 @@ def recovers(trace: Trace) -> Iterator[Outcome]:
             return None
         return "" if probe.succeeded else _came(probe)
 
-    return _told((one for one in trace if one.kind is Kind.AGAIN), "success, as before", wrong)
+    again = (one for one in unexplained(trace, services_of(run.contract)) if one.kind is Kind.AGAIN)
+    return _told(again, "success, as before", wrong)
 
 
 @rule("soap/no-internals", on=_ON)
