@@ -26,12 +26,12 @@ _ELEMENTS = {
     "SetBin": '<xs:element name="Bin" type="c:Number"/><xs:element name="Weight" type="c:Rate"/>',
     "SetBinResponse": "",
     "AddRecipe": '<xs:element name="Title" type="c:Label"/><xs:element name="Grams" type="c:Number"/>',
-    "AddRecipeResponse": '<xs:element name="RecipeId" type="xs:string"/>',
+    "AddRecipeResponse": '<xs:element name="RecipeId" type="c:RecipeId"/>',
     "GetRecipes": "",
     "GetRecipesResponse": '<xs:element name="Recipe" minOccurs="0" maxOccurs="unbounded"><xs:complexType><xs:sequence>'
-    '<xs:element name="RecipeId" type="xs:string"/><xs:element name="Title" type="xs:string"/></xs:sequence>'
+    '<xs:element name="RecipeId" type="c:RecipeId"/><xs:element name="Title" type="xs:string"/></xs:sequence>'
     "</xs:complexType></xs:element>",
-    "DeleteRecipe": '<xs:element name="RecipeId" type="xs:string"/>',
+    "DeleteRecipe": '<xs:element name="RecipeId" type="c:RecipeId"/>',
     "DeleteRecipeResponse": "",
 }
 _NAMES = [name for name in _ELEMENTS if not name.endswith("Response")]
@@ -47,6 +47,7 @@ XSD = (
     + _simple("Rate", "double", 'minInclusive value="0"', 'maxInclusive value="8"')
     + _simple("Number", "int", 'minInclusive value="1"', 'maxInclusive value="9"')
     + _simple("Label", "string", 'maxLength value="40"')
+    + _simple("RecipeId", "string", 'pattern value="r[0-9]{1,6}"')
     + _simple("Mode", "string", 'enumeration value="slow"', 'enumeration value="even"', 'enumeration value="burst"')
     + "".join(
         f'<xs:element name="{name}"><xs:complexType><xs:sequence>{inside}</xs:sequence></xs:complexType></xs:element>'

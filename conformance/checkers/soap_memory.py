@@ -235,7 +235,9 @@ class SoapMemory:
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past) -> bool:
         """Return whether a device keeps what was written beside a value, and never the value itself."""
-        beside = [self._past[writer.label, act.label, name] for name in writer.sent.keys() & act.told - act.sent.keys()]
+        beside = [
+            self._past[writer.label, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
+        ]
         return (
             len(past.lost) == _LOST
             and len({*past.lost, *past.kept}) == 1

@@ -11,21 +11,22 @@ from typing import Final
 from lxml import etree
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.samples import sample
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.messages import ordinary, simple_leaves, unknown_in, with_text
+from conformance.api.soap.roles import TEXTS
 from conformance.commandline.device_options import advice
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, addressing_blocks
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import Node, clark, parse
-from conformance.documents.xsd_shapes import INTEGERS, STRINGS, Element
+from conformance.documents.xsd_shapes import INTEGERS, Element
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import Headers
 from conformance.transport.credentials import UsernameToken
 from conformance.transport.reach import split
 
 _NONE: Final[Mapping[str, Sequence[str]]] = MappingProxyType({})
-# Types whose values may refer to something, and names of numbers that do.
-_TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
+# Names of numbers that refer to something.
 _ID: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name)$", re.IGNORECASE)
 
 
@@ -131,7 +132,7 @@ class DescribedMessages:
             node.at(path).name
             for path, simple in simple_leaves(declared, node)
             if not simple.enumeration
-            and (simple.builtin in _TEXTS or (simple.builtin in INTEGERS and _ID.search(node.at(path).name)))
+            and (simple.builtin in TEXTS or (simple.builtin in INTEGERS and _ID.search(node.at(path).name)))
             and node.at(path).name not in self.values
         ]
 
@@ -150,9 +151,11 @@ class DescribedMessages:
         for optional in (False, True):
             node = ordinary(declared, optional=optional)
             invented = self.invented(declared, node)
-            for path, _ in simple_leaves(declared, node):
+            for path, simple in simple_leaves(declared, node):
                 name = node.at(path).name
                 values = self.values.get(name) or (given.get(name.lower()) if name in invented else None)
+                if not values and name in invented and simple.patterns:
+                    values = [str(sample({"type": "string", "pattern": f"^(?:{simple.patterns[0]})$"}))]
                 if values:
                     node = with_text(node, path, str(values[turn % len(values)]))
             if lacking := unknown_in(declared, node):

@@ -15,7 +15,7 @@ from typing import Final
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.messages import declarations, simple_leaves, with_text
 from conformance.api.soap.mutations import invalid_ones, mutations
-from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, texts_of
+from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
 from conformance.documents.xml import Node
@@ -66,11 +66,12 @@ class _Changes:
 
     def find(self, found: list[Act], allowed: set[str]) -> None:
         """Call each operation that reads, changes, creates or removes once, to know a message that it accepts."""
-        for act in sorted(found, key=lambda one: (one.role is not Role.READS, self.caller.asks(one.operation))):
-            if act.label not in allowed or act.role is Role.OTHER:
+        self.caller.acts = {act.label: act for act in found if act.label in allowed}
+        for act in in_order(self.caller.acts.values(), self.caller.asks):
+            if act.role in {Role.OTHER, Role.ENDS}:
                 continue
             try:
-                declared, node, kind = usual_message(self.caller, act.port, act.operation)
+                declared, node, kind = usual_message(self.caller, act)
             except NotPossibleError:
                 continue
             # What removes needs a thing to remove.

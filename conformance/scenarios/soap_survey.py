@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.mutations import STRANGE, invalid_ones, mutations
-from conformance.api.soap.roles import Role, role_of, texts_of
+from conformance.api.soap.roles import LAST, REFERS, Act, Role, acts_of, in_order, texts_of
 from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
 from conformance.documents.xml import Node, NotXmlError, clark, elements
-from conformance.documents.xsd_shapes import Element
+from conformance.documents.xsd_shapes import Element, Simple
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -134,17 +134,22 @@ class SoapProbe:
 class Caller:
     """Sends messages and records them; ``left_out`` are operations with the reason why they are not called.
 
-    ``given`` are values that the device gave, by what they are called; ``current`` those that an operation that reads
-    told once, so that what writes them first leaves the device as it is.
+    ``acts`` are the operations that may be called, by label. ``given`` are values that the device gave, by what they
+    are called or by their type; ``made`` those of what the suite created, the last first. ``current`` are those that an
+    operation that reads told once, so that what writes them first leaves the device as it is. ``accepted`` are messages
+    that succeeded, by label.
     """
 
     api: RestInterface
     messages: DescribedMessages
+    acts: dict[str, Act] = field(default_factory=dict)
     probes: list[SoapProbe] = field(default_factory=list)
     left_out: list[tuple[str, str]] = field(default_factory=list)
     lost: set[str] = field(default_factory=set)
-    given: dict[str, list[str]] = field(default_factory=dict)
+    given: dict[str | Simple, list[str]] = field(default_factory=dict)
+    made: dict[str | Simple, list[str]] = field(default_factory=dict)
     current: dict[str, str] = field(default_factory=dict)
+    accepted: dict[str, Node | None] = field(default_factory=dict)
 
     def asks(self, operation: SoapOperation) -> int:
         """Return how many values the message of an operation has that only the device can know."""
@@ -154,15 +159,46 @@ class Caller:
             return _MANY
         return len(self.messages.invented(declared, node)) if declared and node else 0
 
-    def learn(self, probe: SoapProbe) -> None:
-        """Keep the values in a success; what is no message teaches nothing."""
+    def learn(self, probe: SoapProbe, node: Node | None) -> None:
+        """Keep the values in a success of a message; what is no message teaches nothing."""
+        act = self.acts[probe.operation]
+        self.accepted[probe.operation] = node
         with contextlib.suppress(NotSoapError):
             for element in probe.inside():
-                for name, values in values_in(element).items():
-                    self.given.setdefault(name, []).extend(values)
-                if role_of(probe.operation.rpartition("/")[2]) is Role.READS:
-                    told = texts_of(element).items()
-                    self.current |= {name: texts[0] for name, texts in told if len(texts) == 1}
+                told = texts_of(element)
+                for given, values in values_in(element).items():
+                    self.given.setdefault(given, []).extend(values)
+                for name, simple in act.told.items():
+                    if simple.patterns:
+                        self.given.setdefault(simple, []).extend(told.get(name, ()))
+                for name, simple in act.makes.items():
+                    for key in act.keys(name, simple):
+                        self.made[key] = [*told.get(name, ()), *self.made.get(key, ())]
+                if act.role is Role.READS:
+                    self.current |= {name: texts[0] for name, texts in told.items() if len(texts) == 1}
+
+    def known(self, act: Act) -> dict[str, list[str]]:
+        """Return values by name, first those of what the suite created; for what ends or removes a thing no others."""
+        found: dict[str, list[str]] = {}
+        for name, simple in act.sent.items():
+            own = [text for key in act.keys(name, simple) for text in self.made.get(key, ())]
+            others = [text for key in (name, simple) for text in self.given.get(key, ()) if act.role not in LAST]
+            found[name] = list(dict.fromkeys([*own, *others]))
+        return found
+
+    def renew(self, act: Act) -> bool:
+        """Create anew what an operation needs; return whether there is something new."""
+        needed = {key for name, simple in act.sent.items() for key in act.keys(name, simple)}
+        for label, node in list(self.accepted.items()):
+            maker = self.acts[label]
+            keys = {key for name, simple in maker.makes.items() for key in maker.keys(name, simple)}
+            if keys & needed and label not in self.lost and maker is not act:
+                octets = self.messages.message(maker.port, maker.operation, node)
+                probe = self.send(maker.port, maker.operation, Kind.TRIED, "a message that creates", octets)
+                if probe.succeeded:
+                    self.learn(probe, node)
+                    return True
+        return False
 
     def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
         """Send octets to a port.
@@ -207,43 +243,44 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     messages = DescribedMessages.of(api)
     if messages is None:
         raise NotPossibleError("the device has no WSDL")
-    found, caller = messages.found, Caller(api, messages)
+    found = messages.found
     described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
-    steps: dict[str, Iterator[None]] = {}
-    # What one operation answers, another asks for: those that ask for nothing that must be known come first.
-    for port, operation in sorted(each(found.ports), key=lambda one: caller.asks(one[1])):
+    caller = Caller(api, messages, {act.label: act for act in acts_of(found)})
+    for port, operation in each(found.ports):
         rule = described[label_of(port, operation)]
         why = found.remark(operation) or ("" if rule.may else str(rule))
         why = why or ("" if is_same(port.url, found.base) else f"its port is at another server, {port.url}")
         if why:
             caller.left_out.append((label_of(port, operation), why))
-        else:
-            steps[label_of(port, operation)] = _explore(caller, port, operation)
-    api.run.limit.in_turns(steps, _SURVEY_SHARE)
+            caller.acts.pop(label_of(port, operation), None)
+    # What one operation answers, another asks for: those that ask for nothing that must be known come first.
+    order = in_order(caller.acts.values(), caller.asks)
+    api.run.limit.in_turns({act.label: _explore(caller, act) for act in order}, _SURVEY_SHARE)
     if not caller.probes:
         told = "; ".join(f"{label.rpartition('/')[2]}: {why}" for label, why in caller.left_out)
         raise NotPossibleError(f"no operation could be called. {told or 'The WSDL describes none'}")
     return tuple(caller.probes)
 
 
-def _explore(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
+def _explore(caller: Caller, act: Act) -> Iterator[None]:
     """Send the messages of one operation; yield after the usual one and after each group of others."""
     try:
-        yield from _groups(caller, port, operation)
+        yield from _groups(caller, act)
     except NotPossibleError as error:
-        caller.left_out.append((label_of(port, operation), str(error)))
+        caller.left_out.append((act.label, str(error)))
 
 
-def _groups(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterator[None]:
-    declared, node, kind = usual_message(caller, port, operation)
+def _groups(caller: Caller, act: Act) -> Iterator[None]:
+    port, operation = act.port, act.operation
+    declared, node, kind = usual_message(caller, act)
     yield
     effort = caller.api.run.effort
     # What was created may be there only once, and what was removed is not there any more.
-    is_once = role_of(operation.name) in {Role.CREATES, Role.REMOVES}
+    is_once = act.role in {Role.CREATES, Role.REMOVES}
     # At quick, what may not be repeatable is repeated too: what wrong messages do to it shows only beside that.
-    quick = _REPEATED if role_of(operation.name) is Role.OTHER else 0
+    quick = _REPEATED if act.role in {Role.OTHER, Role.ENDS} else 0
     for _ in range(0 if is_once else quick if effort.name == "quick" else _USUAL - 1):
-        if label_of(port, operation) not in caller.lost:
+        if act.label not in caller.lost:
             message = caller.messages.message(port, operation, node)
             caller.send(port, operation, kind, "a valid message", message)
     yield
@@ -255,12 +292,12 @@ def _groups(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterato
         for one in effort.draw([each for each in tried if each.kind == kind], _MOST, f"{caller.api.run.seed}/{kind}")
     ]
     for wrong in invalid_ones(drawn, caller.messages.found.types):
-        if time.monotonic() < until and label_of(port, operation) not in caller.lost:
+        if time.monotonic() < until and act.label not in caller.lost:
             message = caller.messages.message(port, operation, wrong.made[0])
             caller.send(port, operation, Kind.INVALID, wrong.what, message)
     yield
     for kind, says, octets in _odd(caller, port, operation, node):
-        if time.monotonic() < until and label_of(port, operation) not in caller.lost:
+        if time.monotonic() < until and act.label not in caller.lost:
             caller.send(port, operation, kind, says, octets)
             if is_once:
                 continue
@@ -273,30 +310,45 @@ def _groups(caller: Caller, port: SoapPort, operation: SoapOperation) -> Iterato
             )
 
 
-def usual_message(caller: Caller, port: SoapPort, operation: SoapOperation) -> tuple[Element | None, Node | None, Kind]:
+def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None, Kind]:
     """Send valid messages until one is accepted; return the declaration, the last message and its kind.
 
-    Where the device refuses a value that the suite invented, it is asked with values that it gave. That it refuses an
-    invented one is no fault: the message is recorded as tried.
+    Where the device refuses a value that the suite invented, it is asked with values that it gave, and last with one
+    of a thing that is created for it. That it refuses such a value is no fault: the message is recorded as tried. What
+    ends or removes a thing gets only what the suite created.
+
+    Raises:
+        NotPossibleError: no message can be made; it says what is needed.
     """
     messages, tried = caller.messages, list[Node | None]()
-    current = caller.current if role_of(operation.name) is Role.WRITES else {}
-    declared, node = messages.usual(operation, current=current)
-    invented = bool(declared and node and messages.invented(declared, node))
-    kind = Kind.TRIED if invented else Kind.USUAL
-    for turn in range(_TRIED + 1 if invented else 1):
-        if label_of(port, operation) in caller.lost:
+    current = caller.current if act.role is Role.WRITES else {}
+    declared, node = messages.usual(act.operation, current=current)
+    invented = messages.invented(declared, node) if declared and node else []
+    names = {name.lower() for name in invented if REFERS.search(name)} or {name.lower() for name in invented}
+    kind, is_last = Kind.TRIED if invented else Kind.USUAL, bool(invented) and act.role in LAST
+    for turn in range(_TRIED + 2 if invented else 1):
+        if act.label in caller.lost:
             break
+        is_new = turn > _TRIED and caller.renew(act)
+        known = caller.known(act)
+        if (turn > _TRIED and not is_new) or (is_last and (not turn or not any(known.get(name) for name in names))):
+            continue
         if turn:
-            node = messages.usual(operation, turn - 1, caller.given)[1]
+            node = messages.usual(act.operation, 0 if is_new else turn - 1, known)[1]
         if node in tried:
             continue
         tried.append(node)
-        probe = caller.send(port, operation, kind, "a valid message", messages.message(port, operation, node))
+        octets = messages.message(act.port, act.operation, node)
+        probe = caller.send(act.port, act.operation, kind, "a valid message", octets)
         if probe.succeeded:
             kind, caller.probes[-1] = Kind.USUAL, replace(probe, kind=Kind.USUAL)
-            caller.learn(probe)
+            caller.learn(probe, node)
             break
+    if not tried and is_last:
+        raise NotPossibleError(
+            f"the suite ends and removes only what it created, and created nothing for {act.operation.name}: allow the "
+            f"operation that creates it by --call, or name a value in [values]"
+        )
     return declared, node, kind
 
 

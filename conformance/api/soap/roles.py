@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
@@ -13,11 +14,13 @@ from lxml import etree
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, local, parse
-from conformance.documents.xsd_shapes import Element, Simple
+from conformance.documents.xsd_shapes import STRINGS, Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 #: A name of a value by which a device knows one of its things.
 REFERS: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name|channel)$", re.IGNORECASE)
+#: Types whose values may refer to something.
+TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
 #: A device that takes a value, a thing or a removal later has so long, s.
 SETTLES_S: Final = 1.0
 # Elements of a message that are nested deeper are not compared.
@@ -33,6 +36,7 @@ class Role(StrEnum):
     WRITES = "writes"
     CREATES = "creates"
     REMOVES = "removes"
+    ENDS = "ends"
     OTHER = "other"
 
 
@@ -41,7 +45,10 @@ _VERBS: Final = {
     Role.WRITES: "set put update write change configure modify store save",
     Role.CREATES: "create add register insert new",
     Role.REMOVES: "delete remove unregister erase",
+    Role.ENDS: "cancel abort stop end terminate close",
 }
+#: Roles of operations after which a thing does not go on.
+LAST: Final = frozenset({Role.ENDS, Role.REMOVES})
 _ROLES: Final = {verb: role for role, verbs in _VERBS.items() for verb in verbs.split()}
 
 
@@ -55,7 +62,7 @@ class Act:
         noun: its name without the verb, in lower case.
         sent: simple types of the values in its request by their names in lower case; required ones in ``needs``.
         needs: names of values that each request has.
-        told: names of the values in its response.
+        told: simple types of the values in its response.
     """
 
     port: SoapPort
@@ -64,7 +71,18 @@ class Act:
     noun: str
     sent: dict[str, Simple] = field(default_factory=dict)
     needs: frozenset[str] = frozenset()
-    told: frozenset[str] = frozenset()
+    told: dict[str, Simple] = field(default_factory=dict)
+
+    @property
+    def makes(self) -> dict[str, Simple]:
+        """The values in its response by which a device may know what it has made."""
+        is_one = self.role is not Role.READS and self.role not in LAST
+        return {name: one for name, one in self.told.items() if is_one and name not in self.needs and _is_id(name, one)}
+
+    def keys(self, name: str, simple: Simple) -> list[str | Simple]:
+        """Return by what other messages may know a value: its name, a bare id with the noun, and its type."""
+        named = [f"{self.noun}{name}", *([] if REFERS.fullmatch(name) else [name])]
+        return [*named, *([simple] if simple.patterns and simple.builtin in TEXTS else [])]
 
     @property
     def label(self) -> str:
@@ -77,7 +95,7 @@ class Act:
             self.role is Role.READS
             and writer.role is Role.WRITES
             and self.needs <= writer.sent.keys()
-            and not self.told.isdisjoint(writer.sent.keys() - self.sent.keys())
+            and not self.told.keys().isdisjoint(writer.sent.keys() - self.sent.keys())
         )
 
     def lists(self, creator: Act) -> bool:
@@ -109,7 +127,27 @@ def _act(found: Wsdl, port: SoapPort, operation: SoapOperation) -> Act:
         "".join(noun).lower(),
         {name: simple for name, (simple, _) in sent.items()},
         frozenset(name for name, (_, needed) in sent.items() if needed),
-        frozenset(name for name, _, _ in _values(response)) if response else frozenset(),
+        {name: simple for name, simple, _ in _values(response)} if response else {},
+    )
+
+
+def _is_id(name: str, simple: Simple) -> bool:
+    return bool(REFERS.search(name)) or (bool(simple.patterns) and simple.builtin in TEXTS)
+
+
+def in_order(acts: Iterable[Act], asks: Callable[[SoapOperation], int]) -> list[Act]:
+    """Return operations as they can be called: what makes a thing before what needs it, and what ends things last."""
+    found, makers, ranks = list(acts), defaultdict[str | Simple, list[str]](list), defaultdict[str, int](int)
+    for act in found:
+        for key in [key for name, simple in act.makes.items() for key in act.keys(name, simple)]:
+            makers[key].append(act.label)
+    for _ in range(_DEEPEST):
+        for act in found:
+            keys = [key for name in act.needs if _is_id(name, act.sent[name]) for key in act.keys(name, act.sent[name])]
+            before = [ranks[label] + 1 for key in keys for label in makers.get(key, ()) if label != act.label]
+            ranks[act.label] = min(max(before, default=0), _DEEPEST)
+    return sorted(
+        found, key=lambda one: (one.role is Role.REMOVES, one.role is Role.ENDS, ranks[one.label], asks(one.operation))
     )
 
 

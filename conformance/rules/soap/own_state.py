@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
-from conformance.api.soap.roles import REFERS, Role, payload_of, role_of, texts_of
+from conformance.api.soap.roles import LAST, REFERS, Role, payload_of, role_of, texts_of
 from conformance.documents.wsdl import Wsdl
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import elements, local
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # So many valid messages without a wrong one between them show that an operation may be called again and again.
 _REPEATED: Final = 3
 _CALLED: Final = frozenset({Kind.USUAL, Kind.VARIED, Kind.AGAIN})
-_ENDS: Final = frozenset({Role.REMOVES, Role.OTHER})
+_ENDS: Final = LAST | {Role.OTHER}
 # An operation, and the values in a message to it, each with its name.
 _Sent = tuple[str, frozenset[tuple[str, str]]]
 
@@ -47,7 +47,7 @@ def unexplained(trace: Iterable[SoapProbe], found: Wsdl | None) -> list[SoapProb
             is_kept = True
         elif _inside(fault) & declared.get(probe.operation, frozenset()):
             is_kept = is_proven and role is Role.READS and any(REFERS.search(name) for name, _ in values)
-        elif role is Role.OTHER:
+        elif role in {Role.OTHER, Role.ENDS}:
             is_kept = is_proven and probe.kind is Kind.AGAIN and _is_repeatable(probes, probe.operation)
         else:
             ids = {text for name, text in values if REFERS.search(name)}

@@ -53,11 +53,13 @@ def _all(devices, tmp_path):
 def test_right_devices_are_not_blamed_and_are_left_as_they_were(tmp_path):
     devices = [feeder(style) for style in _STYLES]
     before = dict(devices[0].settings)
+    # What the user has there is not removed, though it is listed first.
+    devices[0].recipes["r900000"] = "the user's"
     outcomes = _all(devices, tmp_path)
     for outcome in outcomes:
         assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
     assert devices[0].settings == before
-    assert devices[0].recipes == {}
+    assert devices[0].recipes == {"r900000": "the user's"}
     assert devices[0].bins == {"1": "3", "2": "4"}
     verdicts = {one["id"]: one["verdict"] for one in outcomes[0].result["requirements"]}
     names = ("written-is-read", "created-is-there", "deleted-is-gone")
@@ -85,3 +87,13 @@ def test_operations_whose_names_say_nothing_are_judged_as_before(tmp_path):
     verdicts = {one["id"]: one["verdict"] for one in outcome.result["requirements"]}
     assert {verdicts[f"soap/{name}"] for name in ("answered", "message", "response-valid", "recovers")} == {"pass"}
     assert verdicts["soap/written-is-read"] not in {"pass", "fail", "warn"}
+
+
+def test_what_the_suite_did_not_create_is_not_removed(tmp_path):
+    """Nothing may be created here, and a list names what the user has."""
+    device = feeder()
+    device.recipes["r900000"] = "the user's"
+    with serving(device) as url:
+        outcome = certified(f"{url}/feeder.wsdl", tmp_path, "--call", "POST /feederPort/DeleteRecipe")
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert device.recipes == {"r900000": "the user's"}
