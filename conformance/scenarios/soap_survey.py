@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.mutations import STRANGE, invalid_ones, mutations
 from conformance.api.soap.roles import LAST, REFERS, Act, Role, acts_of, in_order, texts_of
+from conformance.commandline.device_options import advice
 from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
@@ -347,7 +348,7 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
     if not tried and is_last:
         raise NotPossibleError(
             f"the suite ends and removes only what it created, and created nothing for {act.operation.name}: allow the "
-            f"operation that creates it by --call, or name a value in [values]"
+            f"operation that creates it{advice(' by --call')}, or name a value in [values]"
         )
     return declared, node, kind
 
