@@ -64,8 +64,8 @@ class EntityTags:
         self._refused = 0
         self._ignored: list[Case] = []
         self._performed: list[Case] = []
-        # By URL: what was read before the last write that was accepted by its tag.
-        self._spent: dict[str, Response] = {}
+        # By URL: what was read before the last write that was accepted by its tag, and what that wrote.
+        self._spent: dict[str, tuple[Response, bytes]] = {}
         # A 304 for a copy that is not the current one, with the tag that was current: the next read decides.
         self._stale: dict[str, tuple[Occasion, str]] = {}
 
@@ -169,6 +169,7 @@ class EntityTags:
             self._wrote.clear()
             self._waiting.clear()
             self._stale.clear()
+            self._spent = {one: spent for one, spent in self._spent.items() if one == url}
             if answer.ok and occasion.request.method in {"PUT", "PATCH"}:
                 self._wrote[url] = occasion
         yield from self._at_once(occasion, now, wanted or "")
@@ -200,18 +201,27 @@ class EntityTags:
                 self._performed.append(case)
 
     def _at_once(self, occasion: Occasion, now: Response | None, wanted: str) -> Iterator[Case]:
-        """Judge a write by a tag that another one has used since it was read, as two clients do at the same moment."""
-        before, status = self._spent.pop(occasion.request.url, None) if now is None else now, occasion.response.status
+        """Judge a write by a tag that another one has used since it was read, as two clients do at the same moment.
+
+        What the other one wrote already may be accepted (RFC 9110 13.1.1).
+        """
+        url, status = occasion.request.url, occasion.response.status
+        spent = self._spent.pop(url, None) if now is None else (now, b"")
+        before, other = spent if spent is not None else (None, b"")
         tag = (before.header("etag") if before is not None else None) or "W/"
-        if before is None or tag.startswith("W/") or tag not in _TAG.findall(wanted):
+        if before is None or tag.startswith("W/") or tag not in _TAG.findall(wanted) or other == occasion.request.body:
             return
         is_done = _has_changed(occasion, before)
         if now is None and (is_done or status == HTTPStatus.PRECONDITION_FAILED):
             found, label = f"status {status}, as the write before it by this tag", label_of(occasion.operation)
             expected = f"a refusal with 412, because another write has changed what {tag} named"
-            yield occasion.case(_MATCH, not is_done, expected, found, cause=f"{label} at once")
+            case = occasion.case(_MATCH, not is_done, expected, found, cause=f"{label} at once")
+            if not is_done or self._has_412 or _declares(occasion.operation, with_status=True):
+                yield case
+            else:
+                self._performed.append(case)
         if is_done:
-            self._spent[occasion.request.url] = before
+            self._spent[url] = before, occasion.request.body
 
 
 def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:

@@ -60,6 +60,7 @@ def _broken(tmp_path, exchanges, **described):
 
 _GET, _A, _B = "GET /tubes/1 200", {"level": 1}, {"level": 2}
 _C, _SECOND = {"level": 3}, one("PUT /tubes/1 200", _B, _B, if_match='"a"')
+_THIRD = one("PUT /tubes/1 200", _C, _C, if_match='"a"')
 _HEAD, _ACTION = "HEAD /tubes/1 200", "GET /tubes/1/seal 404"
 _REFUSES = one("GET /tubes/2/seal 405", allow="POST")
 _READ, _TAG_A, _TAG_B = one(_GET, _A), one(_GET, _A, etag='"a"'), one(_GET, _B, etag='"b"')
@@ -107,7 +108,10 @@ _KNOWS = [one("GET /tubes/2 200", _A, etag='"k"'), one("PUT /tubes/2 412", body=
         [_TAG_A, one("PUT /tubes/1 428", body=_B, if_match='"x"'), _TAG_A],
         [_TAG_A, _SECOND, _TAG_B],
         [_TAG_A, _SECOND, one("PUT /tubes/1 412", body=_C, if_match='"a"'), _TAG_B],
-        [_TAG_A, _SECOND, _TAG_A, one("PUT /tubes/1 200", _C, _C, if_match='"a"')],
+        [_TAG_A, _SECOND, _TAG_A, _THIRD],
+        # The same again, which has been done already; after an action that may have brought back what the tag names.
+        [_TAG_A, _SECOND, _SECOND],
+        [_TAG_A, _SECOND, one("POST /tubes/1/seal 200", _A), _THIRD],
         [_TAG_A, one("PUT /tubes/1 200", _A, _B, if_match='"a"'), one("PUT /tubes/1 200", _C, _C, if_match='"a"')],
         [_TAG_A, _SECOND, one("PUT /tubes/1 200", _B, _C, if_match='"a"')],
         [_TAG_A, one("POST /tubes/1/seal 200", _A), one("PUT /tubes/1 200", _B, _B, if_match='"b"')],
@@ -124,6 +128,8 @@ def test_right_devices_of_many_styles_are_not_blamed(tmp_path, exchanges):
 
 def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
     exchanges = [_TAG_A, _WRITTEN, _TAG_B]
+    assert _broken(tmp_path, [_TAG_A, _SECOND, _THIRD], if_match=False) == set()
+    assert _broken(tmp_path, [_TAG_A, _SECOND, _THIRD, *_KNOWS], if_match=False) == {"description/if-match"}
     assert _broken(tmp_path, exchanges, if_match=False) == set()
     assert _broken(tmp_path, [*_KNOWS, *exchanges], if_match=False) == {"description/if-match"}
     assert _broken(tmp_path, [*exchanges, *_KNOWS], if_match=False) == {"description/if-match"}
@@ -157,6 +163,7 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
         ("entity-tag", [one("GET /tubes/1 412", if_none_match='"b"')]),
         ("entity-tag", [one("PUT /tubes/1 200", _A, etag='"old"'), _TAG_A]),
         ("if-match", [_TAG_A, _WRITTEN]),
+        ("if-match", [_TAG_A, _SECOND, _THIRD]),
         ("if-match", [*_UNSTABLE, *_UNSTABLE]),
         ("if-match", [_TAG_A, one("DELETE /tubes/1 204", if_match='"x"')]),
         ("if-match", [_TAG_A, _SECOND, one("PATCH /tubes/1 200", _C, _C, if_match='"x", "a"')]),
