@@ -2,7 +2,8 @@
 
 import pytest
 from small_device import certified, small_device
-from sprinklers import FAULTS, RIGHT, sprinklers
+from sprinkler_faults import FAULTS, RIGHT
+from sprinklers import sprinklers
 
 # What some of the faults bring about beside what they break: what is refused and done is no longer as it was written.
 _FOLLOWS = {

@@ -1,0 +1,107 @@
+"""The styles in which the sprinklers are right, and their faults with the requirement that must notice each."""
+
+_READ = "description/written-is-read"
+
+RIGHT = {
+    "as described": {},
+    "without conditions": {"asks": False, "keys": False, "takes": 0.3},
+    "weak tags": {"etag": "weak", "asks": False},
+    "no tags": {"etag": "none", "asks": False, "ranges": "none"},
+    "late": {"late": 0.8, "asks": False, "utc": True},
+    "counts reads": {"counts": True, "etag": "weak", "asks": False},
+    "moves by itself": {"background": True, "takes": 0.05},
+    "another client": {"drifts": 0.9, "caches": 2},
+    "keys that are refused again": {"repeats": "refused", "remembers": 3},
+    "keys without fingerprints": {"prints": False, "remembers": 2, "asks": False},
+}
+#: Faults that are found side by side in one run: the style, and for each fault the requirement that it breaks.
+FAULTS = [
+    (
+        "as described",
+        {
+            "a stale If-Match is taken": "description/if-match",
+            "another body gets the first answer": "description/idempotency-key",
+            "a part begins one later": "http/range",
+            "a file ends at NUL": _READ,
+            "the digest is wrong": "description/digest",
+        },
+    ),
+    (
+        "as described",
+        {
+            "a missing If-Match is taken": "description/required",
+            "a stale If-None-Match is current": "description/entity-tag",
+            "one key acts twice": "description/idempotency-key",
+            "what is refused with 406 is written": "description/refused-keeps",
+            "a part tells its own length as the whole one": "http/range",
+            "the checksum is of other octets": "description/digest",
+        },
+    ),
+    (
+        "as described",
+        {
+            "If-None-Match: * is not looked at": "description/if-match",
+            "a stale If-Range gets a part": "description/entity-tag",
+            "a repeated key acts and says nothing": "description/idempotency-key",
+            "what is refused with 406 is created": "description/refused-keeps",
+            "what is refused with 428 is written": "description/refused-keeps",
+            "line ends of a file are changed": _READ,
+        },
+    ),
+    (
+        "keys that are refused again",
+        {
+            "what is refused with 428 is deleted": "description/refused-keeps",
+            "what is refused with 415 is created": "description/refused-keeps",
+            "a new key gets an old answer": "description/idempotency-key",
+        },
+    ),
+    (
+        "as described",
+        {
+            "HEAD renames": "description/safe",
+            "CSV lacks the last row": "description/same-values",
+            "two decimals are kept": _READ,
+        },
+    ),
+    (
+        "without conditions",
+        {"a forecast deletes zones": "description/safe", "CSV has other values": "description/same-values"},
+    ),
+    (
+        "weak tags",
+        {
+            "a forecast stops the rain": "description/safe",
+            "the list shows another state": "description/same-values",
+            "the offset is lost": _READ,
+        },
+    ),
+    ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
+    ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
+    (
+        "as described",
+        {
+            "If-Match takes a weak tag": "description/if-match",
+            "the filter goes by the first area": "description/list-filter",
+            "minutes are sorted as texts": "description/list-order",
+            "the next key ends one": "description/idempotency-key",
+        },
+    ),
+    (
+        "as described",
+        {
+            "any content type is taken": "description/invalid-refused",
+            "a shorter file keeps the tail": _READ,
+            "a refusal spends its key": "description/idempotency-key",
+        },
+    ),
+    (
+        "as described",
+        {
+            "two at once write by one tag": "description/if-match",
+            "a file in chunks is empty": "description/digest",
+            "a retry gets the thing as it is now": "description/idempotency-key",
+        },
+    ),
+    ("without conditions", {"two at once get one id": "description/created-is-there", "the season stays": _READ}),
+]
