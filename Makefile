@@ -3,8 +3,9 @@ SHELL := /bin/bash
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := out
-# How many processes share the tests: three for each processor, because a test waits for half of its time.
-WORKERS ?= $(shell echo $$((3 * $$(nproc))))
+# How many processes share the tests: two for each processor, because a test waits for half of its time. With three,
+# requests of load tests run into their deadline.
+WORKERS ?= $(shell echo $$((2 * $$(nproc))))
 # The newest Python that is there, from 3.11 up; or say which: make PYTHON=/path/to/python3.12 install
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null && command -v $$p && break; done)
