@@ -28,8 +28,9 @@ from surface import ACTION, DEADLINE_S, PUBLISHES, READS, SERVICES, STYLES, End
 _LOOK_S = 0.1
 _DEPTH = 100
 _LEAKED = 1
-# So many at once, or within a second, are a crowd.
-_MANY = 17
+# So many messages within a second are a crowd, and so many calls at once: more than any but a crowd sends. A busy
+# machine hardly brings about more of these at one moment.
+_MANY, _WAITING = 17, 9
 
 
 @dataclass
@@ -197,7 +198,7 @@ class RosEnd:
             future.set_result(empty())
             return future
         self._waiting += 1
-        is_crowd = self._waiting >= _MANY
+        is_crowd = self._waiting >= _WAITING
         if self.fault == "call doubled" or (is_crowd and self.fault == "call doubled in a crowd"):
             client.call_async(request)
         if self.fault == "late as success":
@@ -277,7 +278,7 @@ class RosEnd:
                 publisher.publish(self._held.pop())
 
     def _served(self, service: str, response: Any) -> Any:
-        is_crowd, self._waiting = self._waiting >= _MANY, self._waiting - 1
+        is_crowd, self._waiting = self._waiting >= _WAITING, self._waiting - 1
         if self.fault == "last response" or (is_crowd and self.fault == "last response in a crowd"):
             response, self._last[service] = self._last.get(service, (response, 0.0))[0], (response, 0.0)
         if self.fault == "response as success" and hasattr(response, "success"):
