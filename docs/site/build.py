@@ -81,9 +81,9 @@ def _gather(source: Path) -> None:
     pages |= {ROOT / name: page for name, page in _ELSEWHERE.items() if name != "README.md"}
     for path, page in pages.items():
         (source / page).write_text(_moved(path, source), encoding="utf-8")
-    for folder in ("motion", "images"):
-        if (DOCS / folder).is_dir():
-            shutil.copytree(DOCS / folder, source / folder)
+    for folder in DOCS.iterdir():  # pictures of the pages
+        if folder.is_dir() and folder != SITE:
+            shutil.copytree(folder, source / folder.name)
     for name, heading in {**_UNSEARCHED, **_KEYWORDS}.items():
         page = source / name
         page.write_text(f"---\n{heading}\n---\n{page.read_text(encoding='utf-8')}", encoding="utf-8")
