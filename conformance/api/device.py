@@ -75,7 +75,7 @@ class Device:
         """Return requests whose responses only the pack can tell apart."""
         return ()
 
-    def observers(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
+    def listeners(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
         """Return what listens to every exchange of the run."""
         return ()
 

@@ -31,7 +31,7 @@ from conformance.contract.requirement_sets import RequirementSetError, judged_by
 from conformance.documents.description import DescriptionError, is_url
 from conformance.documents.openapi import operations_of
 from conformance.statement.statement import Statement, StatementError, api_of
-from conformance.target.naming import Judged, hold_folder, named_or_usual, told_apart, what_is_judged
+from conformance.target.naming import Judged, lock_result_folder, split_args, targets_or_roaas_toml, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
 from conformance.verdict.finding import counted
@@ -182,8 +182,8 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
         raise click.UsageError("--json prints the result of a run, and --plan and --init have none: give one of them")
     source, statement = None, None
     if not options.fleet:
-        named = named_or_usual(targets, given)
-        source, statement = told_apart(named, options.openapi or options.wsdl, new=options.init)
+        named = targets_or_roaas_toml(targets, given)
+        source, statement = split_args(named, options.openapi or options.wsdl, new=options.init)
     options = checked(options, named=bool(source or statement))
     if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
@@ -196,7 +196,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     if options.parallel is not None:
         raise click.UsageError("--parallel says how many robots of a --fleet are judged at once: give --fleet")
     try:
-        done = _judge(door, source, statement, options)
+        done = _carry_out(door, source, statement, options)
     except UnreachableError as unreachable:
         click.echo(f"the device cannot be reached: {inert(str(unreachable))}", err=True)
         return CommandResult(ExitCode.UNREACHABLE)
@@ -213,7 +213,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     return done
 
 
-def _judge(door: FrontDoor, source: str | None, statement: Path | None, options: CertifyOptions) -> CommandResult:
+def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, options: CertifyOptions) -> CommandResult:
     """Do what the options ask for one robot: write a first statement, print the plan, or certify.
 
     Args:
@@ -229,7 +229,7 @@ def _judge(door: FrontDoor, source: str | None, statement: Path | None, options:
     if options.init and source is not None:
         return init_described(statement, source, options, force=options.force)
     if not (options.plan or options.init):
-        hold_folder(options.out)
+        lock_result_folder(options.out)
     judged = what_is_judged(source, statement if not options.init else None, options)
     chosen, contract, _ = judged
     if options.init:
@@ -292,9 +292,10 @@ def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> Com
 def _certify(
     door: FrontDoor | None, judged: Judged, options: CertifyOptions, statement: Path | None, source: str | None
 ) -> Certification:
+    """Run one certification of the device that the statement and the contract in ``judged`` describe."""
     chosen, contract, remarks = judged
     # Imported here: Schemathesis and its like cost a second that --help and wrong usage need not pay.
-    from conformance.engine.certification import certify as judge  # noqa: PLC0415
+    from conformance.engine.certification import certify as run_certification  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.engine.suite import file_digest  # noqa: PLC0415
     from conformance.target.connecting import connection_of  # noqa: PLC0415
@@ -326,7 +327,7 @@ def _certify(
     calls = () if contract.is_claimed else tuple(told(CallRules.of(run), operations_of(contract), run.mapped))
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
-    return judge(robot, options.out, command=command, baseline=baseline, **said)
+    return run_certification(robot, options.out, command=command, baseline=baseline, **said)
 
 
 def _places(contract: Contract, statement: Path | None, source: str | None) -> dict[str, Any]:
@@ -341,11 +342,7 @@ def _places(contract: Contract, statement: Path | None, source: str | None) -> d
 
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     """Return the run that the options describe."""
-    from conformance.verdict.run import (  # noqa: PLC0415 - see _certify
-        Run,
-        Selection,
-        seed_of_nonce,
-    )
+    from conformance.verdict.run import Run, Selection, seed_of_nonce  # noqa: PLC0415 - see _certify
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}

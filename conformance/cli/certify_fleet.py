@@ -17,7 +17,7 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, refuse_same_identity
 from conformance.fleet.member_run import MemberResult, Outcome
-from conformance.target.naming import hold_folder
+from conformance.target.naming import lock_result_folder
 from conformance.verdict.effort import DEEP_MINUTES
 from conformance.verdict.finding import counted
 
@@ -47,7 +47,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
             refuse_same_identity(path, members)
     except (FleetError, ContractError) as error:
         raise click.UsageError(str(error)) from error
-    hold_folder(options.out)
+    lock_result_folder(options.out)
     deep_s = 60 * DEEP_MINUTES if options.effort == "deep" else 0
     limit_s = TIME_LIMIT_S + (60 * options.minutes if options.minutes else deep_s)
     runs = [

@@ -15,7 +15,7 @@ from conformance.statement.statement import StatementError, empty_statement, loa
 from conformance.verdict.finding import counted
 
 if TYPE_CHECKING:
-    from conformance.engine.judging import Judged
+    from conformance.engine.judge_stored import Judged
     from conformance.verdict.verdicts import Verdict
 
 _FAIL = "fail"
@@ -99,7 +99,7 @@ def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None,
         StatementError: the statement is invalid.
     """
     # Imported here, so that --help stays quick.
-    from conformance.engine.judging import judge_stored  # noqa: PLC0415
+    from conformance.engine.judge_stored import judge_stored  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
     from conformance.history.events import HistoryError  # noqa: PLC0415
     from conformance.scenarios.stored import TracesError  # noqa: PLC0415

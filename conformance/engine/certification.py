@@ -105,7 +105,7 @@ def certify(
                 # Of a robot that is not there, they would only hide that.
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in filter(None, (*notes, *announced, robot.estimate())))
-                _judge(robot, Progress(robot, progress, bar=bar), remarks, recordings)
+                _run_and_repeat(robot, Progress(robot, progress, bar=bar), remarks, recordings)
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(
                     f"{name}: {why}" for name, why in run.unreachable.items()
@@ -291,7 +291,7 @@ class _LoadedForGood:
         gc.freeze()
 
 
-def _judge(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> None:
+def _run_and_repeat(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> None:
     """Run the checks, and send the requests of findings again. Whatever breaks, what was judged until then is kept."""
     run = robot.run
     try:

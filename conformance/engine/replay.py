@@ -32,7 +32,7 @@ from conformance.target.connecting import connection_of
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.effort import Effort
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeLimit
 
@@ -93,7 +93,7 @@ def replay(
 ) -> Replayed:
     """Send one finding's requests again.
 
-    What one response shows is judged again by the new response: by an observer, a rule on the description, or as a
+    What one response shows is judged again by the new response: by a checker, a rule on the description, or as a
     server error. Of others, one response cannot tell.
 
     Args:
@@ -101,7 +101,7 @@ def replay(
         failure: the finding, as in result.json.
         connection: settings for the robot's clients.
         rest: base URL of the robot's REST interface, or None.
-        contract: whose observers and description judge, or None.
+        contract: whose checkers and description judge, or None.
         until: when no further request is sent, by time.monotonic().
 
     Raises:
@@ -287,10 +287,10 @@ def _still_there(
 
 
 def _observed_to_fail(contract: Contract, base_url: str, requirement: str, exchange: Exchange) -> bool:
-    """Return whether the REST observers, which judge single responses, fail a requirement for this exchange."""
+    """Return whether the REST checkers, which judge single responses, fail a requirement for this exchange."""
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)
-        Observers(run.judge, [RestCheckers(contract, base_url), *api.device.checkers(api, ())]).answered(exchange)
+        CheckerListener(run.judge, [RestCheckers(contract, base_url), *api.device.checkers(api, ())]).answered(exchange)
     evidence = run.judge.of(requirement)
     return bool(evidence and evidence.failures)

@@ -53,8 +53,8 @@ _TIMES = 5
 _LONGEST_S = 8.0
 
 
-class Recorder(Listener):
-    """A listener that reports each request to the judge before any observer judges it."""
+class SentListener(Listener):
+    """A listener that reports each request to the judge before any checker judges it."""
 
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
@@ -185,7 +185,7 @@ def is_same(before: Response, came: Attempt) -> bool:
 def look_again(run: Run, connection: Connection, rest: RestInterface | None = None) -> None:
     """Send the request of each finding again, and record how often the failure occurs again.
 
-    If an observer or a rule on the description judges the requirement by single responses, its judgement counts;
+    If a checker or a rule on the description judges the requirement by single responses, its judgement counts;
     otherwise a response with the same status and media type. An unsafe request is repeated only if the robot may be
     moved and the response was 5xx, which is wrong in any state of the robot.
 

@@ -25,7 +25,7 @@ from conformance.contract.described import SOAP
 from conformance.documents.openapi import operations_of
 from conformance.engine.lost_device import LostDevice
 from conformance.engine.refused import RefusalListener
-from conformance.engine.resending import Recorder
+from conformance.engine.resending import SentListener
 from conformance.engine.ros_ends import RosEnds
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.motion_map import MotionMap
@@ -110,7 +110,7 @@ class RobotUnderTest:
             OSError: the CA file cannot be used.
         """
         self._progress = progress
-        self.connection.listeners.insert(0, Recorder(self.run.judge))
+        self.connection.listeners.insert(0, SentListener(self.run.judge))
         self.connection.listeners.insert(0, self.refusals)
         if not self.device.is_known:
             # A known device has no streams, and counts what it is sent; of another one only a response shows that.

@@ -1,4 +1,4 @@
-"""pytest fixtures of every run: the observers, which judge each exchange of every check."""
+"""pytest fixtures of every run: the checkers, which judge each exchange of every check."""
 
 import importlib
 import threading
@@ -31,7 +31,7 @@ from conformance.statement.ros_map import RosMap
 from conformance.statement.state_map import StateMap
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Listener
-from conformance.verdict.evidence import Checker, Observers
+from conformance.verdict.evidence import Checker, CheckerListener
 from conformance.verdict.run import Run
 
 # So long the modules that later checks need are awaited, s.
@@ -48,7 +48,7 @@ def _watched(
     other_exchanges: OtherExchanges | None,
     kept_exchanges: KeptExchanges | None,
 ) -> None:
-    """Register the observers, so that every exchange of the run is judged, the first ones too.
+    """Register the checkers, so that every exchange of the run is judged, the first ones too.
 
     No other code registers any.
     """
@@ -56,18 +56,18 @@ def _watched(
     api = interfaces.rest
     device = api.device if api is not None else device_of(run)
     checkers: list[Checker] = []
-    listeners: list[Listener] = [Observers(run.judge, device.checkers(api, services), by_rule=False)]
+    listeners: list[Listener] = [CheckerListener(run.judge, device.checkers(api, services), by_rule=False)]
     if api is not None:
         elsewhere = [service.endpoint for service in services]
         checkers += [Habits(api), RestCheckers(run.contract, api.client.base_url, elsewhere)]
-        listeners += device.observers(api)
+        listeners += device.listeners(api)
         listeners += [one for one in (other_exchanges, kept_exchanges) if one is not None]
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}
         checkers.append(SoapCheckers(answers))
     if (found := services_of(run.contract)) is not None:
         checkers.append(SoapMemory(found))
-    listeners.append(Observers(run.judge, checkers))
+    listeners.append(CheckerListener(run.judge, checkers))
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():
         for listener in listeners:

@@ -288,7 +288,7 @@ class Surveyor:
         )
 
     def _recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
-        """Send a request whose exchange becomes a probe, so that no observer judges it as well.
+        """Send a request whose exchange becomes a probe, so that no checker judges it as well.
 
         Raises:
             NoAnswerError: no HTTP response was received.

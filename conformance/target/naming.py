@@ -111,7 +111,7 @@ _NAMES: Final = (
 )  # fmt: skip
 
 
-def named_or_usual(targets: tuple[str, ...], options: Mapping[str, Any]) -> tuple[str, ...]:
+def targets_or_roaas_toml(targets: tuple[str, ...], options: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the arguments of a command, or ./roaas.toml if it names no device; say so on stderr."""
     if targets or any(options.get(name) for name in _NAMES) or not USUAL_STATEMENT.is_file():
         return targets
@@ -119,7 +119,7 @@ def named_or_usual(targets: tuple[str, ...], options: Mapping[str, Any]) -> tupl
     return (str(USUAL_STATEMENT),)
 
 
-def told_apart(targets: tuple[str, ...], openapi: str | None, *, new: bool = False) -> tuple[str | None, Path | None]:
+def split_args(targets: tuple[str, ...], openapi: str | None, *, new: bool = False) -> tuple[str | None, Path | None]:
     """Return the description and the statement that the command names; either may be None.
 
     Args:
@@ -331,7 +331,7 @@ def _claims(options: DeviceOptions, contract: Contract) -> tuple[str, ...]:
     return (*contract.profiles.get(options.profile or "", ()), *options.classes)
 
 
-def hold_folder(out: Path) -> None:
+def lock_result_folder(out: Path) -> None:
     """Make the folder for the results and keep other runs out of it, until the command ends.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The judge, which collects the evidence of checks and observers for each requirement."""
+"""The judge, which collects the evidence of checks and checkers for each requirement."""
 
 import re
 import threading
@@ -142,7 +142,7 @@ class Evidence:
 
 
 class Judge:
-    """Collects the evidence of checks and observers.
+    """Collects the evidence of checks and checkers.
 
     Args:
         known: the requirements by id, or their ids alone.
@@ -491,7 +491,7 @@ def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
 _SHOWN: Final = 100
 
 
-class Observers(Listener):
+class CheckerListener(Listener):
     """Calls checkers with every exchange. What they judge holds for every response, errors included.
 
     Args:

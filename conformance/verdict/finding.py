@@ -55,7 +55,7 @@ class Again(NamedTuple):
     Attributes:
         came_back: number of repetitions that failed in the same way.
         sent: number of repetitions.
-        judged: whether an observer judged each response; otherwise only the kinds of the responses were compared.
+        judged: whether a checker judged each response; otherwise only the kinds of the responses were compared.
     """
 
     came_back: int

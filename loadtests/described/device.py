@@ -21,7 +21,7 @@ from conformance.statement.motion_calls import named_by
 from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.target.connecting import connection_of
 from conformance.target.describing import is_wsdl, soap_contract, trusting
-from conformance.target.naming import DeviceOptions, named_or_usual, told_apart, what_is_judged
+from conformance.target.naming import DeviceOptions, split_args, targets_or_roaas_toml, what_is_judged
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import UsernameToken
 from conformance.transport.exchange import NoAnswerError
@@ -90,7 +90,7 @@ class Named:
             StatementError: the statement cannot be read.
         """
         try:
-            source, statement = told_apart(named_or_usual(targets, options), options["openapi"])
+            source, statement = split_args(targets_or_roaas_toml(targets, options), options["openapi"])
         except click.UsageError as error:
             raise SettingsError(error.message) from None
         wsdl = options["wsdl"]

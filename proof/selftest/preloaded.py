@@ -6,7 +6,7 @@ import os
 import pkgutil
 
 import conformance.engine.certification
-import conformance.engine.pytest_run
+import conformance.engine.robot_from_options
 import conformance.engine.robot_under_test
 import conformance.rules
 from conformance.contract.locating import ContractError

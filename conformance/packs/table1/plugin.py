@@ -138,7 +138,7 @@ class Device(device.Device):
 
         return plan_questions(api)
 
-    def observers(self, api: device.Rest) -> Iterable[Listener]:
+    def listeners(self, api: device.Rest) -> Iterable[Listener]:
         """Return what keeps the requests that were refused."""
         from conformance.packs.table1.robot.refused_requests import RefusedRequests  # noqa: PLC0415 - see the class
 

@@ -46,7 +46,7 @@ def _unknown_paths(api: RestInterface) -> list[str]:
     "rest-formats/problem-xml",
 )
 def test_unknown_paths(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Send each method to unknown paths; the observers judge the problem documents."""
+    """Send each method to unknown paths; the checkers judge the problem documents."""
     paths = _unknown_paths(api)
     for path in api.run.effort.draw(paths, _PATHS, f"{api.run.seed}/unknown paths"):
         for method in api.run.effort.subsample(permitted(api.run, rest, _METHODS, path), 3):

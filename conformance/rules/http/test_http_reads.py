@@ -1,4 +1,4 @@
-"""Many reads, one after another on one connection: each is answered, whatever its number, and by the observers' rules.
+"""Many reads, one after another on one connection: each is answered, whatever its number, and judged by the checkers.
 
 One series serves several requirements. Servers used to allow a hundred requests on one connection, and a failure in
 fifty is noticed in twice as many.
@@ -104,7 +104,7 @@ def series() -> _Reads:
 def test_reads_on_one_connection(api: RestInterface, judge: Judge, series: _Reads) -> None:
     """Send many reads on one connection: each gets the status that it gets on a connection of its own.
 
-    The observers judge every response. The robot may close a connection at any time (RFC 9112 9.5), and the client then
+    The checkers judge every response. The robot may close a connection at any time (RFC 9112 9.5), and the client then
     sends the request again on a new one. A robot that does so again and again on a busy connection drops requests.
     """
     judge.at_risk = (_MANY,)

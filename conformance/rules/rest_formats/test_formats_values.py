@@ -41,7 +41,7 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
     "rest-formats/xml", "rest-formats/xml-root", "rest-formats/text", "rest-formats/charset", "rest-formats/vary"
 )
 def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -> None:
-    """GET each resource as XML and as text; the observers judge the responses."""
+    """GET each resource as XML and as text; the checkers judge the responses."""
     _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
     _say_lacking(api, _TEXT, "rest-formats/text")
     if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):

@@ -52,7 +52,7 @@ _STRANGE = Node(clark("urn:example:strange", "no_such_operation"))
 @pytest.mark.phase("reach")
 @pytest.mark.requirement(*PASSIVE)
 def test_every_answer_is_watched(soap: SoapServices, effort: Effort) -> None:
-    """Provoke a fault, and call each operation without arguments; the observer judges every response of the run."""
+    """Provoke a fault, and call each operation without arguments; the checkers judge every response of the run."""
     for service in callable_services(soap, *PASSIVE):
         for _ in range(effort.cases(10)):
             call(service, _STRANGE)

@@ -46,7 +46,7 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             for item in effort.alternatives(drawn, 1):
                 _try(api, judge, call, item)
         for item in by_kind["type"][:1]:
-            # The observers judge the format of the refusal.
+            # The checkers judge the format of the refusal.
             call.carrying(item.made).send(api, ("Accept", XML))
         api.device.halt(api)
         when = f"a valid {operation.id} follows invalid ones"

@@ -35,7 +35,7 @@ def test_query_parameters(api: RestInterface) -> None:
         for item in chosen:
             _try(api, call, item, _QUERY)
         for item in chosen[:1]:
-            # The observers judge the format of the refusal.
+            # The checkers judge the format of the refusal.
             call.having(item.name, item.text).send(api, ("Accept", XML))
     operations = operations_of(api.run.contract)
     if not any(JSON in item.bodies or _has("query", item) or _has("path", item) for item in operations):

@@ -43,7 +43,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
             ):
                 api.device.halt(api)
         for item in [one for one in made if one.kind == "lexical"][:1]:
-            # The observers judge the format of the refusal.
+            # The checkers judge the format of the refusal.
             call.carrying(item.made).send(api, ("Accept", XML))
     api.device.halt(api)
     if not taken and "rest-formats" not in api.run.claims:

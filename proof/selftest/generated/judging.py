@@ -111,7 +111,7 @@ class _Control:
         with self._lock:
             known = self._known.setdefault(effort, {})
             if at_once and not known:
-                # Alone, a requirement sees less than in a whole run: of what every check sends, observers see all.
+                # Alone, a requirement sees less than in a whole run: of what every check sends, checkers see all.
                 proxy.change = unchanged
                 outcome = run_job(job_for(robot, proxy, effort, self._seed))
                 if outcome.exit_code < 0:

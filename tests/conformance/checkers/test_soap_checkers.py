@@ -7,7 +7,7 @@ import pytest
 from conformance.checkers.soap import SoapCheckers
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge, Observers
+from conformance.verdict.evidence import CheckerListener, Judge
 
 URL = "http://robot/ws"
 SPACE = "http://soap.turtlebot.mybot.org/"
@@ -21,7 +21,7 @@ FAULT = f"{OPEN}<s:Fault><faultcode>s:Client</faultcode><faultstring>no</faultst
 def broken(body: str, status: int, media_type: str = XML, version: str = "HTTP/1.1") -> set[str]:
     """Names of the requirements that an answer breaks."""
     judge = Judge(Contract.load().ledger)
-    observer = Observers(judge, [SoapCheckers({URL: {f"{{{SPACE}}}GetGoalResponse"}})])
+    observer = CheckerListener(judge, [SoapCheckers({URL: {f"{{{SPACE}}}GetGoalResponse"}})])
     response = Response(status, (("Content-Type", media_type),), body.encode(), 1.0, version)
     observer.answered(Exchange(Request("POST", URL), response))
     return {id_.rpartition("/")[2] for id_, evidence in judge.evidence.items() if evidence.findings}

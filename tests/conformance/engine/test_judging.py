@@ -15,7 +15,7 @@ from processes import ended
 from small_device import certified, described, reading, small_device
 
 from conformance.contract.pack import Contract
-from conformance.engine.judging import judge_stored
+from conformance.engine.judge_stored import judge_stored
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.history.events import read_history
 from conformance.history.writing import HISTORY_NAME, HistoryWriter

@@ -11,7 +11,7 @@ from conformance.contract.pack import Contract
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Case, Judge, Observers
+from conformance.verdict.evidence import Case, CheckerListener, Judge
 
 
 def _exchange(path: str) -> Exchange:
@@ -49,7 +49,7 @@ def test_a_checker_that_fails_ends_no_request_and_no_other_checker():
 
     judge = Judge(Contract.load().ledger)
     for _ in range(3):
-        Observers(judge, [fails, sees]).answered(_exchange("/x?a=1"))
+        CheckerListener(judge, [fails, sees]).answered(_exchange("/x?a=1"))
     assert len(seen) == 3
     assert list(judge.faults) == ["GET /x: not judged: ValueError: pattern"]
     for number in range(39):

@@ -13,7 +13,7 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Judge, Observers
+from conformance.verdict.evidence import CheckerListener, Judge
 from conformance.verdict.run import Run
 
 _DOCUMENT = {
@@ -33,7 +33,7 @@ def test_a_crash_that_any_check_meets_is_one_finding(tmp_path, status, path, fou
     with serving(lambda *_: (status if next(turns) % 3 == 0 else 200, {})) as url:
         run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
         client = HttpClient(url, Connection())
-        client.connection.listeners.append(Observers(run.judge, [RestCheckers(contract, url)]))
+        client.connection.listeners.append(CheckerListener(run.judge, [RestCheckers(contract, url)]))
         for _ in range(9):
             client.send("GET", path)
         client.close()

@@ -60,7 +60,7 @@ def test_each_goes_where_it_belongs_and_findings_show_variables(heard):
     ):
         assert f"\r\n{line}\r\n" in got[0]
     request = exchange.request
-    assert request.url == f"{url}/pose/?x=1", "observers know it by the URL that was asked for"
+    assert request.url == f"{url}/pose/?x=1", "checkers know it by the URL that was asked for"
     shown = request.curl()
     assert "?x=1&key=$ROAAS_QUERY_KEY" in shown
     assert '"Authorization: Basic $ROAAS_BASIC"' in shown

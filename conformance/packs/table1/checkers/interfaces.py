@@ -106,7 +106,7 @@ class AcrossInterfaces:
         elif request.method == "GET" and state is not None and len(response.body) < _LARGE:
             yield from self._read(state, exchange)
 
-    def forget(self, *, deletes: bool) -> None:  # noqa: ARG002 - see Observers
+    def forget(self, *, deletes: bool) -> None:  # noqa: ARG002 - see CheckerListener
         """Forget what was read before a request that was written by hand: what it did is not known."""
         self._acted_by_hand = True
 

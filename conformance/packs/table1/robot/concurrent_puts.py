@@ -102,7 +102,7 @@ class ConcurrentVelocities:
 
     @property
     def is_unreadable(self) -> bool:
-        """Return whether the last GET of the velocity cannot be read; the observers have judged that response."""
+        """Return whether the last GET of the velocity cannot be read; the checkers have judged that response."""
         return bool(self.reads) and self.reads[-1].velocity is None
 
     def is_decided(self, limits: Limits) -> bool:

@@ -189,7 +189,7 @@ class Robot:
         return self.rest.send("PUT", path, headers=JSON_BODY, body=body, fresh=fresh)
 
     def odometry(self) -> Odometry | None:
-        """GET the odometry; None where the response is invalid (the observers have judged it)."""
+        """GET the odometry; None where the response is invalid (the checkers have judged it)."""
         sent = self.clock.now()
         message, exchange = self.read(POSE, ODOMETRY)
         if message is None:

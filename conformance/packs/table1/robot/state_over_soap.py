@@ -80,7 +80,7 @@ def read_state(
 ) -> StateRead | None:
     """Read a state over REST, SOAP and REST, ``apart_s`` apart; ``first`` is called just before SOAP's.
 
-    Return None where REST has no value, which the observers have judged, and where SOAP's differs although the state
+    Return None where REST has no value, which the checkers have judged, and where SOAP's differs although the state
     has not ``lasted``: it may have changed to and fro.
     """
     path, operation, shape = STATES[name]

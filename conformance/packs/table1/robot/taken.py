@@ -104,7 +104,7 @@ def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
         requested = robot.clock.now()
         velocity, _ = robot.velocity()
         if velocity is None:
-            return None  # which the observers have judged
+            return None  # which the checkers have judged
         if robot.near(velocity, wanted) or not robot.near(velocity, STILL, 2):
             return True
         settled = since + _SETTLED * limits.settle_s + robot.sample_s

@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.robot import DELIVERIES
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"
@@ -26,7 +26,7 @@ class Robot:
 
     def __init__(self, *earlier: Delivery) -> None:
         self.api = RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
-        self.observer = Observers(self.api.run.judge, [Deliveries(self.api.client.url, has_probe=False)])
+        self.observer = CheckerListener(self.api.run.judge, [Deliveries(self.api.client.url, has_probe=False)])
         self.stamps, self._listed, self._now = count(), [], 100.0
         for one in earlier:
             self.hold(one)

@@ -8,7 +8,7 @@ from conformance.packs.table1.checkers.goals import Goals
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003"
@@ -20,8 +20,8 @@ def api() -> RestInterface:
     return RestInterface(Run(statement=Statement()), HttpClient(_BASE, Connection()))
 
 
-def watching(api: RestInterface) -> Observers:
-    return Observers(api.run.judge, [Goals(api.client.url)])
+def watching(api: RestInterface) -> CheckerListener:
+    return CheckerListener(api.run.judge, [Goals(api.client.url)])
 
 
 def refuted(api: RestInterface, *rounds: list[dict]) -> set[str]:

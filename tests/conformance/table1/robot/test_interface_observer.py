@@ -14,7 +14,7 @@ from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, POSE, SENSORS, VELOCITY
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response, Unanswered
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _BASE = "http://robot"
@@ -60,7 +60,7 @@ _PUT_VELOCITY = ("PUT", VELOCITY, b"{}", 204, "application/json", b"")
 def _refuted(checker, reads, apart_s=1.0) -> set[str]:
     """Return what is refuted by exchanges that follow each other."""
     run = Run(statement=Statement())
-    observer = Observers(run.judge, [checker])
+    observer = CheckerListener(run.judge, [checker])
     for number, (method, path, sent, status, media_type, body) in enumerate(reads, 1):
         response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=10 + number * apart_s)
         observer.answered(Exchange(Request(method, _BASE + path, (), sent), response))
@@ -122,7 +122,7 @@ def test_one_that_shows_something_else_twice_is_found(reads, requirement):
 
 def test_what_has_no_response_may_have_changed_the_goal():
     run = Run(statement=Statement())
-    observer = Observers(run.judge, [AcrossInterfaces(_BASE.__add__, Statement().limits)])
+    observer = CheckerListener(run.judge, [AcrossInterfaces(_BASE.__add__, Statement().limits)])
     for number in range(4):
         for method, path, sent, status, media_type, body in (_json(GOAL_PATH, _A), _soap("Goal", None)):
             response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=number + 1.0)

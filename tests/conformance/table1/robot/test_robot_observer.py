@@ -13,7 +13,7 @@ from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.credentials import Credential, Credentials, Kind
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
@@ -28,7 +28,7 @@ def opened(statement: Statement) -> RestInterface:
 def watch(api: RestInterface) -> None:
     connection = api.client.connection
     checker = State(api.client.url, api.run.statement.limits, Clock(), connection.credentials)
-    connection.listeners[:] = [Observers(api.run.judge, [checker])]
+    connection.listeners[:] = [CheckerListener(api.run.judge, [checker])]
 
 
 @pytest.mark.parametrize(("received_s", "refuted"), [(100.001, set()), (100.1, {"rest-resources/pose-stamp"})])

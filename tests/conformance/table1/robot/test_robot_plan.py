@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.plan import Plan, start_of
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _BASE = "http://robot:7003/r2d2"
@@ -60,7 +60,7 @@ def test_what_is_no_leap(poses):
 
 def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.9&y=0.0", **answer: object) -> Run:
     run = Run(statement=Statement())
-    observer = Observers(run.judge, [Plans(_BASE.__add__, run.statement)])
+    observer = CheckerListener(run.judge, [Plans(_BASE.__add__, run.statement)])
     there = [
         {"header": header(), "pose": pose(one.x) | {"position": {"x": one.x, "y": one.y, "z": 0.0}}} for one in poses
     ]
@@ -148,7 +148,7 @@ def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
     asked = _envelope(f"<r:GetPlan><x>{x}</x><y>0</y></r:GetPlan>")
     request = Request("POST", "http://robot:5555/turtlesim_subscriber_ws", (("Content-Type", "text/xml"),), body=asked)
     run = Run(statement=Statement())
-    observer = Observers(run.judge, [Plans(_BASE.__add__, run.statement)])
+    observer = CheckerListener(run.judge, [Plans(_BASE.__add__, run.statement)])
     observer.answered(Exchange(request, Response(200, (("Content-Type", "text/xml"),), answer, 1.0)))
     assert run.judge.counts([_SOAP]) == {_SOAP: 2}  # its end and its frame
     assert run.judge.refuted().get(_SOAP, 0) == (x != "1.9")

@@ -14,7 +14,7 @@ from conformance.packs.table1.checkers.soap_responses import SoapResponses
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response
-from conformance.verdict.evidence import Observers
+from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 
 _WSDL = CONTRACT_DIR / "subscribers.wsdl"
@@ -56,7 +56,8 @@ def judged(body, status=200):
     vars(service)["described"] = service.contract  # as a check has found it
     run = Run()
     response = Response(status, (("Content-Type", "text/xml"),), body.encode(), 1.0)
-    Observers(run.judge, [SoapResponses([service])]).answered(Exchange(Request("POST", _URL, (), b"<a/>"), response))
+    exchange = Exchange(Request("POST", _URL, (), b"<a/>"), response)
+    CheckerListener(run.judge, [SoapResponses([service])]).answered(exchange)
     return set(run.judge.refuted())
 
 

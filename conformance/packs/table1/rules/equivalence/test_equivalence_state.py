@@ -84,7 +84,7 @@ def test_pose_and_velocity_at_one_moment(robot: Robot, subscribers: SoapService,
         for number in range(_REPEATS):
             found = _odd_at_one_moment(robot, subscribers, name, effort)
             if found is None:
-                return  # which the observers have judged
+                return  # which the checkers have judged
             odd = {place: one for place, one in found.items() if not number or place in odd}
             if not odd:
                 break

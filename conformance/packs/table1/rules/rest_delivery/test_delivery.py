@@ -109,7 +109,7 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
 
     for place, text in effort.alternatives([(place, text) for text in _TEXTS for place in range(7)], 8):
         refused("refuses-text", place, text)
-    # The observers judge the format of the refusal.
+    # The checkers judge the format of the refusal.
     rest.send("PUT", path_of("abc", *_VALID[1:]), headers=(("Accept", "application/xml"),))
     for place, text in effort.alternatives([(place, text) for text in _NON_FINITE for place in range(1, 7)], 8):
         refused("refuses-non-finite", place, text)

@@ -64,7 +64,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
 @pytest.mark.phase("late")
 @pytest.mark.requirement(_SAMPLE, _BESIDE)
 def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Read odometry and velocity in turn, unless the rest of the run has; the observer judges each by those around."""
+    """Read odometry and velocity in turn, unless the rest of the run has; the checkers judge each by those around."""
     unread, before, wanted = 0, judge.cases(_BESIDE), effort.cases(_TURNS)
     for turn in range(_READ * wanted):
         judged = judge.cases(_BESIDE)
@@ -86,7 +86,7 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
     "rest-resources/linear-agrees",
 )
 def test_velocity_and_odometry(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Read velocity, linear velocity and odometry: they must agree; the observer judges each response."""
+    """Read velocity, linear velocity and odometry: they must agree; the checkers judge each response."""
     # Two readings agree where the odometry has been steady for a while: so look for that long at least.
     drive = Drive(robot)
     hold_s = robot.limits.hold_s

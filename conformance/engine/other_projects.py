@@ -32,7 +32,7 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(IN_URL)
 
     def connect() -> RobotUnderTest:
-        from conformance.engine.pytest_run import robot_from_options  # noqa: PLC0415 - see the module's docstring
+        from conformance.engine.robot_from_options import robot_from_options  # noqa: PLC0415 - see the module's docstring
 
         return robot_from_options(config)
 

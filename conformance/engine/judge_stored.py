@@ -27,7 +27,7 @@ from conformance.transport.parallel import is_busy
 from conformance.transport.passage import Heard
 from conformance.transport.raw import tell
 from conformance.transport.reach import split
-from conformance.verdict.evidence import Checker, Judge, Observers
+from conformance.verdict.evidence import Checker, CheckerListener, Judge
 from conformance.verdict.verdicts import Verdict
 
 
@@ -118,14 +118,14 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Lis
     rest = target.get("rest")
     api = RestInterface(run, HttpClient(str(rest), Connection())) if rest else None
     device = api.device if api is not None else device_of(run)
-    yield Observers(run.judge, device.checkers(api, services), by_rule=False)
+    yield CheckerListener(run.judge, device.checkers(api, services), by_rule=False)
     if api is not None:
         checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
     if services:
         checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
     if (found := services_of(run.contract)) is not None:
         checkers.append(SoapMemory(found))
-    yield Observers(run.judge, checkers)
+    yield CheckerListener(run.judge, checkers)
 
 
 def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[SoapService]:
