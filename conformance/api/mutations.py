@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 Made = TypeVar("Made")
-# Names and texts that no contract has.
+# A name and a text that no contract contains.
 STRANGE_NAME = "roaas_unknown"
 STRANGE_TEXT = "roaas-no-number"
 

@@ -28,26 +28,26 @@ from conformance.verdict.evidence import Case
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _MOST_OCTETS: Final = 65_536
 _MOST_THINGS: Final = 1_000
-# A device that acts later has so long, s.
+# A device may act this much later, s.
 _SETTLES_S: Final = 3.0
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
 _DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
 #: States in which nothing goes on.
 FINAL: Final = _CANCELLED | _DONE
-# A thing in a final state may be put away; another state ends nothing that went on.
+# States in which a thing was put away. From a final state that is allowed.
 _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
 #: Operations that end what goes on, or interrupt it.
 ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
-#: By these words a description says in which state of another thing an operation is refused.
+#: Texts of a description that name a state of another thing in which an operation is refused.
 ANOTHER: Final = re.compile(r"\b(?:while|if|when) another\b[^.;]*", re.IGNORECASE)
-# By these it says that a number never becomes less.
+# Texts of a description that say that a number never decreases.
 _GROWS: Final = re.compile(
     r"\b(?:never|not) (?:falls?|decreases?|drops?|goes? (?:back|down))\b(?! (?:below|under|to))"
     r"|\bonly (?:grows?|rises?|increases?)\b",
     re.IGNORECASE,
 )
-# Operations after which a number may begin again.
+# Operations after which a number may start again at its beginning.
 _ANEW: Final = frozenset({"reset", "clear", "restart", "reboot", "restore", "zero"})
 
 

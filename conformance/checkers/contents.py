@@ -24,10 +24,10 @@ _PART: Final = re.compile(r"bytes (\d+)-(\d+)/(\d+|\*)", re.IGNORECASE)
 # Digests in structured fields (RFC 9530 2, 3), and in the field before them (RFC 3230 4.3.2).
 _DIGEST: Final = re.compile(r"(sha-256|sha-512)\s*=\s*:?([A-Za-z0-9+/]+=*):?(?=\s*(?:,|;|$))", re.IGNORECASE)
 _HASHES: Final = {"sha-256": hashlib.sha256, "sha-512": hashlib.sha512}
-# Members that tell the digest of a file, by their plain names.
+# Plain names of members that contain the digest of a file.
 _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# So many contents of so many octets are remembered.
+# Contents that are remembered, and octets of each at most.
 _MOST, _LARGEST = 200, 1 << 20
 _FILES: Final = frozenset({_OCTETS, "application/pdf", "application/zip"})
 _RANGE, _DIGESTS, _READ, _TAGS = (
@@ -37,7 +37,7 @@ _RANGE, _DIGESTS, _READ, _TAGS = (
     "description/entity-tag",
 )
 _ASKED: Final = re.compile(r"bytes=(\d*)-(\d*)")
-# By these words a description says that a text is kept as it was sent; other devices may write its lines otherwise.
+# Texts of a description that say that a text is kept as it was sent; without them, line ends may change.
 _KEEPS: Final = re.compile(
     r"\b(?:octets?|bytes?)\b[^.]*\b(?:stored|sent|uploaded|received|written)\b|\bverbatim\b|\bbyte[ -](?:for|by)[ -]",
     re.IGNORECASE,

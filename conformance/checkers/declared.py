@@ -19,13 +19,13 @@ from conformance.documents.representation import UnreadableError, flat, read
 from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing, likeness
 
-# RFC 9110 and RFC 6585 allow these for any request: authentication and rate. Another requirement judges 5xx.
+# Statuses that RFC 9110 and RFC 6585 allow for any request: authentication and rate. Another requirement judges 5xx.
 _ANY_REQUEST = frozenset({401, 429})
-# ... and these for a request that has more in it than method, path and Accept.
+# Statuses allowed for a request that has more in it than method, path and Accept.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
-# Larger bodies are not kept to be known again, octets.
+# Bodies larger than this are not kept for comparison, octets.
 _LARGE = 1 << 14
-# So many responses of an operation are searched for what is writeOnly, so many items of a list, and so deep.
+# Responses of an operation that are searched for writeOnly members; items of a list in them; depth of the search.
 _JUDGED, _ITEMS, _DEEPEST = 40, 20, 5
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 

@@ -18,13 +18,13 @@ _CONDITIONS: Final = frozenset(
     {"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "if-range", "range"}
 )
 _TAGS, _MATCH, _REQUIRED = "description/entity-tag", "description/if-match", "description/required"
-# Conditions beside If-Match, by which a request may be refused with 412 as well (RFC 9110 13.2.2).
+# Conditions beside If-Match for which a request may also be refused with 412 (RFC 9110 13.2.2).
 _OTHERS: Final = frozenset({"if-none-match", "if-modified-since", "if-unmodified-since"})
-# So many tags are remembered, with contents of so many bytes.
+# Tags that are remembered, and bytes of the content of each at most.
 _MOST, _LARGEST = 4000, 65_536
 
 
-#: Header fields of a request, by which a representation is chosen.
+#: Header fields of a request that choose a representation.
 Fields = tuple[tuple[str, str], ...]
 
 

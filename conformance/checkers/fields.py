@@ -23,7 +23,7 @@ _IMF_FIXDATE = re.compile(
     r"\d{2}:\d{2}:\d{2} GMT",
     re.ASCII,
 )
-# What a web server answers by itself when it refuses a request, unless the API's author declares it.
+# Statuses by which a web server itself refuses a request, unless the API's author declares them.
 _OF_PARSERS = frozenset({400, 413, 414, 431})
 # RFC 9110 8.8.3: entity-tag.
 _ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
@@ -85,7 +85,7 @@ def _is_date(value: str | None) -> bool:
         return False
 
 
-# Methods that a server in front may refuse itself, without a word of the resource.
+# Methods that a server in front may refuse itself, without asking the resource.
 _OF_SERVERS = frozenset({"TRACE", "CONNECT"})
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 

@@ -16,9 +16,9 @@ from conformance.documents.openapi import SAFE, Operation, is_json, operations_o
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
-# So many identifiers of a run are remembered.
+# Identifiers of a run that are remembered.
 _REMEMBERED: Final = 50_000
-# Statuses by which a creation with a taken value is refused; so many refused bodies of so many octets are remembered.
+# Statuses that refuse a creation with a taken value; refused bodies that are remembered, and octets of each.
 _TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
 _FEW: Final = 8
 _OCTETS: Final = 16_384

@@ -19,14 +19,14 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.verdict.evidence import Case
 
-# So many values that items had, and that a filter was asked for, are remembered; so many items are compared.
+# Values of items that are remembered; values of filters that are remembered; items that are compared.
 _REMEMBERED: Final = 50_000
 _ASKED: Final = 1000
 _COMPARED: Final = 60
-# Items of one kind may come before those of another.
+# Kinds of items that one order may have: items of one kind may come before those of another.
 _KINDS: Final = 2
-#: By these a client may ask for a value or more, as logs are filtered; by those below it may ask for more items, not
-#: for these alone, where the value is true.
+#: Parameters that ask for their value or more, as logs are filtered; below them, parameters that ask for further items,
+#: and not for these alone, where their value is true.
 LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
@@ -249,7 +249,7 @@ def _holds(value: Any, asked: list[str]) -> bool:
     return any(isinstance(one, dict | list) or text_of(one).casefold() in wanted for one in own)
 
 
-# Texts that may be sorted by what they mean: numbers with units, durations, addresses, levels, days and months.
+# Texts whose order may follow their meaning: numbers with units, durations, addresses, levels, days and months.
 _MEANING: Final = re.compile(
     r"[\d+\-.].*|P[\dT].*|(?:off|none|low|minor|medium|moderate|high|major|severe|critical|urgent|fatal|emergency|trace"
     r"|debug|info|notice|warn|warning|error|alert|ok|good|bad|small|large|[sml]|x+[sl]"

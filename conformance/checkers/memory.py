@@ -38,21 +38,21 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
 from conformance.verdict.evidence import Case
 
-# A device that writes later has so long, s.
+# A device may write this much later, s.
 _SETTLES_S: Final = 3.0
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _REFUSED: Final = range(400, 500)
-# Other clients and devices that answer from several processes: what differs counts when it is seen again.
+# Times that a difference must be seen before it counts: other clients, or several processes, may cause one.
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
 _MOST_THINGS: Final = 1_000
-# A body of more octets is not remembered, and of a value so many characters are.
+# Bodies larger than this are not remembered, octets; characters of a value that are shown.
 _MOST_OCTETS: Final = 65_536
 _SHOWN: Final = 200
-# Members of a device that no change of its thing changes; and the fewest characters that no device has by chance.
+# Members that no change of a thing changes; the fewest characters of an identifier that no two devices share by chance.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
-# By these words a description says that an identifier is given once, and that something outlives a thing.
+# Texts of a description that say that an identifier is used once, and that something outlives a thing.
 _NEVER_AGAIN: Final = re.compile(
     r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)"
     r"|\bid(?:entifier)?\b[^.]*\b(?:higher|greater|larger) than\b[^.]*\b(?:had|ever|deleted)\b",

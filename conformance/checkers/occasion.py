@@ -13,7 +13,7 @@ from conformance.documents.openapi import Operation
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
 
-#: Methods that every server knows: a request with another one may never reach a resource.
+#: Methods that every server knows. A request with another method may never reach a resource.
 METHODS: Final = frozenset({"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS"})
 
 

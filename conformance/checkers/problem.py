@@ -12,10 +12,10 @@ from conformance.transport.exchange import Response
 from conformance.verdict.evidence import Case
 
 _NAMESPACE = "urn:ietf:rfc:7807"
-# Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its field.
+# Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its own field.
 _TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
-# What servers refuse in a path, because they and the application may read it differently: an encoded slash
-# (Apache), backslash, percent, control character, a parameter (Tomcat, Jetty, Spring's firewall).
+# Path characters that servers refuse, because the application may read them differently: an encoded slash (Apache),
+# backslash, percent, control character, a parameter (Tomcat, Jetty, Spring's firewall).
 _AMBIGUOUS = re.compile(r"%(?:2f|5c|25|7f|[01][0-9a-f])|[;\\]", re.IGNORECASE)
 # The characters of a target (RFC 3986 3.3, 3.4); a target with any other one is malformed (RFC 9112 3.2).
 _TARGET = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/?-]|%[0-9A-Fa-f]{2})*")

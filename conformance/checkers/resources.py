@@ -13,13 +13,13 @@ from conformance.documents.openapi import Resource, is_json, resource_at, resour
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.evidence import Case
 
-# Statuses that say nothing of the resource; a crash, whatever the method, is a finding of its own.
+# Statuses that say nothing of the resource; CRASHES are findings of their own.
 _NOT_NOW: Final = frozenset({401, 403, 429, 503}) | CRASHES
-# By these a device says that it has no HEAD; by those, that it has no such resource.
+# Statuses of a device without HEAD; those of a device without the resource.
 _NO_HEAD: Final = frozenset({404, 405, 501})
 _NO_RESOURCE: Final = frozenset({400, 404, 410, 422})
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
-# So many URLs are remembered.
+# URLs that are remembered.
 _MOST: Final = 4000
 
 

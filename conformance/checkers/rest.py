@@ -20,7 +20,7 @@ from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.evidence import Case
 
-# Those that judge any response; those that judge what the description may say of it.
+# Checkers of any response; checkers that need the description's operation.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.stated, problem.form, fields.allow, fields.challenge,

@@ -21,15 +21,15 @@ from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, Simple, is_alike
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# Other values that have to be kept before one has to be, and how often another one is read before it counts.
+# Other values that must be kept before one counts as lost; times that another value is read before it counts.
 _KEPT: Final = 2
 _SEEN: Final = 2
-# So often one and the same value is read, whatever is written, before it counts as never written.
+# After this many reads of one value, whatever is written, it counts as never written.
 _LOST: Final = 6
-# Of so many values that are read at once, one may be read later: by a read that went wrong.
+# Values that are read at once: one of them may be read later, by a read that failed.
 _FEW: Final = 3
 _MOST: Final = 1_000
-# Nouns of what is kept as it is given, and is no state of the world.
+# Nouns of values that are kept as they are given, and are not measured.
 _KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
 

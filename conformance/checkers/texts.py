@@ -14,7 +14,7 @@ from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.transport.reach import joined
 from conformance.verdict.evidence import Case
 
-# So many URLs are remembered.
+# URLs that are remembered.
 _MOST: Final = 1000
 _SPACE: Final = re.compile(r"\s+")
 

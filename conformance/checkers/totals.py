@@ -13,16 +13,16 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
-#: A total may be kept apart from the list, and be late after a change, s. Wrong so often while nothing changes, it is
-#: wrong.
+#: A total may be stored apart from the list, and be late after a change, s. Reads in which a total must be wrong while
+#: nothing changes.
 SETTLES_S: Final = 3.0
 _OFTEN: Final = 2
-# Where servers cut a list without saying so, and where they stop counting.
+# Servers cut a list at multiples of these numbers without saying so; the fewest items of such a list.
 _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
-# So many choices of filters are remembered.
+# Choices of filters that are remembered.
 _MOST: Final = 1000
-# By these words a description says that a total goes by the filters.
+# Texts of a description that say that a total counts the filtered items.
 _FILTERED: Final = re.compile(r"\b(?:filter\w*|match\w*)\b(?![^.]*\b(?:ignor|regardless|whatever))", re.IGNORECASE)
 _CAP: Final = 50  # also the fewest items that a list without parameters for its parts is cut at
 

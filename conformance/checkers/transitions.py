@@ -19,14 +19,14 @@ from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 _STATES: Final = frozenset({"state", "status", "phase", "mode"})
-# Sentences that say what becomes of an operation in other states than those that another one names.
+# Texts of a description on what an operation does in all states that another sentence does not name.
 _ELSE: Final = re.compile(r"\b(?:an)?other state|\botherwise\b", re.IGNORECASE)
-#: That a refusal keeps all.
+#: Texts of a description that say that a refusal changes nothing.
 KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
-# What happens once may be a change by itself just then.
+# Times that a change must follow: once may be a change by itself at that moment.
 _TWICE: Final = 2
-#: What happens with each of so many refusals does not.
+#: Refusals after each of which a change must follow: a change by itself does not.
 OFTEN: Final = 3
 _OCTETS, _MOST = 65_536, 1_000
 

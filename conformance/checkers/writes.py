@@ -30,16 +30,16 @@ from conformance.verdict.evidence import Case
 
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000
-# A device that acts later has so long, s.
+# A device may act this much later, s.
 _SETTLES_S: Final = 3.0
 _MOST_OCTETS: Final = 65_536
-# What looks like a habit of the device counts when it is seen by so many requests.
+# Requests that must show a habit of the device before it counts.
 _SEEN: Final = 2
-# Whole numbers beyond this have no double of their own (RFC 8259 6).
+# Whole numbers beyond this are not exact as doubles (RFC 8259 6).
 _EXACT: Final = 2**53
-# Doubles that differ by no more are equal; those that differ by more than the second are no rounding.
+# Doubles that differ by less than the first are equal; those that differ by more than the second were not rounded.
 _EQUAL, _CLOSE = 1e-14, 0.005
-#: By these words a description says what becomes of what a PUT leaves out.
+#: Texts of a description that say what becomes of members that a PUT leaves out.
 GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,

@@ -22,7 +22,7 @@ from conformance.verdict.effort import DEEP_MINUTES
 from conformance.verdict.finding import counted
 
 PARALLEL = 4
-# Options that hold for each robot of a fleet; what else there is belongs to one robot, and into the file.
+# Options that apply to each robot of a fleet; all others belong to one robot, in the fleet file.
 _FOR_ALL = (
     "profile", "classes", "pack", "requirements", "effort", "minutes", "seed", "nonce", "timeout_s", "request_rate",
     "key", "trust_hosts", "select", "exclude",

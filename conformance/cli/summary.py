@@ -25,10 +25,10 @@ _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-c
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 2000
 _SHOWN_BLOCKED = 5
-# Findings of one requirement that are printed in full; each further one has a line.
+# Findings of one requirement that are printed in full; each further one takes a line. Characters of that line.
 _IN_FULL = 5
 _LINE = 160
-# The column of a class's reason; that on narrow terminals; and from how many columns on a terminal is wide.
+# Column of a class's reason; that column on narrow terminals; columns from which a terminal is wide.
 _REASON, _NARROW, _WIDE = 46, 4, 100
 
 

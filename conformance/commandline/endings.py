@@ -14,11 +14,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
 
-#: Names, in the environment, the process that a command belongs to: the command ends with it.
+#: Environment variable with the process that a command belongs to: the command ends with it.
 PARENT_VARIABLE: Final = "ROAAS_PARENT"
 _OFTEN_S: Final = 0.2
 _ALWAYS: Final = ("SIGINT", "SIGTERM")
-# By default they end the process, too; those that show a crash, as SIGSEGV, and those that profilers use are left.
+# Signals that end the process by default. Those of a crash, such as SIGSEGV, and of profilers are left alone.
 _USUALLY: Final = ("SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGXCPU", "SIGPWR", "SIGBREAK")
 _parent_ended = threading.Event()
 

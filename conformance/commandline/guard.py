@@ -20,11 +20,12 @@ from conformance.commandline.help_pages import inert
 from conformance.commandline.secrecy import SECRETS
 
 _SHOWN = 300
-# What Python and the loader of its modules say where the memory of a process is limited, beside MemoryError.
+# Messages of Python and its module loader where a process's memory is limited, beside MemoryError.
 _NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread", "out of memory")
-# With fewer, libraries end the process in the middle of a run, with exit code 1 or an abort, and not with MemoryError.
+# Address space that each command needs, MB. With less, libraries end the process in the middle of a run, with exit code
+# 1 or an abort, and not with MemoryError.
 _LEAST_MB = {"certify": 400, "replay": 400, "judge": 400, "explain": 120, "load": 1_200}
-# Freed where memory ends, so that this can be told.
+# Memory that is freed when there is no more, so that the error can be reported.
 _RESERVE = bytearray(1 << 20)
 
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 from conformance.commandline.secrecy import SECRETS
 
 LOCK_NAME: Final = ".roaas.lock"
-# A result has some hundred kilobytes: where these octets find no room, neither does it.
+# A result has some hundred kilobytes: if this many octets cannot be written, it cannot either.
 _ROOM: Final = bytes(1 << 18)
 _MOST: Final = 1000
 

@@ -24,21 +24,21 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
 
-# A secret of fewer characters, or a word or number of fewer than the second, would be masked where it is none.
+# Fewest characters of a secret that is masked, and of one that is a word or number: shorter ones occur by chance.
 _SHORTEST: Final = 5
 _SHORTEST_WORD: Final = 8
 _MOST_KNOWN: Final = 100
 _REMEMBERED: Final = 1000
 _MOST_REMEMBERED: Final = 4096
-# The beginning of a secret that is recognized where the text is cut after it, and how long such a secret is at least.
+# Fewest characters of a secret's beginning that is masked where the text is cut; fewest characters of such a secret.
 _BEGINNING: Final = 8
 _LONG: Final = 12
 _CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
-# Before an ellipsis, less of it is recognized.
+# Fewest and most characters that are recognized before an ellipsis.
 _ELLIPSIS: Final = re.compile(r"…+|\.{3,}")
 _SHORTEST_CUT: Final = 4
 _LONGEST_CUT: Final = 256
-# An escape may itself be escaped; hostile text is not searched deeper than this.
+# An escape may itself be escaped: text is searched this deep.
 _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
     r"%(?:25){0,8}(?:(?P<wide>(?:[C-Dc-d][0-9A-Fa-f]|[Ee][0-9A-Fa-f]%(?:25){0,8}[89ABab][0-9A-Fa-f])"
@@ -56,8 +56,8 @@ _QUOTED_PRINTABLE: Final = re.compile(rf"=(?:(?P<hex>[0-9A-F]{{2}})|{_LINE_END}{
 _FOLDED: Final = re.compile(rf"{_LINE_END}[ \t]*")
 _UNITS: Final = (_ESCAPE, _QUOTED_PRINTABLE, _FOLDED)
 _URLSAFE: Final = str.maketrans("+/", "-_")
-# Known by their places: the value of a cookie that a device gives to the owner of a credential, and digests of a
-# password, from which it can be guessed (RFC 7616 3.4.1; UsernameToken Profile 1.0, 3.1).
+# Secrets that are known by their places: the value of a cookie that a device gives to the owner of a credential, and
+# digests of a password, from which it can be guessed (RFC 7616 3.4.1; UsernameToken Profile 1.0, 3.1).
 _SET_COOKIE: Final = re.compile(r"([Ss][Ee][Tt]-[Cc][Oo][Oo][Kk][Ii][Ee]2?: ?[^=;,\s\"]{1,99}=)[^;,\s\"]+")
 _ANSWER: Final = re.compile(r"(\bresponse=[\\\"']{0,9})[0-9A-Fa-f]{32,64}")
 _PASSWORD_DIGEST: Final = re.compile(r"(#PasswordDigest[^<>]{0,99}>)[^<]{1,99}")
@@ -70,10 +70,10 @@ _PLACES: Final = (
 _COOKIE: Final = re.compile(r"^([^=;]{1,99}=)[^;]+")
 # A password in a URL (RFC 3986 3.2.1).
 _USERINFO: Final = re.compile(r"://[^/?#\s:@\"']{0,99}:([^/?#\s@\"']{1,999})@")
-# A compressed body hides what it says from every reader but the curious one.
+# Compressed bodies are unpacked, up to this size, and searched as well.
 _GZIP: Final = b"\x1f\x8b"
 _MOST: Final = 1 << 24
-# The formats of results and the requirements: a word of theirs is not masked, as no program could read the rest.
+# The words of the result formats and requirements are not masked: no program could read the result without them.
 _ROOMS: Final = Path(__file__).parents[2]
 _OUR_WORDS: Final = ("reports/schemas/*.json", "conformance/rules/requirements.toml", "conformance/packs/*/*.toml")
 
@@ -325,5 +325,5 @@ def _without_cookie(name: Any, value: Any) -> Any:
     return _COOKIE.sub(r"\1$ROAAS_SET_COOKIE", value) if isinstance(value, str) else value
 
 
-#: Those of this process.
+#: The secrets of this process.
 SECRETS: Final = Secrets()

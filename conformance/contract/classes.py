@@ -108,7 +108,7 @@ class ConformanceClass:
         return tuple(name for name in self.interfaces if name in described and name not in there)
 
 
-#: Octets of request content that every service accepts, over REST and over SOAP.
+#: Octets of request content that every service must accept, over REST and over SOAP.
 TAKEN_OCTETS: Final = 64 * 1024
-#: Octets of request content over which no service need read on: it may close the connection.
+#: Octets of request content from which on a service may stop reading and close the connection.
 LIMIT_OCTETS: Final = 10 * 1024 * 1024

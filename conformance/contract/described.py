@@ -17,10 +17,10 @@ from conformance.contract.toml_file import basic_string
 DOCUMENT_NAME: Final = "openapi.json"
 ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
-# What a run writes of a description into its result: data, and nothing else is read of it.
+# Files that a run writes of a description into its result. They are data; no other file is read from there.
 _DATA_NAMES: Final = (DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME, "wsdl.json")
 _MOST_MANIFEST: Final = 64 * 1024
-#: How the contract is called in verdicts: "keeps its own description".
+#: The contract's name in verdicts: "keeps its own description".
 TITLE: Final = "its own description"
 #: The class that a motion map claims.
 MOTION: Final = "motion"
@@ -30,10 +30,10 @@ ROS: Final = "ros-gateway"
 STATES: Final = "states"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
-#: What a web server does by itself, for a device of either kind.
+#: The class of what a web server does by itself.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
-# Formats in which one value can be written.
+# Media types in which one value can be written.
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 

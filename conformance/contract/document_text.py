@@ -12,16 +12,16 @@ from typing import Any, Final
 
 import yaml
 
-# What a description may hold. The largest known ones have 12 MB, 500,000 values, and lie 60 deep.
+# Budget of a description. The largest known ones have 12 MB, 500,000 values, and lie 60 deep.
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 _MOST_NODES: Final = 1_000_000
 _DEEPEST: Final = 100
 _LONGEST_NAME: Final = 8_192
-# Each value of a JSON text but the first one follows one of these marks, which texts hold too.
+# Marks before the values of a JSON text: each value but the first follows one of them. Texts may contain them too.
 _MARKS_OF_VALUES: Final = ",[{"
-# A whole number with more digits is beyond every double.
+# Digits of a whole number: with more it is beyond every double.
 _MOST_DIGITS: Final = 400
-# Of names in a place, so many characters are shown, and so many names.
+# Characters of a name, and names, that a message about a place shows.
 _SHOWN: Final = 60
 _PLAIN: Final = "roaas:plain"
 _TAG: Final = "tag:yaml.org,2002:"
@@ -35,7 +35,7 @@ _WHOLE: Final = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _BASED: Final = re.compile(r"0(?:o[0-7]+|x[0-9a-fA-F]+)")
 _REAL: Final = re.compile(r"[-+]?(?:\.[0-9]+|(?:0|[1-9][0-9]*)(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _INFINITE: Final = re.compile(r"[-+]?\.(?:inf|Inf|INF)")
-# libyaml's, where there is one.
+# libyaml's loader, where PyYAML was built with it.
 _Loader: Final[Any] = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 

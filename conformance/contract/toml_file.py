@@ -156,7 +156,7 @@ def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
     return f"a {noun}, and not negative" if low == 0 else f"a finite {noun}"
 
 
-# By the patterns of statements: what a text has to be.
+# Words for the patterns of texts in statements.
 _TEXTS: Final = {
     r"^[A-Z]+ /\S*$": "a method and a path on the device, such as 'POST /login', and no URL",
     r"^/\S+$": "a full ROS name, which begins with '/'",

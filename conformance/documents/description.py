@@ -312,7 +312,7 @@ def _with_defaults(server: Schema) -> str:
     return host + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\", errors="surrogatepass")
 
 
-# So many places may the actions of an overlay change, and so many values may they add, in all; and how long, s.
+# Budget of an overlay: places that its actions change in all, values that they add in all, and time, s.
 _MOST_PLACES: Final = 50_000
 _MOST_NODES: Final = 1_000_000
 _MOST_OVERLAY_S: Final = 10.0

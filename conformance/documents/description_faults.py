@@ -24,7 +24,7 @@ from conformance.documents.openapi import PARAMETER, Operation, methods_of, read
 from conformance.documents.schema_budget import Growth
 from conformance.documents.schema_places import DATA, foreign_words, in_extension, schema_places, without_foreign_words
 
-# So many violations are looked at for the reason why a part cannot be read.
+# Violations that are searched for the reason why a part cannot be read.
 _MOST_FAULTS = 1_000
 _SCHEMAS = "openapi/definitions.py"
 
@@ -296,7 +296,7 @@ def _path_fault(operations: Sequence[Operation]) -> str:
 
 
 _UNREADABLE: Final = (UnresolvedError, AttributeError, TypeError, KeyError, ValueError)
-# Of a place so many characters are shown, and so many lines are.
+# Characters of a place, and lines, that are shown.
 _SHOWN: Final = 300
 _LINES: Final = 200
 _META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})

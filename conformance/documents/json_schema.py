@@ -9,14 +9,14 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 Schema = dict[str, Any]
-# So many nodes of a document, and references one behind the other, are copied before the others stay lazy references.
+# Nodes of a schema, and references behind each other, that are copied; the others stay lazy references.
 MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
-#: How lazy references begin.
+#: Scheme of lazy references.
 LAZY_SCHEME: Final = "roaas-lazy:"
 _LAZY: Final[list[tuple[Schema, str]]] = []
 _LAZY_NUMBERS: Final[dict[tuple[int, str], int]] = {}
-#: Keywords whose values are data, and no schemas.
+#: Keywords whose values are data, not schemas.
 VALUE_KEYWORDS: Final = frozenset({"example", "examples", "default", "enum", "const"})
 _DATA: Final = frozenset({"enum", "const"})
 _NAMING: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions", "schemas"})
@@ -229,7 +229,7 @@ def opened(schema: Any) -> Any:
     return changed_alike(found, "opened")
 
 
-#: The changes that a schema behind a lazy reference may undergo, by name.
+#: The changes to a schema behind a lazy reference, by name.
 CHANGES: Final[dict[str, Callable[[Any], Any]]] = {"modern": modern, "opened": opened}
 
 

@@ -43,23 +43,23 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 T = TypeVar("T")
-# The keyword of such a reference where its schema is compiled on its own.
+# The keyword that stands for a lazy reference in a schema that is compiled on its own.
 _KEYWORD: Final = "roaas-referred"
 _UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
-# A schema that refers to no more than so many is compiled together with them.
+# A schema that refers to at most this many others is compiled together with them.
 _MOST_TOGETHER: Final = 30
-# Schemas of so many nodes are kept compiled, in nearly 1 kB each.
+# Nodes of all schemas that are kept compiled, in nearly 1 kB each.
 _MOST_KEPT: Final = 100_000
-# So many judgements of parts of values are remembered, in about 250 octets each.
+# Verdicts on parts of values that are remembered, in about 250 octets each.
 _MOST_JUDGED: Final = 100_000
-# A part of so many octets as JSON is remembered by its digest.
+# A part with at least this many octets of JSON is remembered by its digest.
 _DIGESTED: Final = 100
-# So many references are followed to name a violation: alternatives that refer to each other multiply.
+# References that are followed to name a violation: alternatives that refer to each other multiply.
 _MOST_FOLLOWED: Final = 1_000
-# How a lazy reference is written where `bundled` has put what it leads to.
+# The form of a lazy reference after `bundled` has put its schema into `$defs`.
 _BUNDLED: Final = re.compile(r"#/\$defs/(\d+(?:,\w+)*)")
 _encode: Final = msgspec.json.Encoder().encode
-# An integer that is no double has 309 digits or more; to find so many in a row, each digit is taken for a 0.
+# An integer that is no double has 309 digits or more; to find them, every digit is replaced by 0.
 _AS_ZERO: Final = bytes.maketrans(b"123456789", b"0" * 9)
 _TOO_LONG: Final = b"0" * 309
 
@@ -462,7 +462,7 @@ _RANGES: Final[dict[str, tuple[float, float]]] = {
     "float": (-_SINGLE, _SINGLE),
 }
 _DATA: Final = frozenset({"example", "examples", "default", "enum", "const"})
-# RFC 4648, sections 4 and 5; which alphabet, and whether padding is left out, a description does not say.
+# Base64 by RFC 4648, sections 4 and 5; a description does not say which alphabet, and whether padding is left out.
 _BASE64: Final = re.compile(r"(?:[A-Za-z0-9+/]*|[A-Za-z0-9_-]*)={0,2}")
 _GROUP: Final = 4
 _NAME: Final = re.compile(r"'format': '([^']+)'")

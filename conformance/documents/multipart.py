@@ -13,7 +13,7 @@ from conformance.documents.xml import NotXmlError, parse
 if TYPE_CHECKING:
     from lxml import etree
 
-# A body has so many parts, and those that it includes, as often as it does, have so many octets.
+# Budget of a multipart body: parts; octets of included parts, counted as often as they are included.
 _MOST_PARTS: Final = 10_000
 _MOST_OCTETS: Final = 64 * 1024 * 1024
 _INCLUDE: Final = "{http://www.w3.org/2004/08/xop/include}Include"

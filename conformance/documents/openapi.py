@@ -33,8 +33,8 @@ from conformance.transport.exchange import sendable
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
-# So many nodes of a document are copied for all its paths, and at least so many for each; what many refer to beyond
-# that is read once for all of them.
+# Nodes of a document that are copied for all its paths, and for each at least; schemas that many refer to are then read
+# once for all of them.
 _NODES_IN_ALL: Final = 500_000
 _FEWEST_NODES: Final = 100
 
@@ -376,8 +376,8 @@ def inside_prefix(contract: Contract, path: str) -> bool:
 
 # Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
 _IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
-# By these a server takes another method or target than the request line's, or sees another end of the request: they
-# would make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
+# Fields by which a server may take another method, target or end of the request than the request line says: they would
+# make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
 _STEERING: Final = re.compile(
     r"x-(?:http-?)?(?:method|verb)(?:-?override)?|(?:http-?)?method-?override"
     r"|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"

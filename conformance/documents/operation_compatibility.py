@@ -14,12 +14,12 @@ from conformance.documents.parameters import Parameter, by_media_type, read_enco
 from conformance.documents.schema_compatibility import schema_changes
 from conformance.documents.schema_sides import Side
 
-#: Whether it breaks a client, None if that is not known; and what changed.
+#: A change: whether it breaks a client (None if that is not known), and its text.
 Found = tuple[bool | None, str]
 _KINDS: Final = {"query": "query parameter", "header": "header", "cookie": "cookie", "path": "path parameter"}
 # Other keywords describe these (OpenAPI 3.1, 4.8.12.2).
 _IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
-# Styles in which a single value has something before it.
+# Styles that write something before a single value.
 _MARKED: Final = frozenset({"matrix", "label"})
 
 
@@ -286,7 +286,7 @@ def _called(parameter: Parameter) -> str:
     return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
 
 
-# What a client has to know of a scheme of each type.
+# What a client has to know of a security scheme, by its type.
 _KNOWN: Final = {"apiKey": ("in", "name"), "http": ("scheme",), "openIdConnect": ("openIdConnectUrl",)}
 # A credential as a client knows it, with its scopes; several are needed together.
 _Alternative = dict[tuple[str, ...], frozenset[str]]
@@ -371,7 +371,7 @@ def _text(document: Schema, operation: Schema) -> str:
 
 
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
-# An operation below one of its servers, by what a client sends.
+# An operation as a client addresses it: method and path below the server.
 _Key = tuple[str, str]
 
 

@@ -26,13 +26,13 @@ VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The grammar of numbers in paths and queries; integers have no fraction.
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _INTEGER: Final = re.compile(r"[+-]?\d+", re.ASCII)
-# Texts that no reader takes for a number: nothing, or a letter where a number has none.
+# Texts that no reader takes for a number: the empty text, or a letter where a number has none.
 _NO_NUMBER: Final = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
-# Texts that some frameworks take for a boolean, and for null.
+# Texts of booleans; texts that some frameworks take for a boolean, and for null.
 _BOOLEANS: Final = {"true": True, "false": False}
 _NEAR_BOOLEANS: Final = frozenset({"", "1", "0", "yes", "no", "on", "off", "t", "f", "y", "n"})
 _NULLS: Final = frozenset({"", "null"})
-# Digits of an integer that no bound reaches.
+# Digits of an integer that is beyond every declared bound.
 _BEYOND_EVERY_BOUND: Final = 40
 _SCALARS: Final = frozenset({"string", "number", "integer", "boolean"})
 _ENCODED: Final = re.compile(r"%(?![0-9A-Fa-f]{2})")
@@ -285,7 +285,7 @@ def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
 # A verdict, and why it is so.
 Said = tuple[str, str]
 _Value = TypeVar("_Value", str, "Part")
-# With these, what a field may be depends on other fields.
+# Keywords that make the value of one field depend on others.
 _JOINT: Final = frozenset({"anyOf", "oneOf", "not", "if", "minProperties", "maxProperties", "patternProperties"})
 
 

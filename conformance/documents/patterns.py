@@ -21,10 +21,10 @@ from typing import Any, Final
 import jsonschema_rs
 import regress
 
-# Seconds that one match in the worker may take, and the steps that are tried without it: some hundredths of a second.
+# Seconds that one match in the worker may take; steps that are tried without it: some hundredths of a second.
 _SECONDS: Final = 2.0
 _MOST_STEPS: Final = 200_000
-# What ECMA-262 and Rust read alike: literals, groups, quantifiers, and classes without brackets or && in them.
+# Pattern syntax that ECMA-262 and Rust read alike: literals, groups, quantifiers, classes without brackets or &&.
 _ESCAPE: Final = r"\\[dDwWntrfv\-.^$*+?()\[\]{}|/\\]"
 _CLASS: Final = rf"\[\^?(?:{_ESCAPE}|[^\\\[\]&~\-]|(?<!-)-(?!-))+\]"
 _PLAIN: Final = re.compile(
@@ -199,7 +199,7 @@ def _matches_in_time(pattern: str, source: str, flags: str, text: str) -> bool:
     return _THE_WORKER.matches(pattern, source, flags, text)
 
 
-# The letters of these many code points stand for those of a class that Python does not have.
+# Code points below this stand for a class that Python does not have; ranges of such a class at most.
 _LAST: Final = 0x2000
 _MOST_RANGES: Final = 40
 _PYTHON_PART: Final = re.compile(

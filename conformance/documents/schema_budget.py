@@ -11,37 +11,37 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 
-# So many schemas may bind one value at once, by allOf, anyOf, oneOf, not, if, then, else and references.
+# Schemas that may bind one value at once, by allOf, anyOf, oneOf, not, if, then, else and references.
 _MOST_AT_ONCE: Final = 5_000
-# The smallest value of a schema may have so many parts: members, items and characters.
+# Parts of the smallest value of a schema: members, items and characters.
 _LARGEST: Final = 1_000_000
-# Each value of these is a request of its own where it is sent.
+# Values that may stand in these keywords: each is sent in a request of its own.
 _MOST_VALUES: Final = {"enum": 50_000, "examples": 10_000}
-# So many references may follow each other, and so often schemas are looked at again.
+# References that may follow each other; times that schemas are looked at again.
 _DEEPEST: Final = 60
 _MOST_STEPS: Final = 50_000
-# A pattern may have so many characters, and quantifiers within quantifiers may repeat so often.
+# Characters of a pattern; repeats of quantifiers within quantifiers.
 _LONGEST_PATTERN: Final = 20_000
 _MOST_REPEATS: Final = 10_000
-# The patterns of a document may have so many states together: some 50 bytes each in an automaton.
+# States of all patterns of a document, with some 50 bytes each in an automaton, and of one pattern.
 _MOST_STATES: Final = 3_000_000
 _STATES_OF_ONE: Final = 200_000
 _PART: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|\{(\d{1,9})(?:,(\d{0,9}))?\}|.", re.DOTALL)
 _SCHEMAS: Final = frozenset({"schema", "schemas", "definitions", "example", "value"})
 _SHOWN: Final = 60
-# Objects of a description, outside of its schemas, that a request or a response is made of; each may have so many.
+# Budget of the objects outside of schemas that make up a request or a response, by name.
 _CROWDS: Final = {
     "paths": 10_000, "parameters": 1_000, "responses": 1_000, "content": 1_000, "headers": 1_000, "callbacks": 1_000,
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
-# Words, such as names, addresses and patterns, have at most so many characters, and what stands in addresses as well.
+# Characters of a word, such as a name, address or pattern.
 _LONGEST_WORD: Final = 100_000
 _FOR_PEOPLE: Final = frozenset({"description", "summary", "title", "$comment"})
 _VALUES: Final = frozenset({"example", "examples", "default", "value", "enum", "const", "pattern"})
 _IN_ADDRESSES: Final = frozenset({"parameters", "servers", "headers"})
-# A generator that follows each reference walks through so many parts, so many references deep. It makes cases of each,
-# with all the others in them, so its time grows with the square. GitHub's largest operation has 900 parts.
+# Budget of generators that follow every reference: parts, references deep. They make cases of each part with all others
+# in it, so time grows with the square. GitHub's largest operation has 900 parts.
 _MOST_UNROLLED: Final = 10_000
 _MOST_BESIDE: Final = 1_000
 _UNROLLED_DEEPEST: Final = 8

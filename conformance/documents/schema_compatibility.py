@@ -32,7 +32,7 @@ _GROUPS: Final = (
     ("dependentSchemas",), ("propertyNames",), ("not",), ("if", "then", "else"),
 )  # fmt: skip
 _MEMBERS: Final = ("properties", "patternProperties", "additionalProperties")
-# Words that say nothing without those of other places.
+# Keywords that mean nothing without those of other places.
 _WIDE: Final = ("unevaluatedProperties", "unevaluatedItems")
 
 

@@ -167,7 +167,7 @@ _BESIDE_REFERENCE: Final = frozenset({"$ref", "nullable"})
 _OF_2020: Final = ("https://json-schema.org/draft/2020-12/", "https://spec.openapis.org/oas/3.")
 # A vendor's extension, whose content is no part of the description.
 _EXTENSION: Final = re.compile(r"(?<!/headers)(?<!/schemas)(?<!/properties)(?<!/definitions)/x-(?!roaas-files/)")
-# As many places of one word are named.
+# Places that are named for one word.
 _PLACES: Final = 20
 
 

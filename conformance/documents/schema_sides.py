@@ -20,7 +20,7 @@ MANY: Final = ("allOf", "anyOf", "oneOf", "prefixItems")
 NAMED: Final = ("properties", "patternProperties", "dependentSchemas")
 #: Words that no validator judges, though they say what a value means.
 OPAQUE: Final = ("contentMediaType", "contentEncoding", "contentSchema", "xml")
-#: The schema of a member that is not sent in this direction: it may be anything.
+#: The schema of a member that is not sent in this direction: it allows any value.
 UNSENT: Final[Schema] = {"readOnly": True}
 _PLAIN: Final = frozenset(
     {
@@ -35,7 +35,7 @@ _RANGES: Final = {
     "int8": (-128, 127), "uint8": (0, 255), "int16": (-(2**15), 2**15 - 1), "uint16": (0, 2**16 - 1),
     "uint32": (0, 2**32 - 1), "uint64": (0, 2**64 - 1),
 }  # fmt: skip
-# Formats that every value of the type has; JSON's numbers are doubles here.
+# Formats that every value of the type has; JSON numbers are doubles here.
 _WITHOUT_MEANING: Final = frozenset({"double", "password", "binary"})
 
 

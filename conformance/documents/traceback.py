@@ -8,10 +8,10 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 from conformance.transport.exchange import Exchange, Request
 
-# As much of a body is looked through, octets.
+# Octets of a body that are searched.
 _LOOKED_THROUGH = 200_000
 _SHOWN = 120
-# What a text that a response repeats may have lost or got: escapes of JSON, and a full stop of the sentence around it.
+# What a repeated text may have lost or gained in a response: JSON escapes, and a full stop after it.
 _ESCAPED = re.compile(r"\\([\\\"/])")
 _END = " .,;:!"
 # What error pages of the usual languages and frameworks look like.

@@ -20,7 +20,7 @@ from conformance.documents.xsd_assembly import SchemaDocument, resolved
 Fetch = Callable[[str], bytes]
 # Returns the location of the schema of a namespace; empty if it knows none.
 Locate = Callable[[str], str]
-# More documents than this are no description of a robot, but a robot that keeps its reader busy.
+# Documents of one description at most. A robot that refers to more keeps its reader busy.
 _MOST: Final = 50
 _HEAD: Final = 1000
 _SHOWN: Final = 80
@@ -186,7 +186,7 @@ class SchemaFolder:
         return next((str(path) for path, own in self._files.items() if own == space), "")
 
 
-# How libxml2 and xmlschema call content models that break the rule of unique particle attribution.
+# Words in the errors of libxml2 and xmlschema for content models that break unique particle attribution.
 _AMBIGUOUS: Final = ("determinist", "Unique Particle Attribution")
 
 

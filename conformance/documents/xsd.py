@@ -21,9 +21,9 @@ from conformance.documents.xsd_assembly import Component, SchemaDocument, assemb
 from conformance.documents.xsd_shapes import Element, shape
 
 _SHOWN: Final = 300
-# So deep may the groups of a type lie in each other, those of its base types included.
+# Depth of the groups of a type, with those of its base types.
 _DEEPEST: Final = 400
-# How xmlschema compiles, in turn: as XSD 1.0, as XSD 1.1, and in spite of errors, which are recorded.
+# How xmlschema compiles, in this order: as XSD 1.0, as XSD 1.1, and in spite of errors, which are recorded.
 _WAYS: Final = (("XMLSchema10", "strict"), ("XMLSchema11", "strict"), ("XMLSchema10", "lax"))
 
 
@@ -178,17 +178,17 @@ def _without_slow_patterns(folder: Path) -> bool:
     return found
 
 
-# The compilers build an automaton for each type, of a size that may be the square of its particles; a group counts as
-# often as it is referred to, and a base type for each type that is derived from it.
+# Particles of a type: a compiler's automaton may have the square of their number. A group counts as often as it is
+# referred to, and a base type for each type that is derived from it.
 _MOST_PARTICLES: Final = 1_000
-# The squares of all types together: some 100 bytes and two microseconds each.
+# Sum of these squares over all types: some 100 bytes and two microseconds each.
 _MOST_SQUARES: Final = 20_000_000
-# A group is unrolled as often as it occurs at least, in nearly 40 kB for each particle.
+# Particles of a group times its minOccurs: compilers unroll it, in nearly 40 kB for each.
 _MOST_UNROLLED: Final = 10_000
-# So many components may each refer to the next one: compilers follow them by recursion.
+# Components that may each refer to the next one: compilers follow them by recursion.
 _MOST_CHAINED: Final = 150
 _LONGEST_PATTERN: Final = 5_000
-# Groups, quantifiers and alternatives of a pattern: time grows with their cube; and of all patterns together.
+# Groups, quantifiers and alternatives of one pattern (time grows with their cube), and of all patterns.
 _MOST_OPERATORS: Final = 900
 _MOST_OPERATORS_OF_ALL: Final = 20_000
 _OPERATOR: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|([(*+?{|])", re.DOTALL)

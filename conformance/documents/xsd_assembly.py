@@ -29,7 +29,7 @@ _NAMED: Final = {
     "substitutionGroup": "element",
 }
 _XML: Final = "http://www.w3.org/XML/1998/namespace"
-# Numbers of occurrences beyond it make libxml2's automata larger than any memory.
+# Numbers of occurrences beyond this make libxml2's automata larger than any memory.
 _MANY: Final = 1000
 
 

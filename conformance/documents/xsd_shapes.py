@@ -15,9 +15,9 @@ from conformance.documents.xsd_assembly import UNKNOWN
 if TYPE_CHECKING:
     from lxml import etree
 
-# So many elements of one message are read; types that hold one another in many ways would be read without end.
+# Elements of one message that are read: types that contain each other could be read without end.
 _MOST: Final = 20_000
-# So many elements a request may have.
+# Elements that a request may have.
 _LARGEST: Final = 100_000
 
 

@@ -29,7 +29,7 @@ from conformance.verdict.run import Run
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
-# On a check whose reason to be skipped is recorded already, such as an earlier check that failed for what it met.
+# Marks a check whose reason to be skipped is recorded already, such as an earlier check that met the same failure.
 _TOLD_BEFORE: pytest.StashKey[bool] = pytest.StashKey()
 
 

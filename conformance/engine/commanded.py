@@ -15,7 +15,7 @@ _TURNS: Final = re.compile(
     r"angular|angle|yaw|roll|pitch|turn|rot|theta|omega|heading|azimuth|orientation|\b[rw][xyz]\b|pan|tilt|joint",
     re.IGNORECASE,
 )
-# What a moment, a count or an id says is no axis.
+# Names of numbers that are no axis: times, counts and ids.
 NO_AXIS: Final = re.compile(
     r"^(?:n?anosec|nsec|sec|secs|stamp|timestamp|time|seq|sequence|id|uid|number|count|index|version|covariance"
     r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$|uuid$|number$|index$",
@@ -24,7 +24,7 @@ NO_AXIS: Final = re.compile(
 _ID: Final = re.compile(r"[a-z0-9]I[dD]$")
 _DEPTH: Final = 6
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
-# Of the declared limit a robot is driven at that part; without limits, in rad and in m.
+# The share of the declared limit at which a robot is driven; without limits, rad and m.
 _PART, _TURN, _WAY = 0.1, 0.1, 0.05
 
 

@@ -10,9 +10,9 @@ from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import NoValueError, angle_of
 from conformance.statement.motion_map import Angle
 
-# Budget of one document: so deep, so many numbers, so many members of one list.
+# Budget of one document: depth, numbers, items of one list.
 _DEEP, _MANY, _LISTED = 8, 400, 24
-# So far from 1 is the length of what is no quaternion.
+# A quaternion's length differs from 1 by less than this.
 _UNIT: Final = 0.02
 #: Stands between the pointer of a quaternion and the angle that is meant.
 ANGLE: Final = "#"

@@ -32,11 +32,11 @@ _MOST_NUMBERS, _MOST_READS = 8, 6
 _STATE: Final = re.compile(
     r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle", re.IGNORECASE
 )
-#: What a device repeats of its commands is no measurement.
+#: Names of values that repeat commands, which are no measurement.
 ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
 _STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
 _DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
-#: A robot is kept that near to where it is, m; a fast one as near as it comes in so many s.
+#: A robot is kept this near to its place, m; a fast one as near as it gets in this time, s.
 ROOM_M, ROOM_S = 0.5, 1.5
 #: Statuses by which an operation declares that it refuses an invalid request.
 REFUSED: Final = frozenset({"400", "422", "4XX", "4xx"})

@@ -24,24 +24,24 @@ from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
-# Of a schema, as many fields, levels and objects are read; a comment names so many ends of the graph.
+# Budget of a schema: fields, depth, objects; ends of the graph that a comment names.
 _LEAVES: Final = 500
 _DEPTH: Final = 8
 _PLACES: Final = 50
 _NAMED: Final = 3
-# A type with fewer fields is not known by them.
+# A type with fewer fields than this is not recognized by them.
 _FEW: Final = 4
-# A read, and all of them; what is on the graph is found so soon; nothing more came for so long, s.
+# Time for a read, for all reads, for discovery of the graph, and without news before it counts as complete, s.
 _READ_S: Final = 3.0
 _READS_S: Final = 60.0
 _DISCOVERY_S: Final = 15.0
 _SETTLES_S: Final = 1.0
-# What each node has, and parts of actions.
+# Names that every node has on the graph, and the parts of actions.
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
-#: How words for the states of a goal begin, and the numbers of action_msgs/msg/GoalStatus.
+#: Beginnings of words for the states of a goal, with the numbers of action_msgs/msg/GoalStatus.
 _STATES: Final = {
     "running": r"run|exec|activ|accept|pend|work|cancell?ing|[123]$",
     "succeeded": r"succe|done|compl|finish|4$",

@@ -17,9 +17,9 @@ from conformance.scenarios.scenario import NotPossibleError
 
 # How long the device is watched before and after a little move, and how long it has for that, s.
 _BEFORE_S, _MOVES_S = 0.25, 3.0
-# No further axis is tried after so long, s.
+# No further axis is tried after this time, s.
 _BUDGET_S: Final = 16.0
-# Of a little: so much is tried, and so far off an axis may end, or another one may go with it.
+# Shares of a small move that are tried; share by which an axis may miss its target, or another one may move along.
 _PARTS, _FOLLOWS = (0.2, 1.0), 0.15
 
 

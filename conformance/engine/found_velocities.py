@@ -16,14 +16,14 @@ from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
 
-# How long a velocity is driven, kept up every so many s, and how long the device is watched before and after, s.
+# How long a velocity is driven, how often it is renewed, how long the device is watched before and after, s.
 _DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
-# Nothing is sent for so long at most to see whether the device stops by itself, s; it rests when it did so long.
+# How long at most nothing is sent, to see whether the device stops by itself; how long it must rest to count, s.
 _LET_GO_S, _SURE_S = 3.0, 0.5
 # How many units of a position are one m or one rad.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
-# Beyond this factor one rate is none of the other's kind.
+# Rates that differ by more than this factor are of different kinds.
 _OTHER: Final = 4.0
 _ROOM_RAD: Final = 3.0
 

@@ -15,7 +15,7 @@ from typing import Final
 from conformance.commandline.endings import ended_by, ending_signals
 from conformance.verdict.run import Run
 
-# So long after KeyboardInterrupt was raised, further signals are only recorded: the checks are being left, s.
+# Time after KeyboardInterrupt in which further signals are only recorded, because the checks are being left, s.
 _LEAVES_S: Final = 2.0
 
 

@@ -27,21 +27,21 @@ from conformance.verdict.run import Run
 _CRASH: Final = "robustness/no-crash"
 _HANG: Final = "robustness/no-hang"
 _SOAP: Final = "soap/answered"
-# How long a lost device is waited for by default: one that a supervisor restarts, and one that a command restarts, s.
+# Default wait for a lost device: one that a supervisor restarts, and one that a command restarts, s.
 _RETURN_S: Final = 20.0
 _RESTART_S: Final = 60.0
-# How many requests look for the smallest one, and for how long, s; and how many requests before it are sent with it.
+# Requests that the search for the smallest one may take; its time, s; earlier requests that are sent with it.
 _SENDS: Final = 30
 _LOOKING_S: Final = 120.0
 _BEFORE: Final = (1, 3, 7)
-# A device that has answered its last request may need a moment to die of it, s.
+# A device may crash this long after it has answered its last request, s.
 _DYING_S: Final = 0.3
-# A device that is lost more often than this is not waited for again.
+# A device that is lost more often than this is not awaited again.
 _MOST_LOSSES: Final = 5
 # Requests before the last one that the finding names.
 _NAMED: Final = 5
 _HANGS: Final = frozenset({NoAnswer.TIMEOUT, NoAnswer.GATEWAY_TIMEOUT})
-# Only a request that was sent can have been one too many.
+# Outcomes of a request that may have been the last straw: it was sent.
 _SUSPECT: Final = frozenset({NoAnswer.CLOSED, NoAnswer.TIMEOUT, *OF_GATEWAY.values()})
 
 

@@ -25,7 +25,7 @@ QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
     "Does it refuse what is beyond its limits?": ("beyond-limits", "refused-still"),
 }
 _BROKEN: Final = frozenset({"fail", "warn"})
-# Of its velocity: a device that was let go, and moves at that part of it, drives on.
+# A released device that still moves at this share of its velocity drives on.
 _DRIVES_ON: Final = 0.5
 _LONG: Final = 240
 _NO_LIMITS: Final = "no limits are declared that are refused"

@@ -19,11 +19,11 @@ from conformance.verdict.finding import counted
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-# A line at least this often, s.
+# Longest time between two lines, s.
 _OFTEN_S = 2.0
 # Columns of the bar alone, and of the bar with brackets, counts and blanks.
 _BAR, _BEFORE_TEXT = 24, 42
-# What a requirement that is not met is called, by its level; what a robot may do and does not is no failing of its.
+# Words for a requirement that is not met, by level; what a robot MAY do is no failure.
 _WORDS = {Level.MUST: "fail", Level.SHOULD: "warn"}
 
 

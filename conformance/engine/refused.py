@@ -20,7 +20,7 @@ from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Re
 from conformance.verdict.finding import Finding, counted
 from conformance.verdict.run import Run
 
-# What a SOAP fault says of the same (WS-Security 12, ONVIF Core 5.11.2.2).
+# Codes of a SOAP fault for wrong credentials (WS-Security 12, ONVIF Core 5.11.2.2).
 _FAULT: Final = re.compile(rb"FailedAuthentication|FailedCheck|InvalidSecurityToken|NotAuthorized")
 _EXPIRED: Final = frozenset({401, 403, 407})
 _ERRORS: Final = 400

@@ -36,19 +36,19 @@ from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeLimit
 
-# A pause between two requests is kept, as what is judged may be what comes after it; never longer than this, s.
+# Longest pause between two requests that is kept, s: the judged effect may need the pause.
 _LONGEST_PAUSE_S = 10.0
-# A replay sends requests for at most this time; as much longer as these take, with the recorded pauses, each; and never
-# for longer than the last, s.
+# A replay sends for the first time at most, with the second for each recorded request in addition, and never longer
+# than the last, s.
 _LEAST_S, _EACH_S, _MOST_S = 60.0, 2.0, 1800.0
 _BY_JUDGEMENT = "as in the run"
 _BY_STATUS = "by the status"
 _BY_SILENCE = "by the missing response"
 _ALONE = "from the request alone: give --statement, so that the requirement's own checks judge the device"
-# By these a gateway says that the device is away, or the device that it will not say now.
+# Statuses by which a gateway says that the device is away, or the device that it cannot answer now.
 _AWAY = frozenset({502, 503, 504})
 _SERVER_ERROR = 500
-# As much of the text on a missing response says of which kind it was.
+# Characters of the text on a missing response that say of which kind it was.
 _ALIKE = 20
 
 

@@ -38,7 +38,7 @@ from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
 
-# Octets of one request in a result, compressed; and as they are sent: twice the contract's limit and a half.
+# Octets of one request in a result, compressed; octets that are sent for one, and for all.
 _MOST = 64 * 1024
 _MOST_SENT = 25 * 1024 * 1024
 _MOST_IN_ALL = 4 * _MOST_SENT
@@ -48,7 +48,7 @@ _TARGET = re.compile(r"https?://[\x21-\x7e]+")
 _VALUE = re.compile(r"[^\x00\r\n]*")
 # Fields that the client writes itself.
 _OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
-# How often a finding's request is sent again, and for how long in all: the first of each requirement before others, s.
+# Times that a finding's request is sent again; time for all, s: the first finding of each requirement is first.
 _TIMES = 5
 _LONGEST_S = 8.0
 

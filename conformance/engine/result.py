@@ -27,10 +27,10 @@ from conformance.verdict.verdicts import ClassValue, Value, Verdict, overall, ve
 
 RESULT_FORMAT = "roaas-result/1"
 RESULT_NAME = "result.json"
-# As much of a body as a reader looks at; its length is always told.
+# Characters of a body that the result keeps; its length is always given.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
-# Of the operations of one finding, as many have a command of their own, if it is no longer than this.
+# Operations of one finding that get a command, and characters of such a command.
 _COMMANDS = 30
 _SHORT_CURL = 2000
 _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")

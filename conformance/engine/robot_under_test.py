@@ -33,15 +33,15 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
 from conformance.verdict.run import Run
 
-# How long a robot that stopped answering is given to come back before the rest of the run is called off, s.
+# How long a robot that stopped responding has to come back before the rest of the run is called off, s.
 _GRACE_S = 3.0
-# A robot that answers slowly gets longer, as many answers.
+# A slow robot gets the time of this many responses.
 _GRACE_ANSWERS = 10
-# How many answers tell how fast a robot usually is, and how many do where all of them would take longer than this, s.
+# Responses that show how fast a robot usually is; the fewest, if all would take longer than this, s.
 _LOOKS = 11
 _FEWEST_LOOKS = 5
 _LOOKING_S = 1.0
-# Who looks on is told what is waited for after so long, s.
+# The user is told what the run waits for after this time, s.
 _SILENT_S = 2.0
 
 

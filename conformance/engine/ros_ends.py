@@ -16,7 +16,7 @@ from conformance.verdict.finding import Finding
 _DOES: Final = {
     "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to", "lists": "lists",
 }  # fmt: skip
-#: Of these, what is expected is what the web said, and what was observed is what ROS saw.
+#: Requirements for which the web's value is the expected one, and ROS's the observed one.
 _SEEN_ON_ROS: Final = frozenset(
     f"{ROS}/{name}"
     for name in (

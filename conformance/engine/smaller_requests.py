@@ -10,7 +10,7 @@ from conformance.transport.exchange import Request
 
 # Fields without which a body is not read at all, or that the client adds to each request.
 _KEPT: Final = frozenset({"host", "accept", "content-type", "content-length", "connection"})
-# A text longer than this may be as harmful at half its length.
+# A text longer than this is also tried at half its length.
 _LONG: Final = 64
 
 

@@ -12,7 +12,7 @@ from conformance.contract.generic import generic_ledger
 
 _FORMAT: Final = "roaas-result/1"
 _SHOWN: Final = 300
-#: What a file of the right types may yet raise, as one whose description contradicts itself.
+#: Exceptions that a result file of the right types may still raise, for example if its description contradicts itself.
 MALFORMED: Final = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 
 

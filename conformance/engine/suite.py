@@ -31,7 +31,7 @@ JUDGING = (
     "rules",
     "engine",
 )
-# What of a pack only its self-test uses: folders, and the module that names them.
+# Folders of a pack that only its self-test uses, and the module that names them.
 _SELFTEST = {"mutants", "faulty_bodies", "independent_robots", "selftest.py"}
 
 

@@ -13,7 +13,7 @@ from conformance.statement.statement import StatementError, api_of, endpoints_of
 
 TIME_LIMIT_S = 3600.0
 """How long one robot may take where the file does not say, s."""
-# A name is a folder's name on every file system, and of no other meaning in a path.
+# A fleet name must be a valid folder name on every file system, and mean nothing else in a path.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LOG_NAME = "certify.log"
 RESULT_NAME = "result.json"
-# What a certification writes: of an earlier run nothing may stay that looks like this one's.
+# The files that a certification writes: those of an earlier run must not remain.
 _WRITTEN = (
     RESULT_NAME,
     LOG_NAME,
@@ -41,7 +41,7 @@ _WRITTEN = (
     "gl-*.json",
     "annotations.txt",
 )
-# A run that is told to end stops the robot, which is tried for 20 s, and writes what it has.
+# A run that is told to end stops the robot, for up to 20 s, and writes its result: it gets this long, s.
 _GRACE_S = 45.0
 _PROGRESS = re.compile(rb"(\d+/\d+) checks[^\n]*\n[^\n]*\Z")
 _SHOWN = 400
@@ -60,7 +60,7 @@ class Outcome(StrEnum):
     NOT_STARTED = "not-started"
 
 
-#: The exit code that each outcome would have by itself; a failure that a baseline accepts counts as none.
+#: The exit code of each outcome; a failure that a baseline accepts counts as none.
 EXIT_CODES = {
     Outcome.CONFORMANT: ExitCode.PASSED,
     Outcome.NOT_CONFORMANT: ExitCode.FAILED,

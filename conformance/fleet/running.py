@@ -10,7 +10,7 @@ from conformance.commandline.endings import ending_signals
 from conformance.commandline.help_pages import inert
 from conformance.fleet.member_run import MemberResult, MemberRun, Outcome, Stop
 
-# Who runs is told this often, s.
+# How often progress says which robots are being judged, s.
 _OFTEN_S = 10.0
 
 

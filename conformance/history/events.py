@@ -16,9 +16,9 @@ from conformance.commandline.given_files import read_octets
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.transport.passage import EyeState, Heard, Passage
 
-#: The version of what is written.
+#: Version of the file format.
 VERSION: Final = 1
-# Octets of a body that are kept; of a longer one, only its hash and length.
+# Octets of a body that are kept; of a longer one, only hash and length.
 _MOST_KEPT: Final = 1 << 20
 
 

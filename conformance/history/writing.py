@@ -25,9 +25,9 @@ from conformance.transport.passage import EyeState, Passage, Recorder
 HISTORY_NAME: Final = "history.jsonl.gz"
 _GZIP: Final = 31
 _FAST: Final = 1
-# Events are gathered for so long before they are written, s: all that can be lost.
+# Events are gathered this long before they are written, s: no more than these can be lost.
 _GATHERED_S: Final = 0.1
-# A history has at most so many octets on disk: ten times what a long run writes.
+# Octets of a history on disk: ten times what a long run writes.
 _MOST: Final = 512 << 20
 _LAST_S: Final = 60.0
 

@@ -9,16 +9,16 @@ from typing import Final, NamedTuple
 
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 
-# A number has responded that is so many standard deviations off, or by so much of itself.
+# A number has responded if it changed by this many standard deviations, and at least by this much.
 _FAR: Final = 6.0
 _LEAST: Final = 1e-6
-# What changes at rest by this part of the rate under way changes by itself, as a clock does.
+# A number that changes at rest by this share of its rate under way changes by itself, as a clock does.
 _BY_ITSELF: Final = 0.3
-# Of what it shows under way: at rest a velocity shows less.
+# Share of its value under way that a velocity may show at rest.
 _RESTS: Final = 0.3
-# The first part of a drive, in which a device gets to its velocity.
+# The first share of a drive, in which a device gets to its velocity.
 _RISES: Final = 0.4
-# Two drives tell the same if their ratios differ by less than this part.
+# Two drives agree if their ratios differ by less than this share.
 _ALIKE: Final = 0.4
 
 

@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import median
 from typing import Final, NamedTuple, Protocol
 
-#: So many samples tell: of three, one may be anything.
+#: Use the median of this many samples: one outlier cannot matter.
 SEVERAL: Final = 3
-#: A response is late that takes so many times as long as one usually does.
+#: A response is late if it takes this many times as long as usual.
 LATE: Final = 3
-# The standard deviation of normal noise, by the median distance from the median.
+# Converts the median distance from the median to the standard deviation of normal noise.
 _SIGMA: Final = 1.4826
-# Of a sample's noise: one in fifteen thousand is farther off than this, if the noise is normal.
+# Standard deviations of noise within which a sample lies: normal noise exceeds them once in fifteen thousand.
 FARTHEST: Final = 4.0
 
 Sample = tuple[float, float]

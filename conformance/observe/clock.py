@@ -52,7 +52,7 @@ class SimulatedClock:
         self.time_s += max(0.0, seconds)
 
 
-# A device that is always late does not get all the time in the world, s.
+# Longest time that is given back to a device that is always late, s.
 _MOST_GIVEN_BACK_S = 5.0
 
 

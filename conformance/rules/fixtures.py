@@ -34,9 +34,9 @@ from conformance.transport.exchange import Listener
 from conformance.verdict.evidence import Checker, CheckerListener
 from conformance.verdict.run import Run
 
-# So long the modules that later checks need are awaited, s.
+# Wait for the modules that later checks need, s.
 _PREPARES_S: Final = 30.0
-# What is imported late because few commands need it, and is needed later in a run; the second one in longer runs.
+# Modules that are imported late because few commands need them; the second one in longer runs alone.
 _NEEDED_LATER: Final = ("jsonschema", "schemathesis.specs.openapi")
 
 

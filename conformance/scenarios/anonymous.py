@@ -21,9 +21,9 @@ from conformance.scenarios.writing import Writer
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
-# What may be said of the thing before the credentials are looked at.
+# Statuses about the thing that a device may send before it looks at the credentials.
 _UNDECIDED: Final = frozenset({404, 409, 410})
-# So many operations of a slow device are sent without credentials on a connection that has carried some.
+# Operations of a slow device that are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
 
 

@@ -29,18 +29,18 @@ from conformance.scenarios.whole_list import WholeList, read_whole
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
-# So many filters are looked at.
+# Filters that are looked at.
 _FILTERS: Final = 2
 _MOST_ITEMS: Final = 1000
 _ACCEPTED: Final = 202
-# By these words a description says that it counts what is there now, and what there ever was.
+# Texts of a description that say that it counts what is there now, and what was ever there.
 _NOW: Final = re.compile(
     r"\b(?:how many|number of)\b[^.]*\b(?:have|has|are|is|currently|now|with|in|on)\b", re.IGNORECASE
 )
 _EVER: Final = re.compile(
     r"\b(?:ever|total|so far|since|was|were|been|had|not|only|except|without|handled|processed)\b", re.IGNORECASE
 )
-# As a text, the first is greater than the second one.
+# Numbers that sort the other way as texts.
 _NUMBERS: Final = (9, 10)
 
 

@@ -11,13 +11,12 @@ from conformance.api.rest.variations import Variation, odd_variations, together,
 from conformance.documents.openapi import Operation
 from conformance.verdict.effort import Effort
 
-# At standard effort, of one operation: valid, invalid and odd requests; and at least so many of each at quick.
-# Of so many requests of one kind the sent ones are drawn: schemas that refer to each other in many ways make millions.
+# Requests of one operation at standard effort: drawn cases, and valid, invalid and odd ones at most and at quick. They
+# are drawn, because schemas that refer to each other can make millions.
 _CASES: Final = 400
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
 _LEAST: Final = {"valid": 40, "invalid": 28, "odd": 12}
-# Valid requests of an operation that changes something: each leaves something behind. With several members at once each
-# value is tried in few requests.
+# Valid requests of an operation that changes something, because each leaves something behind.
 _ACTING: Final = 12
 #: An operation that once took more than a second gets this part of the requests.
 SLOW_SHARE: Final = 4

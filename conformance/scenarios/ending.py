@@ -34,9 +34,9 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# So many operations of a thing begin something, and so many kinds of things are looked at.
+# Operations of a thing that begin something; kinds of things that are looked at.
 _BEGINNING, _KINDS = 2, 3
-# By these words a description says that 409 is for what is in use.
+# Texts of a description that say that 409 is for things that are in use.
 _IN_USE: Final = re.compile(
     r"\b(?:in use|while|empty|refer|contain|assign|attach|link|need|depend|belong|stand|used|uses|has|have)",
     re.IGNORECASE,

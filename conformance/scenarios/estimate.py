@@ -25,24 +25,25 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
 
-# Of the cases that Schemathesis is asked for, it makes about this share: some are alike, some cannot be sent. It covers
-# an operation by about so many cases for each parameter or member of the body.
+# Schemathesis makes about this share of the requested cases: some are alike, some cannot be sent. It covers an
+# operation by about this many cases for each parameter or body member.
 _MADE: Final = 0.7
 _COVERING: Final = 15
-# The checks of HTTP use up to so many operations, each with about so many requests; and each operation is sent OPTIONS.
+# Operations that the checks of HTTP read; requests for each; other requests; those with a slow device. OPTIONS is sent
+# to every operation.
 _READS: Final = 8
 _EACH_READ: Final = 18
 _HTTP: Final = 90
 _HTTP_SLOW: Final = 40
-# For each of those, so many reads use one connection at standard, at least so many in all, and so many with a slow
-# device; and several clients at once read so often at standard.
+# Reads on one connection for each of these operations at standard, in all at least, and with a slow device; reads of
+# several clients at standard.
 _ON_ONE_CONNECTION: Final = 60
 _LEAST_ON_ONE: Final = 120
 _FEWEST: Final = 3
 _AT_ONCE: Final = 325
-# The first requests, which measure how fast the device answers; of a device without any to read, too.
+# First requests, which measure how fast the device responds, also of a device without reads.
 _FIRST: Final = 12
-# The time of the suite for a request, and for one that Hypothesis draws, ms; and for its start, s.
+# Time of the suite for a request, and for one drawn by Hypothesis, ms; for its start, s.
 _OWN_MS: Final = 0.5
 _DRAWN_MS: Final = 5.5
 _START_S: Final = 0.5
@@ -146,7 +147,7 @@ def _rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"
 
 
-# Each is sent so often: the quickest of them waited for nobody else.
+# Timed repeats of each: the quickest of them waited for no other request.
 TIMED_AGAIN: Final = 5
 
 

@@ -23,9 +23,9 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.transport.exchange import NoAnswerError, Outgoing
 
-# So many operations are tried, each after so many others.
+# Operations that are tried, and others that are tried after each.
 _HELD, _OTHERS = 6, 6
-# Operations after which a thing takes no other one.
+# Operations after which a thing allows no other one.
 _FINAL: Final = frozenset({"cancel", "abort", "stop", "end", "finish", "terminate"})
 
 

@@ -32,15 +32,15 @@ from conformance.scenarios.whole_list import read_whole
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
-# So many operations are tried; and the turn of bodies that no other check sends.
+# Operations that are tried; the turn of bodies that no other check sends.
 _OPERATIONS, _TURN = 6, 7100
-# A round needs so many keys: the first one, and a new one.
+# Keys of a round: the first one, and a new one.
 _KEYS: Final = 2
-# Members by which a response names what was made, whatever the client has sent.
+# Members in which a response identifies what was made, whatever the client sent.
 _IDS: Final = ("id", "uuid", "guid")
-# By these an operation says that it may refuse a key that came with another body.
+# Statuses by which an operation may refuse a key that came with another body.
 _REFUSALS: Final = frozenset({"409", "422"})
-# By these words a description says that a retry gets what came first, and that a refused request leaves its key free.
+# Texts of a description that say that a retry gets the first result, and that a refused request leaves its key free.
 _FIRST: Final = re.compile(
     r"\b(?:first|original|same|earlier|previous|stored) (?:answer|response|result|reply)\b", re.IGNORECASE
 )

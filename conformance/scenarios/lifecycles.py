@@ -33,17 +33,17 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
-# So many things of a collection are created: where nothing deletes them, at quick, and at the other efforts.
+# Things of a collection that are created: if nothing deletes them, at quick, and at the other efforts.
 _KEPT, _FEW, _MANY = 2, 3, 20
-# As many times an exploration's time the looks at one collection may take; less where a device is slow.
+# Multiples of an exploration's time that one collection may take; with a slow device.
 _BUDGETS, _SLOW_BUDGETS = 10, 3
-# So many operations of things are called.
+# Operations of things that are called.
 _ACTIONS: Final = 3
-# A thing is left alone for at most so long, s.
+# Longest time that a thing is left alone, s.
 _ALONE_S: Final = 6.0
-# So many clients create things at once; and the first turn of those.
+# Clients that create things at once; the first turn of their values.
 _CLIENTS, _AT_ONCE = 2, 110
-# The turns of changes, of refused requests, and of an identifier that is never created, so that their values differ.
+# Turns of changes, of refused requests, and of an identifier that is never created: their values differ.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99
 # Members that say when something was changed.
 _TIMES: Final = re.compile(r"(?:created|updated|modified|changed|timestamp|time|at|on|version|revision|etag)$")

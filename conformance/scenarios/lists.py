@@ -29,29 +29,29 @@ from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# So many pages are read one after another, and so many values of one parameter are sent: at quick, and else.
+# Pages that are read in a row; values of one parameter at quick, and at other efforts.
 _PAGES: Final = 4
 _VALUES: Final = {"quick": 8}
 _MOST_VALUES: Final = 12
-# So many of them are sent for a part of the list as well.
+# Those of these values that are also sent for a part of the list.
 _WITH_PART: Final = 6
-# As many times an exploration's time one list may take; one that once took more than a second, this part of it.
+# Multiple of an exploration's time that one list may take; a list that once took over a second gets this part of it.
 _BUDGETS: Final = 3
 _SLOW_SHARE: Final = 4
-# A fault counts that was seen twice in so many tries; the list was the same before and after, read so often.
+# Tries of a fault; those in which it must be seen; reads that must show the same list before and after.
 _TRIES: Final = 4
 _TWICE: Final = 2
 _STEADY: Final = 3
-# At a multiple of so many items a server may cut a list.
+# A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
-# Fewer items have no pages to compare.
+# Fewest items that make pages to compare.
 _FEWEST: Final = 2
-# So far beyond the end a part of a list is asked for, as far as the schema allows.
+# Offsets beyond the end of a list, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
-# A place whose clocks differ by so many hours from UTC.
+# Difference of a far place's clocks from UTC, h.
 _FAR_H: Final = 11
-# By these words a description says that the last page names no further one.
+# Texts of a description that say that the last page names no next one.
 _ENDS: Final = re.compile(
     r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
     re.IGNORECASE,

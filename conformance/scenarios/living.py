@@ -24,18 +24,18 @@ from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange
 
 ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
-# So many things are read after one step.
+# Things that are read after one step.
 _LOOKED: Final = 4
-# The states of things that end by themselves, and may be removed then.
+# States of things that end by themselves, and may then be removed.
 _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
 _STATES: Final = ("state", "status", "phase")
-# Members whose text depends on where it is read, and texts that are times.
+# Members whose text depends on the address of the read; texts that are times.
 _PLACES: Final = re.compile(r"(?:url|uri|href|link|links|self|path)$")
 _TIME: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _MANY: Final = 10
-# A collection that keeps the newest so many things drops the oldest.
+# Newest things that a collection keeps: then it drops the oldest.
 _RING: Final = 3
 
 

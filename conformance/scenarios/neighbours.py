@@ -21,15 +21,15 @@ from conformance.transport.exchange import Exchange, Outgoing
 
 #: No content has this entity tag.
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
-# As many values of an id are tried; and as many queries of one operation, and of all at quick.
+# Values of an id that are tried; queries of one operation; queries of all at quick.
 _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
-# Each operation is read after so many refusals at standard effort, and after two at quick.
+# Refusals before each read at standard effort; at quick two.
 _REFUSALS: Final = 8
-# Each operation has been read so often by then: with the timed reads at the end, one wrong response in twenty is met.
+# Reads of each operation: with the timed reads at the end, one wrong response in twenty is found.
 _READS: Final = 20 - TIMED_AGAIN
-# A content of so many octets has parts.
+# Octets of a content from which parts are requested.
 _LONG: Final = 8
-# Operations are read more often where the device usually responds in so many ms.
+# Usual response time below which operations are read more often, ms.
 _QUICK_MS: Final = 50.0
 _FEW_READS: Final = 2
 

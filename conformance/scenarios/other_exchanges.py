@@ -31,11 +31,11 @@ from conformance.verdict.time_limit import TimeIsOverError
 
 # Different responses that are kept, so that a long run needs no more memory.
 _MOST: Final = 2000
-# Things that are read at the end: by then even a slow device has them, or has them no more.
+# Things that are read at the end: by then even a slow device has created or removed them.
 _MOST_THINGS, _REMEMBERED = 40, 400
-# A device that acts later has so long, s: a little longer than the checkers wait.
+# A device may act this much later, s: a little longer than the checkers wait.
 _SETTLES_S: Final = 3.2
-# So many things are deleted at the end.
+# Things that are deleted at the end.
 _MOST_DELETED: Final = 10
 _DONE: Final = frozenset({200, 204})
 _ERRORS: Final = range(400, 500)

@@ -42,9 +42,9 @@ from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
-# So many members of a resource are written one by one.
+# Members of a resource that are written one by one.
 _MEMBERS: Final = 6
-# So many filters of a list are tried; a device may list for so long what was deleted, s, and is asked so often.
+# Filters of a list that are tried; time for which a device may list what was deleted, and pause between reads, s.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
 _PARTS: Final = ((("Range", "bytes=-2"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 _GONE_PLACE: Final = "path of what was deleted"
@@ -55,13 +55,13 @@ _FILES: Final = (
     bytes(range(256)) * 17 + b"\r\n\n \0end",
     b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
 )
-# As a client sends what it does not know the length of (RFC 9112 7.1).
+# How a client sends content of unknown length (RFC 9112 7.1).
 _IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
-# Texts of as many octets, with several ends of lines.
+# Texts of equal length in octets, with several kinds of line ends.
 _TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b"end" for word in ("one", "other"))
-# The turn of an identifier that no other check chooses.
+# The turn of an identifier that no other check uses.
 _TURN: Final = 98
-# So many are written one by one after all together, which shows whether the others stay.
+# Members that are written one by one after all together, to see whether the others stay.
 _SINGLES: Final = 4
 
 

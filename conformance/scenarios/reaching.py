@@ -15,9 +15,9 @@ from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Outgoing
 from conformance.verdict.time_limit import TimeIsOverError
 
-#: There is such a thing already, or the state forbids it.
+#: The thing exists already, or its state forbids the request.
 CONFLICT: Final = 409
-#: The device asks for a condition, or the one in the request does not hold.
+#: The device demands a condition, or the condition in the request does not hold.
 WANTS_CONDITION: Final = frozenset({412, 428})
 _IF_MATCH: Final = "if-match"
 _QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)

@@ -18,7 +18,7 @@ from conformance.transport.exchange import Exchange
 _TEXT: Final = "text/plain"
 #: A media type that no device has.
 NO_FORMAT: Final = "application/x.roaas-nothing"
-# The turns of the values in a series of requests are so far apart.
+# Distance between the turns of a series of requests.
 _STEP: Final = 10
 # Texts that no client but the suite writes, as `another` makes them.
 _OURS: Final = re.compile(r"(?:roaas |r)\d+")

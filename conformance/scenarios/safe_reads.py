@@ -33,13 +33,13 @@ from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 
-# In so many rounds a change has to show, after the first; and so many resources are watched.
+# Rounds after the first in which a change must show; resources that are watched.
 _ROUNDS, _WATCHED = 3, 12
-# What is left alone meanwhile is left alone for at least so long, s, and at most.
+# Shortest and longest time that resources are left alone, s.
 _LEAST_S, _MOST_S = 0.3, 5.0
-# The turn of the values that are written before them.
+# The turn of the values that are written first.
 _TURN: Final = 41
-# So many safe requests are sent one by one, to find the one that acts.
+# Safe requests that are sent one by one, to find the one that acts.
 _SINGLE: Final = 150
 
 

@@ -46,12 +46,12 @@ _KEEPING: Final = frozenset(
     }
 )
 _MOST_VALUES, _MOST_ITEMS = 5, 10
-# A part of a number that is no whole one.
+# Added to numbers that need not be whole, so that they have a fraction.
 _PART: Final = 0.375
-# So many members of one resource are written, at quick and at other efforts, and so many resources.
+# Members of one resource that are written at quick and at other efforts; resources.
 _FEW_MEMBERS, _MEMBERS, _RESOURCES = 4, 30, 6
 _ACCEPTED: Final = 202
-# As many times an exploration's time one resource takes; and so many other values of an object are tried.
+# Multiple of an exploration's time that one resource may take; other values of an object that are tried.
 _BUDGETS, _TURNS = 2, 3
 
 

@@ -28,18 +28,18 @@ from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
 from conformance.transport.reach import is_same
 
-# A value is awaited in steps of so long, s, and has to last a little longer than any that is judged.
+# Interval of reads while a value is awaited, s; time that it has to last: longer than any that is judged.
 _STEP_S: Final = 0.1
 _LASTS_S: Final = SETTLES_S + 0.4
-# All changes of one operation take at most so long, s.
+# Longest time for all changes of one operation, s.
 _BUDGET_S: Final = 12.0
-# Changes of one operation at quick and else; refusals of it; things that are created.
+# Changes of one operation at quick and at other efforts; refusals of it.
 _TURNS: Final = (6, 16)
 _REFUSALS: Final = 3
-# Values whose lasting is awaited: two, as what is read in place of a third one may be one of them.
+# Values that are watched for lasting: two, as a third one may be read in place of one of them.
 _LASTING: Final = 2
 _THINGS: Final = 3
-# Reads of each operation one after another, and how many there are in each of as many rounds at the same moment.
+# Successive reads of each operation; reads in each of as many simultaneous rounds.
 _READS: Final = (20, 60)
 _ROUNDS: Final = (6, 30)
 # Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.

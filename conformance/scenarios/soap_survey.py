@@ -31,20 +31,20 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from lxml import etree
 
-# In what an invalid message is wrong: what services differ in otherwise, such as the order, is not tried.
+# Faults of invalid messages that are tried: services differ on others, such as the order.
 _FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
-# Of one operation, at standard: invalid messages of each kind; and how often the usual one is sent.
+# Messages of one operation at standard: invalid ones of each kind; usual ones.
 _MOST: Final = 4
 _USUAL: Final = 6
 _REPEATED: Final = 2
-# One operation may take so long, s.
+# Longest time for one operation, s.
 _BUDGET_S: Final = 20.0
-# With a limit in time, all others than the usual messages end at this share of it: few other checks come after them.
+# With a time limit, all but the usual messages end at this share of it: few other checks follow.
 _SURVEY_SHARE: Final = 0.85
 _MANY: Final = 1000
-# So many values that the device gave are tried for one operation.
+# Values from the device that are tried for one operation.
 _TRIED: Final = 3
-# Messages that are wrong whatever the operation is; and invalid ones that a schema of usual size has.
+# Wrong messages for any operation; invalid messages that a schema of usual size yields.
 _WRONG: Final = 6
 _USUALLY_INVALID: Final = 4
 

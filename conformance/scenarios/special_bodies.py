@@ -23,12 +23,11 @@ from conformance.documents.representation import flat
 
 #: With an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and what other formats escape.
 TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
-# Parts of numbers that are no whole ones: of each member several are sent. One that needs all digits of a double, and
-# an integer that is none.
+# Fractions, several for each member; one that needs all digits of a double; an integer that is no double.
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
 _ALL_DIGITS: Final = 0.12345678901234
 _BEYOND_DOUBLES: Final = 2**53 + 1
-# So many members are removed by null, where a patch may.
+# Members that are removed by null, where a patch allows that.
 _NULLS: Final = 2
 _TIME: Final = "2026-02-{:02}T12:34:56+02:00"
 

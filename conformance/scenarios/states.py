@@ -17,13 +17,13 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.state_map import StateMap
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# Between two looks at the state; so long a state that was reached is watched, and one that a refusal left, s.
+# Interval of reads of the state; time that a reached state, and a state after a refusal, is watched, s.
 _PACE_S: Final = 0.03
 _STAYS_S: Final = 0.3
 _KEEPS_S: Final = 0.1
-# Where a state changes by itself, an operation may come too late for it, and is sent again so often.
+# Tries of an operation that comes too late for a state that changes by itself.
 _TRIES: Final = 3
-# So many times as many operations are sent as there are pairs of an operation and a state: some only lead elsewhere.
+# Operations that are sent for each pair of operation and state: some only lead to another state.
 _WAYS: Final = 4
 
 

@@ -40,42 +40,42 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from conformance.api.rest.generated import Target
 
-# So many parts of a request with several members are sent alone, where it is refused.
+# Parts of a refused request with several members that are sent alone.
 _MOST_PARTS: Final = 24
-# As many refused requests are tried again in other states, and in so many of them.
+# Refused requests that are tried again in other states; number of such states.
 _TRIED, _STATES = 3, 2
-#: At standard effort the usual request is sent and timed so often before the groups of others and after each: a failure
-#: in one call of twenty is met.
+#: At standard effort, timed sends of the usual request before the groups of others and after each: a failure in one
+#: call of twenty is found.
 TIMED: Final = 5
-# One of so many requests is the first on its connection.
+# One request in this many is the first on its connection.
 _FRESH: Final = 5
-# A device may have the run's deadline for its own work, and tell by a response that it is over: that is no hang.
+# A device may use the run's deadline for its own work, and then respond that it is over: that is no hang.
 _GRACE: Final = 1.25
-# How often a thing is created and deleted.
+# Times that a thing is created and deleted.
 _CYCLES: Final = 24
-# Statuses of an operation that is not there.
+# Statuses of an operation that does not exist.
 _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
-# Where a request has JSON with a charset, which means nothing (RFC 8259 11), so that nobody refuses it (RFC 2045 5).
+# A charset means nothing for JSON (RFC 8259 11), so no device should refuse it (RFC 2045 5).
 _CHARSET: Final = "header Content-Type"
-# Media types that hardly an API has, at quick the first of them.
+# Media types that hardly any API accepts; at quick the first.
 _OTHER_TYPES: Final = ("text/plain", "application/xml")
-#: Statuses by which a request is refused for what is in it, or for the thing's state.
+#: Statuses that refuse a request for its content, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
-# Those by which a device may refuse a second thing of one name, and the requests that ask for acceptance.
+# Statuses that may refuse a second thing of one name; requests that must be accepted.
 _DOUBTED: Final = frozenset({400, 409, 422})
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
-# What is judged of a request in the same way when it is generated: it need not be sent again.
+# Kinds of requests that are judged in the same way when they are generated: they need not be sent again.
 _JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
-# How often one request is sent again and again; and cases of Schemathesis, as many of each kind, of one operation.
+# Repeats of one request; fewest repeats; cases of Schemathesis of each kind, for one operation.
 REPEATS: Final = 200
 FEWEST_REPEATS: Final = 60
 COVERAGE: Final = 150
-# As many times an exploration's time one operation may take: one that answers slowly must not take the whole run.
+# Multiple of an exploration's time that one operation may take: a slow one must not take the whole run.
 _BUDGETS: Final = 3
 FUZZED: Final = 40
-# With a limit in time: the survey's others than the usual requests end at the first share of it, so that what every web
-# API is bound by is tried; the generated requests end at the second.
+# With a time limit, shares of it: the survey's requests beyond the usual ones end at the first, so that what binds
+# every web API is tried; the generated requests end at the second.
 SURVEY_SHARE: Final = 0.5
 _GENERATED_SHARE: Final = 0.85
 

@@ -29,10 +29,10 @@ from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 _CSV: Final = "text/csv"
-# A table may round what JSON has in full.
+# A table may round numbers that JSON shows in full.
 _NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}
 _LARGEST: Final = 1 << 20
-# So many things with texts in quotes are created, and by these words a description says what separates values.
+# Things with quoted texts that are created; texts of a description that say what separates values.
 _CREATED: Final = 2
 _COMMAS: Final = re.compile(r"RFC\s*4180|\bcommas?\b|`\w+(?:,\s?\w+)+`", re.IGNORECASE)
 # A table may shorten a text, or keep programs from reading it as a formula.

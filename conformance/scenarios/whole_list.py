@@ -23,7 +23,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 _PAGES: Final = 5
 _LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
-# Servers that have a limit and do not say so have round ones.
+# Servers with an undeclared limit have a multiple of the first, at least the second.
 _ROUND, _FEWEST = 5, 10
 
 

@@ -19,13 +19,13 @@ from conformance.documents.representation import flat
 from conformance.observe.clock import Patience
 from conformance.transport.exchange import Exchange, Outgoing
 
-# A device that writes later has so long, s; and it is read so often meanwhile.
+# Time in which a device may write later, and pause between reads, s.
 _SETTLES_S: Final = 3.0
 _PAUSE_S: Final = 0.2
-# What differs in the last so many reads is on its way, as a valve that moves is.
+# A value that differs in the last this many reads is still changing, as a moving valve does.
 _LAST: Final = 5
 _ACCEPTED: Final = 202
-# By these a device asks for a condition, or says that the one in the request does not hold.
+# Statuses by which a device demands a condition, or says that the one in the request does not hold.
 _WANTS_CONDITION: Final = frozenset({412, 428})
 _Read = TypeVar("_Read")
 

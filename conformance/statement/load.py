@@ -8,7 +8,7 @@ from msgspec import Meta
 from conformance.contract.toml_file import Positive, Text
 
 _MOST_WEIGHT = 1000
-#: What replaces the thresholds of load tests.
+#: What to write in place of the thresholds of earlier versions.
 LEVELS_INSTEAD = "write into the statement, for instance, [slo.pose] and below it p99_ms = 5"
 
 

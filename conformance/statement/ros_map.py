@@ -27,7 +27,7 @@ ServiceType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/srv/[A-Za-z]\w*$")]
 ActionType = Annotated[str, Meta(pattern=r"^[A-Za-z]\w*/action/[A-Za-z]\w*$")]
 
 
-#: Time for what a map gives no time for, s.
+#: Time that is allowed where a map declares none, s.
 _USUAL_S: Final = 5.0
 _PATIENT_S: Final = 30.0
 

@@ -100,9 +100,9 @@ class Judged(NamedTuple):
 
 # A host with a port or with a dot in its name, and perhaps a path.
 _ADDRESS: Final = re.compile(r"(\[[0-9a-fA-F:]+\]|[\w-]+(\.[\w-]+)*)(:\d{1,5}(/.*)?|/.*(openapi|swagger|wsdl|api).*)")
-# So many names of a folder are looked through for one that was meant.
+# Names in a folder that are searched for a similar one.
 _MOST_NAMES: Final = 1000
-# The options that only a robot without a description of its own has.
+# Options for a robot with the paper's contract alone.
 _PAPERS: Final = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 # The options that name a device, by their names in Python.
 _NAMES: Final = (

@@ -48,14 +48,14 @@ from conformance.transport.reach import Trust
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.
 Permit = Callable[[str, str], str]
-# An endpoint that has let this many deadlines pass within this time, s, is not asked until that is over: a hang costs
-# its deadline twice in that time at most, and a link that was gone twice in a long run is none.
+# An endpoint that let this many deadlines pass within this time, s, is not called until the time is over. A hang thus
+# costs two deadlines in it, and a link that failed twice in a long run does not count.
 _HANGS = 2
 _HANGS_WITHIN_S = 60.0
 _CHALLENGE = 401
-# A request that met the end of a kept connection is sent so often in all.
+# Times that a request is sent in all if it met the end of a kept connection.
 _ATTEMPTS = 2
-# The last requests that are kept.
+# Last requests that are kept.
 _RECENT: Final = 60
 _NOTHING_THERE: Final = 404
 _CRASHED: Final = "the server closed the connection without a response, and accepts no other connection"

@@ -23,25 +23,25 @@ from conformance.commandline.secret_file import read_secret
 from conformance.transport.exchange import IDEMPOTENT_METHODS, Response
 from conformance.transport.pace import time_for, time_to_arrive
 
-# An answer longer than this is no answer to any request of the contract, octets; nor is a longer header section.
+# Octets of a response, and of its header section, that are read: no contract needs more.
 _MAX_ANSWER: Final = 32 * 1024 * 1024
 _MAX_HEAD: Final = 100 * 1024
-# As much comes over the wire for one answer, with the sizes and extensions of its chunks, and as many interim answers.
+# Octets on the wire for one response, with the sizes and extensions of its chunks; interim responses.
 _MAX_WIRE: Final = 2 * _MAX_ANSWER
 _MAX_INTERIM: Final = 100
-# Octets that are handed to the network, and taken from it, at once.
+# Octets that are written to the network, and read from it, at once.
 _PIECE: Final = 256 * 1024
 _READ: Final = 64 * 1024
 # Idle connections that are kept, and for how long, s: servers close them after five at the earliest.
 _KEPT: Final = 2
 _EXPIRY_S: Final = 3.0
 _SWITCHING_PROTOCOLS: Final = 101
-# Media types of bodies that never end; as much of one is read, octets and s, and as much of any other body.
+# Media types of bodies that never end; octets and seconds of one that are read, and octets of any other body.
 _STREAMS: Final = ("text/event-stream", "multipart/x-mixed-replace", "video/", "audio/")
 _STREAM: Final = 64 * 1024
 _STREAM_S: Final = 1.0
 _DOWNLOAD: Final = 4 * 1024 * 1024
-# A reset follows the data that nobody reads within this time on a network nearby, ms.
+# Time in which a reset follows data that nobody reads, on a network nearby, ms.
 _RESET_MS: Final = 50
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 

@@ -26,12 +26,12 @@ from conformance.commandline.secret_file import read_secret
 if TYPE_CHECKING:
     from conformance.transport.digest import DigestUser
 
-# A shorter secret is not looked for in responses: it would be found everywhere.
+# Shorter secrets are not searched for in responses: they would be found everywhere.
 _SHORTEST: Final = 4
-# Other cookies than the session's are words, as in theme=dark.
+# Shorter values of other cookies are words, as in theme=dark, and are not masked.
 _SHORTEST_IN_COOKIE: Final = 8
 _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
-# The head of a request, and in it what answers a challenge (RFC 7616 3.4).
+# The head of a request, and the response to a challenge in it (RFC 7616 3.4).
 _REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
 _ANSWER: Final = re.compile(r"(Authorization: Digest )[^\r\n]*")
 _SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST\r\n")
@@ -274,7 +274,7 @@ def quoted(word: str) -> str | None:
     return '"' + "".join(part.replace("!", "\"'!'\"") for part in escaped) + '"'
 
 
-# What stands in a request for the texts that each message has of its own, and where they are.
+# Placeholders for the texts that differ in each message, and the places of these texts.
 _VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
 _TOKEN: Final = re.compile(rb"(:Password [^>]*>)[^<]*(<.*?:Nonce [^>]*>)[^<]*(<.*?:Created>)[^<]*", re.DOTALL)
 

@@ -9,13 +9,13 @@ from urllib.parse import quote
 
 from conformance.transport.shell_command import bytes_command, shell_command
 
-# By these nothing is done (RFC 9110 9.2.1), so they may be sent again without leave.
+# Methods that change nothing (RFC 9110 9.2.1), so they may be sent again without permission.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-# What a request target consists of, whatever a path of a description has (RFC 3986 2).
+# Characters that may stand in a request target (RFC 3986 2).
 _SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
-# Twice has the effect of once (RFC 9110 9.2.2), so a client may send them again on a new connection.
+# Methods that have the same effect when sent twice (RFC 9110 9.2.2): a client may repeat them on a new connection.
 IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
-# A segment of a path that holds this, or is longer than this, is a value and no name.
+# A path segment that contains this, or is longer than this, is a value and no name.
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
 # The first element in a SOAP Body names the operation: the operations of a service share one URL.
@@ -246,7 +246,7 @@ class Sending(NamedTuple):
     kind: NoAnswer | None
 
 
-# What became of a request: what a finding can be shown by.
+# What became of a request: a finding's evidence.
 Attempt = Exchange | Unanswered
 
 

@@ -28,7 +28,7 @@ from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
 
 _REDIRECTS: Final = 4
-# Of one document, and of all that one description refers to.
+# Octets of one document, and of all that one description refers to; time, s.
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 _MOST_IN_ALL: Final = 256 * 1024 * 1024
 _MOST_SECONDS: Final = 300.0

@@ -2,11 +2,11 @@
 
 import threading
 
-# A link that carries fewer octets a second is none; so much longer may an exchange take, octet by octet.
+# Octets a second of the slowest link: an exchange may take as much longer.
 _SLOWEST_OCTETS_PER_S = 256 * 1024
-# Of what has been handed to the network, so much may still be under way: buffers on both sides and between, octets.
+# Octets that may still be under way after they were handed to the network: buffers on both sides and between.
 _UNDER_WAY = 1024 * 1024
-# An answer is late when it takes twice the usual time and this much more, s: a segment that was lost and sent again.
+# A response is late if it takes twice the usual time and this much more, s: TCP may have to repeat a segment.
 _LATE_S = 0.1
 
 

@@ -13,9 +13,9 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing
 from conformance.transport.passage import Heard
 
-# More than this at once is a load test, and more than a small robot has sockets for.
+# More concurrent clients would be a load test, and exceed a small robot's sockets.
 MOST_CLIENTS: Final = 8
-# Whoever has too much to do may say so (RFC 9110 15.6.4, RFC 6585 4): a refusal, whatever was asked.
+# Statuses by which an overloaded server refuses any request (RFC 9110 15.6.4, RFC 6585 4).
 _BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
 
 
@@ -162,7 +162,7 @@ def _tell(requests: Sequence[Addressed], attempts: Sequence[Attempt]) -> None:
 
 
 _Attempt = TypeVar("_Attempt", bound=Attempt)
-# How often a request that the device puts off is sent in all, and the longest wait that it may ask for, s.
+# Times that a deferred request is sent in all; longest wait that the device may ask for, s.
 _TRIES: Final = 6
 _LONGEST_WAIT_S: Final = 10
 

@@ -35,7 +35,7 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import time_for
 from conformance.transport.passage import Passage
 
-# What a recipient may forgive in a header section, and a server must not send (RFC 9112 2.2, 5.2).
+# Faults of a header section that a recipient may accept and a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
 # A request line wherever it stands, with any whitespace that servers may forgive (RFC 9112 3); one without a version.
 _REQUEST_LINE = re.compile(
@@ -45,7 +45,7 @@ _REQUEST_LINE = re.compile(
 _MOST = 4 * 1024 * 1024
 _MOST_INTERIM = 100
 _SHORT = 64 * 1024
-# The least that a connection is waited for, s.
+# Shortest wait for a connection, s.
 _TO_CONNECT_S = 0.05
 _SILENCES = {
     NoAnswer.CLOSED: "the server closed the connection without a response",

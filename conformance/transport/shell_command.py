@@ -14,11 +14,11 @@ from urllib.parse import urlsplit
 from conformance.transport.credentials import is_shown, quoted
 
 _PLAIN_LIMIT = 4000
-# How a request shows that it answers a challenge: curl does so by itself.
+# The placeholder for the response to a challenge: curl computes it itself.
 _DIGEST = "Digest $ROAAS_DIGEST"
 # Fields that curl writes itself.
 _OF_CURL = frozenset({"content-length", "connection", "user-agent", "host"})
-# What curl sends as it is given: it refuses or changes everything else.
+# Characters that curl sends unchanged: it refuses or changes all others.
 _TARGET = re.compile(r"[\x21\x22\x24-\x7e]*")
 _NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 _FIELD = re.compile(r"[!-9;-~]+")

@@ -47,7 +47,7 @@ class Accepted(NamedTuple):
     stale: tuple[str, ...] = ()
 
 
-#: What no baseline does.
+#: The baseline that accepts nothing.
 NOTHING: Final = Accepted()
 
 

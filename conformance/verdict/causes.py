@@ -28,7 +28,7 @@ from conformance.verdict.finding import Finding
 _LEVELS = tuple(Level)
 _KINDS = tuple(CauseKind)
 _TOPICS = tuple(Topic)
-# A check of more requirements than this watches many things, and says less of one.
+# A check of more requirements than this looks at many things, and says less about each.
 _FEW = 5
 
 

@@ -18,9 +18,9 @@ DEEP_MINUTES = 10.0
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3
-# The share of values of one kind that a fast robot is tried with.
+# Share of the values of one kind that a fast robot gets.
 _KEPT = {"quick": 0.5}
-# A run beside others on a loaded machine takes twice its time; three times is more than load explains.
+# Greatest factor by which load may stretch a run: beside others, a run takes twice its time.
 _LONGEST = 3.0
 
 
@@ -59,14 +59,14 @@ class Speed:
         return f"about {before:g} to {self.up_to_ms:g} ms for an answer"
 
 
-# A robot on a network nearby is local, even one that is written in Python and on a loaded machine; one on a wireless
-# link is near, whether it keeps connections or not; an Arduino is far.
+# Classes of speed. A robot on a network nearby is local, even one in Python on a loaded machine; one on a wireless link
+# is near, with or without kept connections; an Arduino is far.
 SPEEDS = (Speed("local", 40, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.05), Speed("slow", math.inf, 0.02))
-# Only what is so much beyond a class's bound is in the next one.
+# A speed must exceed a class's bound by this factor to count as the next class.
 _CLEARLY = 1.25
 
 
-# A robot that takes longer for a response gets proportionally more time, ms.
+# Response time above which a robot gets proportionally more time, ms.
 _UNHURRIED_MS = 100.0
 
 

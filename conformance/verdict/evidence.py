@@ -27,18 +27,18 @@ from conformance.verdict.finding import (
     subject_of,
 )
 
-# Findings of one requirement that are kept: further causes share one more. And how many have all of their requests.
+# Findings of one requirement that are kept, the last for all further causes; findings that keep all of their requests.
 MAX_FINDINGS = 100
 MAX_SEQUENCES = 10
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
 _REST = "the rest"
-# Characters of the message of an error of the suite, and how many operations that met it are named.
+# Characters of a suite error's message; operations that it names.
 _FAULT, _NAMED = 200, 3
 _REFUSED = 400
 # What differs between two cases of one finding: numbers, and values in quotes.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
-# What a requirement that is about missing responses expects of each kind.
+# What a requirement about missing responses expects, by the kind of silence.
 _SILENT = {
     NoAnswer.TIMEOUT: "a response within the deadline",
     NoAnswer.CIRCUIT_OPEN: "a response within the deadline",

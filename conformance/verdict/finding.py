@@ -27,9 +27,9 @@ _SHOWN_TARGET = 120
 _SHOWN_FIELD = 100
 _SHOWN_BODY = 200
 _SHOWN_CURL = 2000
-# As many operations are named in a text; result.json and the pages have all of them.
+# Operations that one text names; result.json and the pages have all.
 _NAMED = 10
-# What differs between two responses of one fault: numbers, times, ids.
+# Numbers, times and ids, which differ between two responses of one fault.
 _NUMBERS = re.compile(r"[0-9a-f.:TZ+-]*\d[0-9a-f.:TZ+-]*")
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>]")
 

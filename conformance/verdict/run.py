@@ -42,7 +42,7 @@ class Selection:
         return self.exit_first and self.has(requirement) and requirement not in self.accepted
 
 
-# Less than this much was left out for want of time: a verdict says so in the notes, and not in its first line.
+# If less than this share was left out for lack of time, a verdict says so in the notes, and not in its first line.
 _NEXT_TO_ALL = 0.99
 _FEWEST_SHARE = 0.04
 

@@ -16,7 +16,7 @@ from conformance.verdict.evidence import Evidence
 from conformance.verdict.finding import Finding, counted
 from conformance.verdict.run import Run
 
-# Why there is no verdict on what a robot does by itself, or does not.
+# Why behaviour that a robot shows or not by itself has no verdict.
 NOT_SEEN = "it was not seen in this run, so it is not judged"
 
 
@@ -238,7 +238,7 @@ _WORDS = {
     Overall.NOT_CONFORMANT: "not conformant to",
     Overall.INCONCLUSIVE: "inconclusive for",
 }
-# A device without requirements of a contract's own keeps its description, and conforms to no contract.
+# Verdicts on a device that is judged by its description alone, and so conforms to no contract.
 _OF_DESCRIPTION = {
     Overall.CONFORMANT: "keeps its own description",
     Overall.NOT_CONFORMANT: "does not keep its own description",

@@ -11,7 +11,7 @@ from proof.mutation.parsing import RequestParser, ResponseParser
 
 _WAIT_S = 30.0
 _PIECE = 262_144
-# A robot may refuse a body that is longer than this before all of it has been sent.
+# A body longer than this may be refused before all of it has been sent.
 _LARGE = 65_536
 _CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 from conformance.commandline.given_files import read_json, read_octets, unzipped
 
 _FORMAT: Final = "roaas-yardstick/1"
-# Rarer than this, no chance is the reason.
+# Probability below which chance is no explanation.
 _NO_CHANCE: Final = 0.05
 # By mutant or good device: in how many runs it was seen, and in how many each requirement failed or warned.
 Table = dict[str, tuple[int, dict[str, int]]]

@@ -12,7 +12,7 @@ import pytest
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
-# How long after a certification was killed to look for one more, s: a mutant may be tried several times.
+# Wait after a killed certification before the next try, s: a mutant may be tried several times.
 _AGAIN_S: Final = 0.1
 # Programs that run at the moment.
 _PROGRAMS: set[subprocess.Popen[bytes]] = set()

@@ -27,7 +27,7 @@ from proof.selftest.robots import Robot
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
 _PRELOADED = ["proof.selftest.preloaded"]
-# The stop of a robot at the end of a run is tried for so long, s.
+# Time in which a robot's stop at the end of a run is tried, s.
 _STOP_S = 1.0
 #: Names the folder of the pack that is loaded there as well.
 PACK_VARIABLE = "ROAAS_SELFTEST_PACK"

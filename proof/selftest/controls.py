@@ -19,7 +19,7 @@ from proof.selftest.robots import Robot, RobotError, check_available, running
 from proof.selftest.servers.fronts import FRONTS, Front, behind
 from proof.selftest.variants import CertificateError, Variant, certificate, variants_of
 
-# A device that takes 300 ms for everything needs its time.
+# Deadline of a control, s: a device may take 300 ms for every response.
 _TIMEOUT_S = 900.0
 
 

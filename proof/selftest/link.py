@@ -19,7 +19,7 @@ from proof.selftest.at_once import safe_path
 Address = tuple[str, int]
 # An Ethernet frame's worth of TCP, octets.
 _SEGMENT = 1460
-# As much is under way in one direction of a connection before the sender has to wait, octets.
+# Octets under way in one direction of a connection before the sender has to wait.
 _WINDOW = 262_144
 _START_S = 20.0
 # l_onoff 1, l_linger 0: close() sends RST instead of FIN.

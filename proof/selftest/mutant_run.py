@@ -17,7 +17,7 @@ from proof.selftest.certifying import Job, Outcome, job_at, run_job
 from proof.selftest.proxy import Proxy
 from proof.selftest.robots import Robot, running
 
-# How long one run may take, s, by effort.
+# Longest time of one run by effort, s.
 _TIMEOUTS = {"quick": 90.0, "standard": 240.0, "deep": 900.0}
 
 

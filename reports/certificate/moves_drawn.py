@@ -13,11 +13,11 @@ from reports.errors import ReportError
 from reports.given_files import parsed, read_octets, unzipped
 
 TRACES_NAME: Final = "traces.json.gz"
-# So many pictures at most; so many points of a line; size of the drawing of one axis, in CSS pixels.
+# Pictures; points of a line; size of the drawing of one axis, in CSS pixels.
 _MOST, _POINTS = 30, 160
 WIDTH, HEIGHT = 300, 64
 _MARGIN: Final = 4
-# Of what an axis moves in the whole run: less is not drawn larger.
+# Share of an axis's range in the whole run: smaller moves are not drawn larger.
 _LEAST: Final = 0.2
 
 

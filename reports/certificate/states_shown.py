@@ -11,7 +11,7 @@ from typing import Any, Final
 from reports.certificate.moves_drawn import messages, traces_in
 from reports.errors import ReportError
 
-# So many states and operations are shown.
+# States and operations that are shown.
 _MOST: Final = 40
 
 

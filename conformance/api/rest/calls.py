@@ -19,7 +19,7 @@ from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
 XML = "application/xml"
-# What is there again in so many seconds is worth waiting for.
+# A refusal is worth waiting for if its Retry-After is no longer than this, s.
 _MOMENT_S = 2
 
 

@@ -17,10 +17,10 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 
-# As many values of one name are remembered, and as many requests are made of them for one stop.
+# Values of one name that are remembered; requests that are made of them for one stop.
 _MOST: Final = 64
 _REFUSED: Final = range(400, 500)
-# Of the values that a device refused, as many are remembered.
+# Refused values that are remembered, for each name.
 _MOST_REFUSED: Final = 8
 
 

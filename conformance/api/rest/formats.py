@@ -17,9 +17,9 @@ from conformance.documents.representation import UnreadableError, flattened, rea
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, send_together
 
-# A robot at rest jitters; a difference in so many turns in a row is no jitter.
+# A robot at rest jitters: only a difference in this many rounds in a row counts.
 _TURNS = 10
-# In so many of these turns a response has to differ of those that come at once: it may have been the first of them.
+# Of these rounds, those in which a response to simultaneous requests must differ: in the others it may have come first.
 _AT_ONCE = 8
 
 
@@ -38,7 +38,7 @@ class Disagreement:
     exchange: Exchange
 
 
-# By format and place.
+# A disagreement by format and place.
 Found = dict[tuple[str, str], Disagreement]
 #: Reads a resource in these formats; returns each with its exchange.
 Reader = Callable[[RestInterface, Call, list[str]], list[tuple[str, Exchange]]]

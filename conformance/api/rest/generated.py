@@ -27,7 +27,7 @@ from conformance.documents.patterns import with_python_patterns
 from conformance.documents.schema_budget import unrolls
 from conformance.transport.exchange import Outgoing
 
-#: Raised where no case can be made: schemas allow everything or nothing, or Schemathesis does not know a media type.
+#: Exceptions where no case can be made: schemas allow everything or nothing, or the media type is unknown.
 NOT_GENERATED = (Unsatisfiable, SerializationNotPossible)
 _BASE = "http://robot.invalid"
 # A header's name and value (RFC 9110 5.1, 5.5), as far as every server takes them.

@@ -19,10 +19,10 @@ from conformance.transport.credentials import Kind
 from conformance.transport.exchange import SAFE_METHODS
 
 _PROGRAM: Final = Path(__file__).with_name("guard_process.py")
-# The deadline of each of its requests, and how long its end is awaited, s.
+# Deadline of each of its requests, and how long its end is awaited, s.
 _DEADLINE_S: Final = 3.0
 _ENDS_S: Final = 2.0
-# Making the stops again and again takes at most this share of the run's time, and so long in all before it counts, s.
+# Renewing the list of stops may take this share of the run's time, and this long besides, s.
 _SHARE: Final = 0.05
 _FREE_S: Final = 0.1
 

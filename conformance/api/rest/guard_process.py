@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
     Contexts = dict[str | None, SSLContext | None]
 
-# Each stop is sent several times: what the other process sent last may arrive after the first one, and a device with a
-# queue of missions begins the next one.
+# Rounds of stops, and the time between two, s: a request of the killed process may arrive after the first stop, and a
+# device with a queue of missions begins the next one.
 _ROUNDS = 3
 _BETWEEN_S = 0.4
-# Not for this request, or not now: it is sent again (RFC 9110 15.5.9, RFC 8470 5.2, RFC 6585 4; 15.6).
+# Statuses after which the stop is sent again: not for this request, or not now (RFC 9110 15.5.9, 15.6, RFC 8470, 6585).
 _AGAIN = frozenset({408, 425, 429})
 _SERVER_ERROR = 500
 _NO_RESPONSE = 599
 _LONGEST_HEAD = 65_536
-# The device refuses who sends the stop (RFC 9110 15.5, RFC 4918 11.3): after a login it is sent again.
+# Statuses that refuse the sender of the stop (RFC 9110 15.5, RFC 4918 11.3): it is sent again after a login.
 _REFUSALS = frozenset({401, 403, 407, 423, 428})
 _LONGEST_LOGIN = 1 << 20
 _UNAUTHORIZED = 401

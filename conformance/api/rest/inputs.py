@@ -31,7 +31,7 @@ class _Nothing:
     """The type of NOTHING."""
 
 
-#: The body of a request without one; None is the JSON value null.
+#: Marks a request without a body; None is the JSON value null.
 NOTHING: Final = _Nothing()
 
 

@@ -15,11 +15,11 @@ from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 
-# A longer array is a load test.
+# Longest array that is sent: a longer one is a load test.
 _MOST_ITEMS: Final = 100
-# Of so many formats of a response each is asked for with a wrong value.
+# Formats of a response that are each requested together with a wrong value.
 _FORMATS: Final = 3
-# What frameworks refuse in any place.
+# Faults that frameworks refuse wherever they are.
 _OTHER_TYPE: Final = "which has another type"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})

@@ -14,7 +14,7 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import Pairs, Token, json_text
 
 Path = tuple[str | int, ...]
-#: What can be wrong with a JSON body: the end of ids in class strict-input.
+#: The kinds of faults in a JSON body; the ids of class strict-input end with them.
 KINDS = (
     "malformed",
     "missing",
@@ -29,7 +29,7 @@ KINDS = (
     "empty",
     "bounds",
 )
-# Texts that are no number of JSON, or of no double: kind, and whether the body is malformed by them.
+# Texts that are no JSON number or no double: the kind of fault, and whether it makes the body malformed.
 _NO_NUMBERS = (
     ("non-finite", True, ("NaN", "Infinity", "-Infinity")),
     ("non-finite", False, ("1e400", "-1e400")),
@@ -37,7 +37,7 @@ _NO_NUMBERS = (
 )
 _DEPTH = 100_000
 _DIGITS = 5_000
-# No text or list is made longer, wherever its bound lies.
+# The longest text or list that is sent, even if its bound allows more.
 _LONGEST = 1 << 20
 
 

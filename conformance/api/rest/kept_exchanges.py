@@ -13,7 +13,7 @@ from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Exchange, Listener
 
-# So many exchanges of different lengths are kept for each operation.
+# Exchanges of different lengths that are kept for each operation.
 _MOST: Final = 12
 
 

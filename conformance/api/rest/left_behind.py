@@ -16,7 +16,7 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined, path_of
 from conformance.verdict.finding import listed
 
-# As many ids, paths and operations a line of the summary names; the result has all.
+# Ids, paths and operations that a line of the summary names (the result has all); characters of an id.
 _NAMED: Final = 3
 _ID: Final = 60
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})

@@ -359,7 +359,7 @@ _LEAST: Final = frozenset(
 _MOST: Final = frozenset(
     {"max", "maximum", "to", "until", "till", "before", "lte", "le", "lt", "end", "older", "upper", "below", "under"}
 )
-# What a description says of one.
+# Descriptions of a parameter that is a lower bound.
 _SAYS_LEAST: Final = re.compile(
     r"at least|or more|or (?:later|after|newer|above|greater|higher)|not (?:before|below|less)|minimum|lower bound"
     r"|greater than|more than|later than|newer than|higher than|since|\bfrom\b|>=?",

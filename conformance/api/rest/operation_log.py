@@ -22,10 +22,10 @@ from conformance.transport.exchange import Exchange, Listener, Request, Unanswer
 from conformance.verdict.finding import Finding
 
 _OK, _REDIRECT = 200, 300
-# A body is read for what it shows of its schema up to this size, octets.
+# Octets of a body that are searched for members of its schema.
 _READ = 100_000
 _ERRORS: Final = 400
-# The device's state did not allow the operation, which shows it as well as a success.
+# Statuses by which a device says that its state forbids the operation; they show the operation as well as a success.
 _OF_STATE: Final = frozenset({409, 423})
 # A fault as the first element of a SOAP Body.
 _FAULT: Final = re.compile(rb"Body[^<>]*>\s*<(?:[\w.-]+:)?Fault[\s/>]")

@@ -6,10 +6,10 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.parameters import Parameter
 
-# Letters, nothing, and texts that programming languages take for numbers and the contract does not.
+# Letters, the empty text, and texts that programming languages read as numbers and the contract does not.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")
 _NO_INTEGERS = ("3.5", "99999999999999999999")
-# Which of these a problem can name as they are.
+# Those of these texts that a problem's detail may repeat.
 _TELLING = {"abc", "roaas-no-number", "1.5m"}
 
 

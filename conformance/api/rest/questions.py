@@ -21,10 +21,10 @@ from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import Outgoing, Response
 from conformance.transport.parallel import Addressed
 
-# Stands in the questions that only one client sends.
+# Begins the values in a question that only one client sends.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
-# So many characters of a mismatch are shown.
+# Characters of a mismatch that are shown.
 _SHOWN: Final = 400
 
 

@@ -17,11 +17,11 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Outgoing
 
-# How the names of references end: what they identify, or where a list goes on.
+# Ends of names that refer to something: an identifier, or the place where a list goes on.
 _ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
-# Whole names of the same kind, which are also the ends of other words.
+# Whole names of references that are also the ends of other words.
 _WHOLE: Final = frozenset({"ref", "slug", "key", "after", "before", "since", "next", "previous", "startafter"})
-# Words that end like these, and identify nothing.
+# Words that end like references and identify nothing.
 _NO_REFERENCES: Final = frozenset(
     [
         "acid",

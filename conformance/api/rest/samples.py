@@ -14,8 +14,8 @@ from conformance.documents.patterns import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
-# A value gets about so many optional members in all, and so many members and items that it must have. Each has an
-# equal share of both for its own members, as schemas that refer to each other in many ways have no end.
+# Optional members of a value in all; required members and items in all. Each member gets an equal share of both for its
+# own members, as schemas may refer to each other without end.
 _OPTIONAL = 1_000
 _REQUIRED = 20_000
 #: A text of each format that JSON Schema, OpenAPI and its registry name.

@@ -14,7 +14,7 @@ from conformance.transport.exchange import Exchange
 Snapshot = dict[str, Any]
 _READINGS = 3
 _PAUSE_S = 0.04
-# As many times a suspect is given to come to rest.
+# Times that a suspect is given to come to rest.
 _WINDOWS = 12
 
 

@@ -12,22 +12,23 @@ from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
 
-#: By these a server says that it, or one behind it, has failed; 503 says that it cannot now, 501 that it never can.
+#: Statuses by which a server says that it, or one behind it, failed; 503 means not now, 501 never.
 CRASHES = frozenset({500, 502, 504})
-#: By these a device says that its present state keeps it from acting, whatever the request contains: a conflict, a
-#: condition, a lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
+#: Statuses of a device whose state keeps it from acting, whatever the request contains: a conflict, a condition, a
+#: lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
 HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
-# What differs between two responses to one request: times, and ids of requests.
+# Digits, and the letters of times and request ids around them: they differ between two responses to one request.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
-# As many operations are named in one sentence; the table of the operations has all.
+# Operations that one sentence names; the table of operations has all.
 _NAMED = 4
-# Statuses that refuse a request for another reason than its content.
+# Tries of a request whose usual status is wanted: a server error may be a rare one.
 _TRIES = 3
-#: By these a device refuses a request because of who sends it, or because another client has it (RFC 9110 15.5,
-#: RFC 4918 11.3, RFC 6585 3).
+#: Statuses that refuse a request because of its sender, or because another client holds the thing (RFC 9110 15.5, RFC
+#: 4918 11.3, RFC 6585 3).
 REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
+# Statuses that refuse a request for another reason than its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
-# What an operation needs that was never answered 2xx.
+# What an operation needs that was never answered 2xx, in words.
 _VALUES: Final = "values that the device knows"
 _CREDENTIALS: Final = "credentials that may do this"
 _OF_STATUS: Final = {

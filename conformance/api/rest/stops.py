@@ -27,16 +27,16 @@ from conformance.transport.client import HttpClient, is_drafting
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
 from conformance.transport.passage import Heard
 
-#: What is said of a device that may still move begins with these words.
+#: How the note on a device that may still move begins.
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
-# Between two tries, s.
+# Pause between two tries, s.
 _AGAIN_S: Final = 0.3
-# The deadline of one request, and how many usual responses a slow device gets.
+# Deadline of one request, s; a slow device gets this many of its usual response times.
 _DEADLINE_S: Final = 2.0
 _ANSWERS: Final = 4
-# All requests of one try for what the description marks, s.
+# Longest duration of one try that sends what the description marks, s.
 _LONGEST_S: Final = 5.0
-# As many operations are read to see whether it moves; words in the names of what says so, and of places.
+# Operations that are read to see whether the device moves; names of members that say so, and names of positions.
 _READS: Final = 8
 _MOVING: Final = frozenset({"moving", "driving"})
 _PLACES: Final = frozenset(
@@ -57,7 +57,7 @@ _PLACES: Final = frozenset(
     }
 )
 _Way = Callable[[], str]
-# What the stop names is over.
+# Statuses of a read of what the stop names, once it is gone.
 _OVER: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 
 

@@ -11,7 +11,7 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import until_taken
 
-# Answers to a client that has given too many wrong credentials (RFC 6585 4, RFC 4918 11.3).
+# Statuses for a client that sent too many wrong credentials (RFC 6585 4, RFC 4918 11.3).
 _SHUT_OUT: Final = frozenset({423, 429})
 
 

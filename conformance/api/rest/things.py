@@ -17,22 +17,22 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 
-# Ends of the names of path parameters that a member with another name may give, such as ``id`` for ``item_pk``.
+# Ends of path parameters whose value a member of another name may hold, such as ``id`` for ``item_pk``.
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
-# Members that a device sets itself, or hides, by the end of their names: the last words, with what stands before them.
-# ``on`` alone is a switch; ``season``, ``format`` and ``standby`` are words of their own.
+# Names of members that a device sets itself, or hides. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
+# are words of their own.
 _OWN: Final = re.compile(
     r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time"
     r"|owner|author|user|password|secret|token|pin|key|[^a-z](?:at|by)|(?:[a-z]ed|[^a-z]?(?:seen|made|built|sent))_?on"
     r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
 )
-# Names and states of what is deleted and can still be read, and names of what says that it is not.
+# Names and states of things that are deleted and can still be read; names of members that say the opposite.
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
-# Members that one of several things has: another one gets it, or gets another place in an order.
+# Members that only one of several things has: setting it for one thing takes it from another.
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
-# Formats of texts that are the same in every spelling but for case and punctuation.
+# Formats whose texts mean the same in every case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
 # Identifiers that a client may choose for what it creates.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")

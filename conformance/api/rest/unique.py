@@ -17,14 +17,14 @@ from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 
-# So many members are tried, and so many characters of a text are counted up.
+# Members that are tried; characters of a text that are counted up.
 _TRIED: Final = 6
 _COUNTED: Final = 8
-# From one value to the next: what other code counts up by one does not meet it.
+# Distance between two values: other code, which counts by one, does not reach the next.
 _STEP: Final = 7919
-# So many of them are looked at for one that was not sent before.
+# Values that are looked at for one that was not sent before.
 _STEPS: Final = 40
-# Of integers without a bound: each program holds it.
+# The greatest integer where no bound is declared: every program can hold it.
 _GREATEST: Final = 2**31 - 1
 _ALPHABETS: Final = (string.digits, string.ascii_lowercase, string.ascii_uppercase)
 

@@ -29,7 +29,7 @@ from conformance.verdict.evidence import HarnessError
 
 __all__ = ["INVALID", "UNCLEAR", "VALID"]
 
-# What a cookie's value may not contain (RFC 6265 4.1.1), and percent signs, which not every reader decodes.
+# Characters that a cookie's value may not contain (RFC 6265 4.1.1), and percent signs, which not every reader decodes.
 _NO_COOKIE = re.compile(r"[^!#-$&-+\--:<-\[\]-~]")
 Headers = Sequence[tuple[str, str]]
 _RULES = {

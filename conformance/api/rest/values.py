@@ -18,10 +18,10 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange, Outgoing
 
-# As many values of one name are remembered, and as many are tried in one place.
+# Values of one name that are remembered; those that are tried in one place.
 _REMEMBERED, _TRIED = 16, 4
 _DEPTH = 6
-#: What identifies an item of a collection, by the usual names of such members.
+#: Usual names of the members that identify an item of a collection.
 IDS = ("id", "uuid", "name", "key", "slug")
 
 

@@ -19,7 +19,7 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 
-# As many enum values, examples and optional members are tried of one place, and so deep in a body.
+# Enum values, examples and optional members that are tried in one place; how deep in a body.
 _FEW: Final = 12
 DEPTH: Final = 3
 LONG: Final = 5000
@@ -28,7 +28,7 @@ _BEYOND: Final = 2**63
 Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
 _UNKNOWN_NUMBER: Final = 987_654_321
-# Texts that programs stumble over; none of them acts on anything.
+# Texts that programs often mishandle; none of them makes a device act.
 _ODD_TEXTS: Final = (
     "",
     " ",

@@ -73,7 +73,7 @@ def is_closed(attempt: Unanswered) -> bool:
 _SLOWER: Final = 20
 _ALWAYS_MS: Final = 1000.0
 _TRIES: Final = 3
-# After so many attacks that cost a deadline the rest is left out.
+# After this many attacks that used up a deadline, the rest is left out.
 _TROUBLES: Final = 3
 
 

@@ -12,12 +12,12 @@ from functools import partial
 from itertools import islice
 from typing import Final
 
-# In a document: where text is that the robot reads as a value; and where it is that it may pass over.
+# Slots in a document: for text that the robot reads as a value, and for text that it may ignore.
 VALUE_SLOT: Final = "roaas-value-here"
 IGNORED_SLOT: Final = "roaas-aside-here"
-# What an entity expands to that nobody wrote in one piece.
+# A text that occurs in a response only if the robot expanded an entity.
 MARK: Final = "roaas-expanded-4711"
-# How files begin that nearly every robot has (Unix, Windows).
+# Beginnings of files that nearly every robot has (Unix, Windows).
 LEAKS: Final = rb"root:[^:\n]{0,40}:0:0:|; for 16-bit app support|127\.0\.0\.1\s+localhost"
 _FILES: Final = ("file:///etc/passwd", "file:///etc/hosts", "file:///c:/windows/win.ini")
 _DEPTH: Final = 100_000
@@ -249,7 +249,7 @@ def _instructions(template: Template, url: Callable[[str], str]) -> Iterator[Att
     yield Attack("processing-instruction", "an instruction at the end", template.octets() + b"<?run this?>")
 
 
-# One for each requirement; what names an address before what takes long, in which a robot may come to call it.
+# Kinds of attacks, one for each requirement. Those with an address come first: a robot may call it later.
 _KINDS: Final = (
     _doctypes,
     _internal,

@@ -8,7 +8,7 @@ from lxml import etree
 
 from conformance.documents.xml import ENVELOPE, Node, NotXmlError, clark, elements, local, parse, text_of
 
-# A message that asks for nothing: whatever answers it handles SOAP, and does nothing.
+# A SOAP message without content: a server that answers it handles SOAP, and does nothing.
 EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body/></e:Envelope>'
 
 

@@ -11,8 +11,8 @@ from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Simple, 
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")
-# Zeros of both signs, the smallest and greatest of all and of the normal ones, and those that are known to be
-# misread: 2.2250738585072011e-308 hung Java and PHP, 2**53 + 1 is no double, 1e23 is printed as 1e+23 or 9.99...e22.
+# Numbers that programs misread: zeros of both signs, the smallest and greatest doubles, 2.2250738585072011e-308 (hung
+# Java and PHP), 2**53 + 1 (no double), 1e23 (printed as 1e+23 or 9.99...e22).
 EXTREMES: Final[dict[str, tuple[float, ...]]] = {
     "double": (
         0.0,
@@ -32,7 +32,7 @@ EXTREMES: Final[dict[str, tuple[float, ...]]] = {
     ),
     "float": (0.0, -0.0, 1.401298464324817e-45, 1.1754943508222875e-38, 3.4028234663852886e38, 0.5),
 }
-# Characters of drawn texts: those that XML has to escape, and some of two and three octets.
+# Characters of random texts: those that XML has to escape, and some of two and three octets.
 _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u20ac\u65e5"
 
 

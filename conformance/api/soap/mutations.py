@@ -17,9 +17,9 @@ from conformance.documents.xsd_shapes import Element, Simple
 
 STRANGE: Final = "urn:example:strange"
 _NOBODY: Final = "no_such_element"
-#: The children of a Body.
+#: The children of a Body element.
 Payload = tuple[Node, ...]
-# What no schema can forbid.
+# Kinds of faults that no schema can forbid.
 _BEYOND_SCHEMA: Final = frozenset({"body", "non-finite"})
 
 

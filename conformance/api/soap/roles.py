@@ -17,15 +17,15 @@ from conformance.documents.xml import NotXmlError, elements, local, parse
 from conformance.documents.xsd_shapes import STRINGS, Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-#: A name of a value by which a device knows one of its things.
+#: Names of values by which a device identifies one of its things.
 REFERS: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name|channel)$", re.IGNORECASE)
 #: Types whose values may refer to something.
 TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
-#: A device that takes a value, a thing or a removal later has so long, s.
+#: A device may apply a change or a removal this much later, s.
 SETTLES_S: Final = 1.0
-# Elements of a message that are nested deeper are not compared.
+# Elements of a message that are nested deeper than this are not compared.
 _DEEPEST: Final = 6
-# A longer message is not read, octets.
+# A message longer than this is not read, octets.
 _LONGEST: Final = 65_536
 
 
@@ -47,7 +47,7 @@ _VERBS: Final = {
     Role.REMOVES: "delete remove unregister erase",
     Role.ENDS: "cancel abort stop end terminate close",
 }
-#: Roles of operations after which a thing does not go on.
+#: Roles of operations after which a thing has ended.
 LAST: Final = frozenset({Role.ENDS, Role.REMOVES})
 _ROLES: Final = {verb: role for role, verbs in _VERBS.items() for verb in verbs.split()}
 

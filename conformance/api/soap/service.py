@@ -130,7 +130,7 @@ class SoapService:
         return fetch(location, self.published.url or self.endpoint, self.client.connection, folder)
 
 
-# How long the address in a WSDL is given to answer before the WSDL's own is taken instead, s.
+# How long the address in a WSDL may take to answer before the address of the WSDL itself is used, s.
 _PROBE_S = 3.0
 
 

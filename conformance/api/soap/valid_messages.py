@@ -16,7 +16,7 @@ from conformance.documents.xml import XSD, XSI, Node, NotXmlError, clark, namesp
 from conformance.documents.xsd_shapes import FLOATS, INTEGERS, Element, bounds
 from conformance.verdict.evidence import HarnessError
 
-# Whole numbers tried where a contract takes only some, such as codes.
+# Whole numbers that are tried where a contract accepts only some, such as codes.
 _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
 
 

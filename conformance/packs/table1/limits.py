@@ -17,8 +17,8 @@ from conformance.measures.samples import FARTHEST
 #: One limit for both directions, or the least and the greatest velocity, m/s or rad/s. It has no bounds of its own:
 #: msgspec 0.22 reads them from the wrong place in a union with a tuple, and crashes.
 Range = float | tuple[float, float]
-#: So many times the tolerance and the noise of a part of a velocity its limit is at least: otherwise rest may pass for
-#: any velocity, and nothing that depends on reaching one can be judged (contract.md#judging-by-windows).
+#: Fewest multiples of tolerance and noise in a limit: below, rest could pass for any velocity, and nothing that depends
+#: on reaching a velocity can be judged (contract.md#judging-by-windows).
 RESOLVED: Final = 4.0
 
 

@@ -29,15 +29,15 @@ from conformance.verdict.run import Run
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, held_operations, generated_requests, neighbours, own_things, others)
-# HTTP lets any server or gateway send these, whatever the operation: conditions, ranges, rates, sizes, upgrades.
+# Statuses that HTTP lets any server or gateway send: conditions, ranges, rates, sizes, upgrades.
 _ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
-# ... and these, unless the request was the operation's usual one.
+# Statuses that HTTP allows as well, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
-# ... of which these come from the application, in the media type that it declares for them by their number.
+# Those of these statuses that come from the application, in the media type that it declares for them.
 _OF_APPLICATION = frozenset({412, 415, 428})
-# By these a device says that it does not know what a request refers to.
+# Statuses by which a device says that it does not know what a request refers to.
 _NO_SUCH_THING = frozenset({400, 404, 409, 422})
-# Of these, HTTP knows these only as responses to requests with one of these fields (RFC 9110 13, 14).
+# Statuses that HTTP knows only as responses to requests with one of these fields (RFC 9110 13, 14).
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404

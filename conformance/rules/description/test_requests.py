@@ -24,7 +24,7 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
-# What says that two values have to fit together, which no schema can say.
+# Texts of a description that say that two values depend on each other, which no schema can say.
 _TOGETHER = re.compile(
     r"[<>≤≥≠]|\b(than|before|after|below|above|between|exceeds?|equal|differ\w*|both|either|together|unless|requires?)\b",
     re.IGNORECASE,

@@ -16,10 +16,10 @@ from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
-# So many rounds that a robot which fails one time in fifty fails several times.
+# Rounds: a robot that fails one time in fifty fails several times in them.
 _ROUNDS = 40
 _IN_A_ROW = 6
-# So many of the clients that come at once are served; to the others a robot may say that it is busy.
+# Concurrent clients that are served at least; a robot may tell the others that it is busy.
 _SERVED = 2
 
 

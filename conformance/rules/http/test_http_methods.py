@@ -16,7 +16,7 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswer
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
-# What a method may have set going has the settling checks' time to show: nobody has to wait for it.
+# These checks come early: an effect of a method can then show while other checks run.
 _BEFORE = pytest.mark.phase("motion")
 # Methods that a robot might take by mistake; where GET is not allowed, HEAD is not.
 _STANDARD = ("GET", "PUT", "POST", "DELETE", "PATCH", "HEAD")

@@ -54,7 +54,7 @@ def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
 
 _PRECONDITIONS = "http/preconditions"
 _RANGE = "http/range"
-# No response has this entity tag, and every response is newer than HTTP.
+# An entity tag that no response has; a date before every response.
 _NO_TAG = '"roaas-nothing-has-this-tag"'
 _LONG_AGO = "Sat, 29 Oct 1994 19:43:31 GMT"
 # Reads at standard effort.

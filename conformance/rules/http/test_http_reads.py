@@ -26,15 +26,15 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _AVAILABLE, _MANY = "http/available", "http/many-requests"
-# Reads in the series, and of each resource at standard effort.
+# Reads in the series; reads of each resource at standard effort.
 _IN_ALL, _EACH = 120, 60
-# So many requests that were dropped are the robot's habit, and not the end of an idle connection.
+# Dropped requests that show a habit of the robot, and not just the end of an idle connection.
 _DROPS = 3
-# Only a robot that does not answer all reads that follow each other at once, for no longer than this, s, is read again,
-# at the rate that the requirement names.
+# Time for reads that follow each other at once, s. If some fail, the robot is read again at the requirement's rate:
+# this many reads, at this interval, s.
 _FIRST_S = 3.0
 _READS, _EVERY_S = 100, 0.1
-# A client that was told to slow down reads at this interval, s, so often.
+# Reads, and interval, of a client that was told to slow down, s.
 _SLOW_READS, _SLOW_S = 10, 1.0
 _LONGEST_WAIT_S = 10.0
 

@@ -21,10 +21,10 @@ _NOTHING = "image/png"
 _FIELDS = ("accept: {}", "ACCEPT: {}", "aCCept:{}", "Accept:\t{} \t", "Accept:   {}")
 # One list in several lines (RFC 9110 5.3): the last one holds what the robot has, or the first.
 _LINES = (("Accept: image/png", "Accept: image/webp;q=0.5", "Accept: {}"), ("Accept: {}", "Accept: image/webp;q=0.5"))
-# How long after the response the connection may end, s.
+# Time in which the connection must end after the response, s.
 _ENDS_S = 2.0
 _TRIES = 3
-# Between two pieces of a request, s; so many pieces make the longest that any network would.
+# Pieces of a request, and the pause between two, s: together longer than any network would need.
 _PIECES, _APART_S = 12, 0.003
 
 

@@ -18,9 +18,9 @@ pytestmark = pytest.mark.needs("rest")
 _TURNS = 3
 # How long a suspect is left alone to see whether it changes by itself, s: longer than an uptime's second.
 _ALONE_S = 1.3
-# As many of them are left alone, one after the other.
+# Suspects that are left alone, one after the other.
 _SUSPECTS = 5
-# How long to watch what was put, s: longer than a cancelled goal takes to end.
+# How long a put value is watched, s: longer than a cancelled goal takes to end.
 _WATCHED_S = 0.15
 
 

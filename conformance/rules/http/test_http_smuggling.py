@@ -25,10 +25,10 @@ _BOTH, _CLOSED, _LINES, _COLON = (
     "web-server/space-before-colon",
 )
 _CHUNKED, _CHUNKS = "Transfer-Encoding: chunked", raw.chunked(b"abcde", 5)
-# Shorter than the chunks, and than the next request: who believes it finds rubbish where a request should begin.
+# A length shorter than the chunks and the next request: a server that uses it reads garbage as the next request.
 _SHORT = "Content-Length: 3"
 _THINK_S = 3.0
-# A robot that crashes now and then breaks another rule; one that crashes at each of these was confused by the request.
+# Tries: a robot that crashes at each of them was confused by the request; rarer crashes break another rule.
 _TRIES = 3
 
 

@@ -19,9 +19,9 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _Q = "rest-formats/q-values"
 _SPECIFIC = "rest-formats/specific-range"
 _DEFAULT = "rest-formats/json-default"
-# So many resources have other formats than data, and are asked for.
+# Resources with formats that are not data, which are requested as well.
 _OTHERS = 2
-# A finding names as many further values.
+# Further values that a finding names.
 _NAMED = 11
 # {a} is the default format, {b} and {c} the others (or the default again), {A} to {C} in capitals.
 _MATRIX = (
@@ -53,7 +53,7 @@ _MATRIX = (
     (_SPECIFIC, "text/*, {a};q=0.5"),
     (_SPECIFIC, "text/*;q=0.3, text/plain;q=0, application/xml;q=0.2"),
 )
-# The same in few lines, for formats that may be there for other values.
+# The same in few rows, for formats that may exist for other values.
 _FEW = (
     (_Q, "{a};q=0.5, {b}"),
     (_Q, "{b};q=0.2, {a};q=0.9"),

@@ -22,7 +22,7 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _ID = "rest-formats/xml-input"
-# Two writings of one number are no farther apart than this, whatever is accepted.
+# Two writings of one number differ by less than this, whatever tolerance is accepted.
 _ECHO = 1e-9
 
 

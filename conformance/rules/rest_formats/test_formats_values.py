@@ -24,7 +24,7 @@ _XML = "application/xml"
 _TEXT = "text/plain"
 # No robot has its responses in this format.
 _NO_FORMAT = "image/png"
-# Longer than a client waits between two requests, s.
+# Pause longer than a client's between two requests, s.
 _PAUSE_S = 1.1
 _IDS = {_XML: "rest-formats/xml", _TEXT: "rest-formats/text"}
 

@@ -25,10 +25,10 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _ID = "robustness/recovers"
 _TEXT = "text/plain"
-# What a valid read may be answered for another reason than the request before it.
+# Statuses that a valid read may get for another reason than the request before it.
 _OTHERWISE = frozenset({401, 403, 404, 409, 410, 423, 429, 503})
 _OK, _REDIRECTED = 200, 400
-# A server that keeps the connection open and does not read on is waited for so long, s, and twice.
+# Wait for a server that keeps the connection open and does not read on, s; number of waits.
 _THINK_S, _WAITS = 3.0, 2
 
 

@@ -20,9 +20,9 @@ from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 
 _ON = (survey, generated_requests, neighbours, own_things)
-# A response time has grown when its median is so many times, and so many ms, above that of the first requests.
+# A response time has grown if its median is this many times, and this many ms, above that of the first requests.
 _TIMES, _MS, _FEWEST = 3.0, 50.0, 15
-# A body that has become so many times as long takes longer, rightly.
+# A body this many times as long may take longer.
 _MORE = 1.5
 
 

@@ -15,11 +15,11 @@ from conformance.scenarios.soap_survey import Kind, SoapProbe
 if TYPE_CHECKING:
     from lxml import etree
 
-# So many valid messages without a wrong one between them show that an operation may be called again and again.
+# Valid messages without a wrong one between them that show that an operation may be repeated.
 _REPEATED: Final = 3
 _CALLED: Final = frozenset({Kind.USUAL, Kind.VARIED, Kind.AGAIN})
 _ENDS: Final = LAST | {Role.OTHER}
-# An operation, and the values in a message to it, each with its name.
+# A sent operation, and the values in its message with their names.
 _Sent = tuple[str, frozenset[tuple[str, str]]]
 
 

@@ -27,9 +27,9 @@ _ON = (soap_survey, soap_changes)
 _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
-# What shows no version of SOAP may be answered by a fault of any, or by none.
+# A message that shows no version of SOAP may be answered by a fault of any version, or by none.
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
-# Values in what is wrong, which are no other cause; names of elements and prefixes are.
+# Values in an error text, which differ within one cause; names of elements and prefixes do not.
 _VALUES = re.compile(r"'(?!\{)[^']*'|(?<=fault: ).*|\d+(?=, column|\)|$)", re.DOTALL)
 # How a device says that it lacks an operation (ONVIF Core, 5.11.2; WS-Addressing SOAP Binding, 6.4.2).
 _OPTIONAL = re.compile(r"not\s?(?:supported|implemented)", re.IGNORECASE)

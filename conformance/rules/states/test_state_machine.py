@@ -10,7 +10,7 @@ from conformance.scenarios.states import Step, Walk, walked
 from conformance.statement.state_map import StateMap
 from conformance.verdict.evidence import Case
 
-# What a state that changes by itself may excuse once it does not excuse twice.
+# Times: a state that changes by itself may excuse a difference once.
 _TWICE = 2
 
 

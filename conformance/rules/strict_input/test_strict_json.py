@@ -19,7 +19,7 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
 _IDS = tuple(f"strict-input/json-{kind}" for kind in KINDS)
 _STATUSES = ("strict-input/status-malformed", "strict-input/status-invalid")
-# Requirements whose cases may kill a robot: each is sent over a connection of its own.
+# Requirements whose cases may crash a robot: each case is sent on a connection of its own.
 _HOSTILE = ("strict-input/json-depth", "strict-input/json-huge-number")
 # Cases of one requirement and operation at standard effort; more of them repeat each other.
 _EACH = 50

@@ -19,7 +19,7 @@ from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
-# Attacks over REST have no late effects: they may run while the suite waits for those of other requests.
+# Attacks over REST have no late effects, so they run while the suite waits for those of other requests.
 pytestmark = pytest.mark.phase("aside")
 _REST = "xml-security/rest"
 _XML = "application/xml"

@@ -7,7 +7,7 @@ from proof.selftest.generated.judging import KILLED, NOT_REACHED, SURVIVED, Gene
 from proof.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 
 _COUNTED = frozenset({KILLED, SURVIVED})
-# How many of a tool's false alarms the table names.
+# False alarms of a tool that the table names.
 _ALARMS = 5
 
 

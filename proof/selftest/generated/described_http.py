@@ -10,7 +10,7 @@ from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
-# By how many octets a wrong length is wrong.
+# Difference of a wrong Content-Length, octets.
 _OFF = 7
 
 

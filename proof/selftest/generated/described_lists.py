@@ -15,7 +15,7 @@ from proof.selftest.generated.described_inputs import NOTHING, Input
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
-# A total goes wrong after so many lists, and after that it stays wrong.
+# Lists after which a total goes wrong and stays wrong.
 _RIGHT = 10
 _DEPTH = 2
 _Differs = Callable[[Page, Page], bool]

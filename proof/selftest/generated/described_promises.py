@@ -21,7 +21,7 @@ _SUCCESS, _REFUSED = range(200, 300), range(400, 500)
 _NOT_ACCEPTABLE, _FAILED, _UNSUPPORTED, _REQUIRED, _PART, _CURRENT = 406, 412, 415, 428, 206, 304
 _WRITING = frozenset({"PUT", "PATCH", "DELETE"})
 _OCTETS, _CSV, _KEY = "application/octet-stream", "text/csv", "Idempotency-Key"
-# As many resources are tried, and so many decimals are kept.
+# Resources that are tried; decimals that are kept.
 _TRIED, _DECIMALS = 3, 2
 
 
@@ -40,7 +40,7 @@ class _Past:
     keyed: dict[str, tuple[Request, Response]] = field(default_factory=dict)
 
 
-# What is done with a request: the response that the client gets, and whether it was altered.
+# What a mutant does with a request: returns the client's response, and whether it was altered.
 _Act = Callable[[Request, Forward, _Past], tuple[Response, bool]]
 
 

@@ -10,7 +10,7 @@ from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
-# What is done after a request to an item: with the request, the response, another item, and the way to the device.
+# What a mutant does after a request to an item: request, response, another item, and the way to the device.
 _Act = Callable[[Request, Response, str, Forward], Response | None]
 
 

@@ -20,9 +20,9 @@ from proof.selftest.robots import Robot
 KILLED: Final = "killed"
 SURVIVED: Final = "survived"
 NOT_REACHED: Final = "not reached"
-# A run took too long or broke off, so that nothing is known.
+# The run took too long or broke off, so that nothing is known.
 GIVEN_UP: Final = "given up"
-# What a mutant did was not what it says: its own mistake.
+# The mutant did something else than its text says: an error of the self-test.
 BROKEN: Final = "broken"
 # Classes that are claimed, and requirements that are judged alone (all, where there are none).
 Attempt = tuple[tuple[str, ...], tuple[str, ...]]

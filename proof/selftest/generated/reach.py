@@ -10,7 +10,7 @@ from proof.mutation.messages import Forward, HangUpError, Request, Response
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
-# Larger messages are attacks by their size, which no fault by rule is about.
+# Larger messages are attacks by their size, which no generated fault is about.
 _LARGEST: Final = 100_000
 # Conditions that the clock or other requests decide, which messages alone do not show.
 _OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})

@@ -10,7 +10,7 @@ from typing import Final
 from proof.selftest.generated.judging import KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 from proof.selftest.generated.mutant import GeneratedMutant
 
-# Of the normal distribution, for 95 %.
+# Standard deviations of the normal distribution that contain 95 %.
 _Z: Final = 1.959964
 
 

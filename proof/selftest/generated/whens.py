@@ -17,7 +17,7 @@ from proof.selftest.generated.places import Exchange
 _RARE: Final = 20
 _FROM: Final = 30
 _PAUSE_S: Final = 1.0
-# For the first of so many seconds, s.
+# The first seconds of each period in which a fault strikes; length of the period, s.
 _SPELL_S: Final = 2.0
 _OF_S: Final = 10.0
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})

@@ -11,7 +11,7 @@ from proof.table1.faulty_bodies.readings import READINGS
 from proof.table1.faulty_bodies.velocities import VELOCITIES
 
 FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
-#: Statements of faulty bodies that declare something else than ``baroque.toml`` does, by the fault's name.
+#: Statements of faulty bodies that declare other values than ``baroque.toml``, by the fault's name.
 STATEMENTS = {path.stem: path for path in Path(__file__).parent.glob("*.toml")}
-#: Faults of which a statement leaves nothing to see: they need not fail, but must not pass.
+#: Faults that a statement may hide: they need not fail, but must not pass.
 UNSEEN = frozenset({"dead-base"})

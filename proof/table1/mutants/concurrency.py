@@ -17,7 +17,7 @@ MUTANTS = Table()
 _resource = MUTANTS.of_class("rest-resources", "rest")
 _mutant = MUTANTS.of_class("http", "rest")
 
-# How long an answer waits for another one to be mixed up with, s.
+# How long a response waits for another one to be mixed up with, s.
 _MEETS_S: Final = 0.05
 
 

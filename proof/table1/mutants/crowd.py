@@ -10,7 +10,7 @@ from proof.mutation.changes import Make, Where
 from proof.mutation.messages import Change, Forward, Request, Response
 from proof.mutation.wire import IncompleteMessageError
 
-# How long a request waits for company, s: as it would in a robot that takes its time.
+# How long a request waits for a concurrent one, s, as in a slow robot.
 COMPANY_S: Final = 0.003
 
 

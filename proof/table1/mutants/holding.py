@@ -17,7 +17,7 @@ _mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
 _DELETE, _PUT_GOAL, _POST = rest("DELETE", GOAL), rest("PUT", GOAL), rest("POST", VELOCITY)
-# Nobody asks: nothing has come for so long; and how often is looked, s.
+# Silence after which no client counts as reading, and interval of looks, s.
 _SILENT_S, _LOOK_S = 0.12, 0.04
 
 

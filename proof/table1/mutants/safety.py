@@ -19,7 +19,7 @@ _mutant = MUTANTS.of_class("safety", "rest")
 _PUT = rest("PUT", VELOCITY)
 _PUTS = rest("PUT", VELOCITY, LINEAR)
 _PUT_GOAL, _DELETE = rest("PUT", GOAL), rest("DELETE", GOAL)
-# How often a robot that goes on sends itself the velocity again, s.
+# Interval at which a robot that drives on repeats the velocity to itself, s.
 _EVERY_S = 0.15
 _AXES = (("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"))
 
@@ -104,7 +104,7 @@ class _SlowCancel:
         return forward(request)
 
 
-# A stop or a cancel that is carried out so late is answered as late, s.
+# Delay of a stop or cancel, and of its response, s.
 _HELD_BACK_S = 4.0
 
 

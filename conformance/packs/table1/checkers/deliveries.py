@@ -25,14 +25,14 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELD
 from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.evidence import Case, case
 
-# So many deliveries may wait to be looked for, and the oldest of them for so long, s.
+# Deliveries that may wait to be looked for; longest wait of the oldest, s.
 _MANY: Final = 10
 _WAITS_S: Final = 1.0
-# What the list holds at least.
+# Deliveries that the list holds at least.
 _HELD: Final = 50
-# So many lists are remembered: several clients may read it at once.
+# Lists that are remembered: several clients may read it at once.
 _LISTS: Final = 8
-# A message of more octets is not read.
+# Messages longer than this are not read, octets.
 _LARGE: Final = 100_000
 _OPERATIONS: Final = {clark(NAMESPACE, f"Execute{name}Request"): name == "Coffee" for name in ("Coffee", "Delivery")}
 

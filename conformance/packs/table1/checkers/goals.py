@@ -15,14 +15,14 @@ from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.transport.exchange import Attempt, Exchange, Request, Response
 from conformance.verdict.evidence import Case, case
 
-# A value that is the old goal's after so many changes, and after most of those that change it, is so by rule.
+# Changes, and share of all changes, after which a value must be the old goal's before it counts as stale.
 _OFTEN: Final = 3
 _MOST: Final = 0.5
-# By what the first of these readings shows, and the second, a change is judged; by further ones, what lives.
+# The first two readings after a change judge the change; later ones judge what is left of the old goal.
 _AT_FIRST: Final = 2
-# A goal is shown one way, another way, and the first way again.
+# Readings of a goal that show a swap: one value, another, and the first again.
 _SHOWN: Final = 3
-# What a goal's own progress changes.
+# Prefix of the members that a goal's own progress changes.
 _PROGRESS: Final = "status."
 Shown = dict[str, Any]
 

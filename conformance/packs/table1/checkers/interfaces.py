@@ -16,12 +16,12 @@ from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# One interface may be behind the other: once is none too often, and neither is any time so soon after a change, s.
+# Times that an interface must be behind the other before it counts; time after a change in which it may be, s.
 _OFTEN: Final = 2
 _BEHIND_S: Final = 0.5
 _XML: Final = "application/xml"
 _LARGE: Final = 100_000
-# A value that was not read yet, and one of which HEAD says only that it is there.
+# Marks a value that was not read yet, and one that only HEAD showed to be there.
 _UNREAD: Final = object()
 _THERE: Final = object()
 _HEAD: Final = "http/head"

@@ -16,12 +16,12 @@ from conformance.packs.table1.robot.soap_services import returned
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-#: Path, shapes of the list and of a type named in full, and requirement, by what is in a SOAP response with the list.
+#: The lists: path, shape of the list, shape of a type named in full, and requirement, by the SOAP response's member.
 _LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {
     b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, "equivalence/sensors"),
     b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, SERVICE_TYPE, "equivalence/services"),
 }
-# So many lists over SOAP wait for the next one over REST.
+# Lists over SOAP that wait for the next one over REST.
 _MOST: Final = 20
 
 

@@ -18,19 +18,19 @@ from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
 from conformance.verdict.evidence import Case, case
 
-# Shorter than this, m, or than so many of the path's own steps, is no leap.
+# A leap is longer than this, m, and than this many of the path's own steps.
 _LEAP_M: Final = 1.0
 _STEPS: Final = 4.0
-# Whoever leaps aside and back is about where it was: of the leap.
+# A leap aside and back ends within this share of the leap from where it began.
 _BACK: Final = 0.5
-# Numbers up to this, m, are exact enough to compare, and a tolerance that is shorter asks for none.
+# Numbers up to this are exact enough to compare; a shorter tolerance is not judged; the default tolerance, m.
 _FAR_M: Final = 1e4
 _NEAR_M: Final = 0.01
 _TOLERANCE_M: Final = 0.1
 _FRAME: Final = "map"
 _YAW_OFF_RAD: Final = 0.2
 _ROUNDING_M: Final = 1e-6
-# What judges a plan's end, start, frame and given start, by media type; the last is SOAP's. YAML is read too slowly.
+# Requirements on a plan's end, start, frame and given start, by media type; the last is SOAP's. YAML takes too long.
 _JUDGED: Final = {
     "application/json": (
         "rest-resources/plan-end",
@@ -41,9 +41,9 @@ _JUDGED: Final = {
     "application/xml": ("rest-formats/same-values",) * 4,
     "text/xml": ("soap-subscribers/plan",) * 4,
 }
-# Of fewer poses nobody knows the usual step.
+# Poses that a path needs to show its usual step.
 _FEWEST: Final = 6
-# A robot whose pose changes by less stands still, m; of plans that start elsewhere so many are no wrong readings.
+# A robot that moves less than this stands still, m; plans that must start elsewhere before it counts.
 _STANDS_M: Final = 0.02
 _OFTEN: Final = 2
 

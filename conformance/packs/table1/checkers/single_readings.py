@@ -25,22 +25,22 @@ from conformance.verdict.evidence import Case, case
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"
-# For so long a velocity may be behind the odometry, s.
+# A velocity may be behind the odometry by this time, s.
 _BEHIND_S: Final = 0.4
-# Odometry read after it, and before it, without a sample in between that was not read: it may be a message behind.
+# Odometry samples around a velocity, without a missed one between them: a velocity may be one message behind.
 _AROUND: Final = 2
-# Samples are neighbours if their stamps are not farther apart than so many times the shortest lapse.
+# Samples are neighbours if their stamps are apart by at most this many shortest lapses.
 _NEIGHBOURS: Final = 1.5
-# From so many on they are no chance: in whole runs of good robots, also of noisy ones, there was none.
+# Readings that must be wrong: whole runs of good robots, also of noisy ones, had none.
 _SEVERAL: Final = 2
-# By so many tolerances a reading is out.
+# A reading is wrong if it is off by this many tolerances.
 _OUT: Final = 1.5
 _LAPSES: Final = 50
-# A message is told one way, another way, and the first way again.
+# Readings of a message that show a swap: one value, another, and the first again.
 _TOLD: Final = 3
-# What may be in one answer and not in another, for want of digits, m, rad, m/s and rad/s.
+# Difference that rounding may make between two responses, m, rad, m/s and rad/s.
 _ABSOLUTE: Final = 0.02
-# A pose may be out by so much, m, and so may its heading as a vector: a robot may turn on between two samples.
+# A pose may be off by this much, m, and its heading as a vector: a robot may turn between two samples.
 _PLACE_M: Final = 0.05
 _HEADING: Final = 0.2
 

@@ -11,9 +11,9 @@ from conformance.packs.table1.robot.state_over_soap import answered, contradicti
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# Whoever answers may have a sample that another one of the robot's processes has not yet, s.
+# A process of the robot may lag behind another one by this, s.
 _BACK_S: Final = 1.0
-# Once, a clock may have been put back.
+# Times that a clock must go back: once, somebody may have set it.
 _SEVERAL: Final = 2
 
 

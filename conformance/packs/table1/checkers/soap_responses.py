@@ -30,7 +30,7 @@ from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
 _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soap-subscribers/response-valid"}
-# A longer path of a plan is judged where it is asked for.
+# Plans longer than this are judged only by the check that requests them, octets.
 _LARGE: Final = 100_000
 _SUFFIX: Final = "Response"
 # A service that speaks SOAP 1.2 as well answers it in kind.

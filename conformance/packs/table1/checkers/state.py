@@ -32,7 +32,7 @@ _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
 _PLAIN_FIELDS: Final = frozenset({"host", "accept", "connection"})
 _PLAIN_ACCEPT: Final = frozenset({"", "*/*", "application/json"})
 _UNIT: Final = 1e-3
-# Odometry that has been seen before so long ago is older than one second by all clocks, s.
+# Odometry that was first seen this long ago is older than one second by all clocks, s.
 _OLD_S: Final = 1.5
 
 

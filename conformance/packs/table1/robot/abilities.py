@@ -11,7 +11,7 @@ from conformance.packs.table1.statement import Motion
 AHEAD, ABOUT = 0, 5
 # The components by which a robot is told to move, the one that needs the least room first.
 _BY_ROOM: Final = (ABOUT, AHEAD, 1, 2, 3, 4)
-# So much wider than the narrowest circle is a circle that no rounding makes too narrow.
+# A circle this much wider than the narrowest one is wide enough despite rounding.
 _WIDER: Final = 1.02
 
 

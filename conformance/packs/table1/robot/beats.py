@@ -30,13 +30,13 @@ from conformance.packs.table1.robot.robot import (
 from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.statement import said_of
 
-# At quick effort there is a beat after one of so many checks.
+# At quick effort, a beat follows every second check.
 _EVERY: Final = 2
-# How long after a reading that was odd another one is made, s; one interface may be behind the other.
+# An odd reading is repeated after this time, s: one interface may be behind the other.
 _AGAIN_S: Final = 0.3
-# Plans lead so far away from where the robot is when it is first asked for one, m.
+# Plans lead this far from the robot's place at the first request, m.
 _AWAY_M: Final = 0.5
-#: What is read in a beat: paths as JSON or XML, and SOAP operations.
+#: What a beat reads: paths as JSON or XML, and SOAP operations.
 _BEATS: Final = (
     (GOAL_PATH, "GetGoal", GOAL_PATH),
     (GOAL_PATH, f"{XML} {GOAL_PATH}", GOAL_PATH),

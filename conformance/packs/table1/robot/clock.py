@@ -6,15 +6,15 @@ from typing import Final
 
 from conformance.measures.samples import slope
 
-# The rate is told from readings at least so far apart, s: over 3 s, two late answers can make a right clock 10 % wrong.
+# Readings this far apart show the clock's rate, s: over 3 s, two late responses can make a right clock 10 % wrong.
 SPAN_S: Final = 5.0
-# Of all readings one in so long is kept, s; when there are too many, every other one of them.
+# One reading is kept in this time, s, and at most this many: then every other one goes.
 _EVERY_S: Final = 0.1
 _MOST: Final = 80
-# What the rate may be off, and what a stamp may be older than its reading, in comparison with the others, s.
+# Error that the rate may have; age that a stamp may have more than the others at its reading, s.
 _SHARE: Final = 0.05
 _OLDER_S: Final = 0.05
-# Readings from which it shows whether the part below a second is in its unit: how many, and how far apart two are, s.
+# Readings that show whether the part below a second has the right unit: how many, and how far apart two are, s.
 _FINE: Final = 60
 _NEAR_S: Final = (0.2, 0.45)
 _ENOUGH: Final = 10

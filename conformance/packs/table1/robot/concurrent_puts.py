@@ -13,9 +13,9 @@ from conformance.packs.table1.robot.letting_go import JUDGED, certain_s
 from conformance.packs.table1.robot.robot import Velocity, is_near
 from conformance.transport.exchange import Exchange
 
-# Within so many tolerances a velocity is the one that was put.
+# A velocity within this many tolerances of the one that was put is that one.
 _NEAR: Final = 1.5
-# Of the settle time: from then on a velocity has to be there.
+# Multiple of the settle time after which a velocity has to be reached.
 _SETTLED: Final = 1.1
 
 

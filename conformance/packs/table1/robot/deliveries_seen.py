@@ -17,7 +17,7 @@ from conformance.transport.client import Connection, HttpClient
 # How long after the last message another is still looked for, s.
 QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
-# Between two readings of a list in which deliveries are awaited, s.
+# Pause between two readings of a list in which deliveries are awaited, s.
 _AGAIN_S: Final = 0.1
 
 

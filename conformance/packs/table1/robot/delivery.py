@@ -20,7 +20,7 @@ from conformance.transport.parallel import until_taken
 
 # Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
-# As long as this a plain number is only digits.
+# Plain numbers below this are written by digits alone.
 _ONLY_DIGITS: Final = 1e15
 
 

@@ -16,17 +16,17 @@ from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
-# A turn of readings is not begun more often than this, s: the robot's odometry has tens of hertz.
+# Shortest time between two rounds of readings, s: the robot's odometry has tens of hertz.
 _PACE_S: Final = 0.02
-# A velocity of which too few samples are seen is looked at for so much longer, s.
+# A velocity with too few samples is read this much longer, s.
 _LONGER_S: Final = 1.0
-# Of the hold time: a look that takes longer makes a renewal late.
+# Share of the hold time: a look that takes longer makes a renewal late.
 _LOOK_SHARE: Final = 0.25
-# So many requests are a look.
+# Requests of one look.
 _LOOK: Final = 3
-# How often a stop is tried whose response is late.
+# Tries of a stop whose response is late.
 _STOPS: Final = 3
-# How often it is begun anew to reach a velocity that was renewed too late, so that it may have ended before.
+# Tries of a velocity that was renewed too late, so that it may have ended.
 _LAPSES: Final = 2
 
 

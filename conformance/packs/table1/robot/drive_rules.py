@@ -17,13 +17,13 @@ from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
-# What was measured for so long alike is steady: readings of two resources may be compared, s.
+# Readings that agree for this long are steady, so that two resources may be compared, s.
 _STEADY_S: Final = 0.3
-# So many readings in a row that are off while the velocity changes are no matter of samples.
+# Readings in a row that must be wrong while the velocity changes: fewer may come from sampling.
 _IN_A_ROW: Final = 5
-# More turns than are in any window.
+# Rounds that are looked at: more than any window has.
 _LOOKED_AT: Final = 200
-#: Two writings of one double are no farther apart than this, whatever is accepted.
+#: Two writings of one double differ by less than this, whatever tolerance is accepted.
 ECHO: Final = 1e-9
 _OUTLASTED: Final = NotTested("a response takes so long that a velocity ends before it is read")
 _RESOURCES: Final = "rest-resources"

@@ -13,7 +13,7 @@ from conformance.packs.table1.statement import Statement
 # Far enough to be on the way for a while, near enough to be inside every room; nearer where there is no room.
 _FAR_M = (1.5, 0.5)
 _SLOW_M_S = 0.1
-# So far aside, m: a place whose numbers have all their digits, as whole ones do not show that a robot rounds.
+# Offset that gives a place all its digits, m: whole numbers do not show that a robot rounds.
 _ASIDE_M = 0.0137
 
 

@@ -22,7 +22,7 @@ CANCELED: Final = 5
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6
-# A robot so near its goal may end the goal while the suite asks: its tolerance, and what it drives in the meantime, m.
+# A robot this near its goal may end it while the suite asks, m: its tolerance, and its way in the meantime.
 _ARRIVED_M: Final = 0.1
 
 

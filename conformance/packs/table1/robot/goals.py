@@ -11,21 +11,21 @@ from conformance.packs.table1.robot.plan import EXACT, ask, reachable
 from conformance.packs.table1.robot.robot import Robot
 from conformance.scenarios.scenario import NoOccasionError
 
-# How far velocities may take a robot: aside, and straight ahead, m.
+# How far velocities may take a robot, aside and straight ahead, m.
 _NEAR_M: Final = 0.4
 _FAR_M: Final = 0.7
-# Who cannot drive back needs so many times the room ahead; in a circle, so many radii aside.
+# A robot that cannot reverse needs this multiple of the room ahead, and in a circle this many radii aside.
 _ONE_WAY: Final = 2.0
 _CIRCLE: Final = 2.2
 _PLACES: Final = 8
 # How far away open places are looked for: the nearest first, for the way there takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
-# How far away a goal is that has to last, where there is room, m; and how often it is tried to be in time.
+# Distance of a goal that has to last, where there is room, m; tries to be in time.
 _FARTHEST_M: Final = 1.5
 _ATTEMPTS: Final = 3
 # By how much the headings of goals in a series differ, rad.
 _TURN_RAD: Final = 0.37
-# A robot that makes room is waited for so long, s.
+# Wait for a robot that makes room, s.
 _ARRIVES_S: Final = 10.0
 
 

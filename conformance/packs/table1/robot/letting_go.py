@@ -14,25 +14,25 @@ from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import wrapped
 from conformance.packs.table1.robot.robot import STILL, Velocity, is_near
 
-# Of a tolerance: by so much a velocity that holds may be off.
+# A velocity that still holds may be off by this many tolerances.
 _OFF: Final = 1.5
-# More turns than are in the window of several samples.
+# Rounds that are looked at: more than the window of several samples has.
 _LOOKED_AT: Final = 60
-# For so long a velocity holds at least, s.
+# Shortest time that a velocity holds, s.
 _AT_LEAST_S: Final = 0.1
-# How long a velocity is counted on to hold where no hold time is declared, s.
+# Hold time that is assumed where none is declared, s.
 COUNTED_ON_S: Final = 0.5
-# Of the hold time: for so long what holds is judged. Whoever still has to send something counts on less.
+# Share of the hold time in which a velocity must hold. Code that still has to send something uses the smaller share.
 JUDGED: Final = 0.95
 _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02
 _ROUNDING_S: Final = 1e-6
-# By so much a pose of a robot at rest may be off, m and rad.
+# A pose of a robot at rest may be off by this much, m and rad.
 _PLACE_M: Final = 0.05
 _HEADING_RAD: Final = 0.1
-# Readings that are farther apart than this share of the hold time say nothing of it.
+# Readings farther apart than this share of the hold time show nothing of it.
 _GAP: Final = 0.25
-# Where no hold time is declared a velocity has to end within so long, s.
+# Without a declared hold time, a velocity has to end within this time, s.
 _ENDS_S: Final = 10.0
 #: How a velocity is commanded last: by both parts, by a PUT of the linear part, by both as XML, or on a connection that
 #: is then closed.

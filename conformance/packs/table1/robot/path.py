@@ -21,27 +21,27 @@ from conformance.packs.table1.robot.geometry import wrapped
 from conformance.packs.table1.robot.robot import Odometry, Velocity
 from conformance.verdict.evidence import Case
 
-# Less than this is no drive to judge: m and rad.
+# Shortest drive and turn that are judged, m and rad.
 _SHORTEST: Final = 0.08
 _LEAST_TURN: Final = 0.2
-# Readings; a sum over one step says nothing.
+# Fewest readings: a sum over one step says nothing.
 _FEWEST: Final = 3
-# What may be between the sum of a sampled velocity and the way: relative, and absolute in m and rad.
+# Difference between the sum of a sampled velocity and the way: as a share, in m, and in rad.
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06
-# Of the greatest speed: with less a robot does not count as driving in a direction.
+# Share of the greatest speed: below, a robot does not count as driving in a direction.
 _MOVES: Final = 0.25
-# Between readings that are farther apart a velocity may have ended and begun again: its sum is a guess, s.
+# Between readings farther apart than this a velocity may have ended and begun again: its sum is a guess, s.
 _FINE_S: Final = 0.25
-# A window's share of the way, and what the noise at its ends comes to on the whole way.
+# A window's share of the way; the noise at its ends as a multiple for the whole way.
 _WINDOW: Final = 0.25
 _NOISES: Final = 8.0
-# Between readings that are so far apart, and so many times as far as others, nobody knows what the robot did, s: an
-# answer was held up, and a velocity may have ended in the meantime and begun again.
+# A gap between readings, s, and as a multiple of the others', in which the robot's velocity is unknown: a response was
+# late, and a velocity may have ended and begun again.
 _HELD_UP_S: Final = 0.5
 _HELD_UP_TIMES: Final = 3.0
-# The same of the robot's own samples, by their stamps, s: a robot's odometry comes at least five times a second.
+# The same for the robot's own samples, by their stamps, s: odometry comes at least five times a second.
 _SKIPPED_S: Final = 0.15
 
 

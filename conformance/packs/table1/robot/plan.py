@@ -21,13 +21,13 @@ from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
-# A way so much longer than the distance goes around something: not what a short drive is for.
+# A path this much longer than the distance goes around something, and is no use for a short drive.
 _DETOUR: Final = 1.3
-# Where a plan ends at the pose itself, and not only within its tolerance, m.
+# A plan that ends within this distance ends at the pose itself, and not only within its tolerance, m.
 EXACT: Final = 1e-6
-# A plan that ends farther away than this was not made for the place in the request, m.
+# A plan that ends farther away than this was not made for the requested place, m.
 _BESIDE: Final = 0.3
-# How far from the robot, or from the given start, a path may begin: a planner's grid is not finer, m.
+# Distance from the robot, or from the given start, at which a path may begin, m: a planner's grid may be as coarse.
 START_OFF: Final = 0.25
 # Notations of a number beside the shortest: with an exponent, with a sign, with other digits before the dot.
 NOTATIONS: Final[tuple[Callable[[float], str], ...]] = (
@@ -35,7 +35,7 @@ NOTATIONS: Final[tuple[Callable[[float], str], ...]] = (
     lambda value: f"{value:+.20e}",
     lambda value: f"{value:+.17f}".replace("0.", ".", 1) if abs(value) < 1 else f"00{value:.17f}".replace("00-", "-00"),
 )
-# Plans and readings that have to say together that paths begin elsewhere.
+# Plans and readings that must agree that paths begin elsewhere.
 _STARTS: Final = 3
 
 
@@ -198,7 +198,7 @@ def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
 
 _PLACES = 4
 _FAR_M = 1.0
-# Places that are nearer to each other than this cannot be distinguished by where a plan ends, m.
+# Places nearer to each other than this cannot be told apart by a plan's end, m.
 _APART_M = 0.4
 
 

@@ -12,16 +12,16 @@ from conformance.papers_robot.statement import Ros
 from conformance.transport.passage import EyeState, Recorder
 from ros_probe.process import ProbeError, RosProcess
 
-#: How long the robot's messages are waited for, s. DDS sends a lost sample again after its writer's next heartbeat, and
-#: Fast DDS has one every 3 s: on Wi-Fi a message may come so late.
+#: Wait for the robot's messages, s. DDS sends a lost sample again after its writer's next heartbeat, which Fast DDS has
+#: every 3 s.
 ARRIVES_S: Final = 5.0
 
-# What the probe hears.
+# Names of what the probe sees.
 _EYES: Final = ("deliveries", "velocities")
 _NS: Final = 1_000_000_000
-# Until the robot is discovered, at most, and from one look at the graph to the next, s.
+# Wait for the robot's discovery, and pause between two looks at the graph, s.
 _DISCOVERY_S, _STEP_S = 10.0, 0.05
-# A subscription is of use when both ends know of it, s.
+# Time after which both ends know of a subscription, s.
 _MATCHED_S: Final = 0.2
 _DELIVERY: Final = "mybot_delivery_app/msg/DeliveryRequestMsg"
 _TWIST, _STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"

@@ -26,34 +26,34 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Request, Response
 from conformance.verdict.effort import Effort
 
-# These say that the request is wrong, in whatever state the robot is: not whose it is, nor how large or how many.
+# Statuses that say that the request is wrong in every state: not because of its sender, size or rate.
 _WRONG: Final = frozenset({400, 404, 405, 406, 415, 422})
 _FAULTS: Final = frozenset({"Client", "MustUnderstand", "VersionMismatch"})
-# Fields by which a request is framed in a way of its own, or means something else later.
+# Fields that frame a request in an unusual way, or that change what it means later.
 _SPECIAL: Final = frozenset({"transfer-encoding", "expect", "range", "idempotency-key", "if-match", "if-none-match"})
 _OF_THE_CLIENT: Final = frozenset({"host", "content-length", "connection"})
-# What is larger, or attacks an XML parser, is sent by those checks that look at what it does to the robot, octets.
+# Octets of a request that is kept. Larger ones, and attacks on XML parsers, are sent by the checks of these.
 _LARGEST: Final = 8192
 _LONGEST: Final = 1024
 _ATTACKS: Final = (b"<!DOCTYPE", b"<!ENTITY", b"XInclude")
-# What a refusal says apart from values: it tells kinds of faults apart.
+# Words of a refusal without values, which tell kinds of faults apart.
 _DETAIL: Final = re.compile(r"detail\W+|faultstring\W*")
 _VALUES: Final = re.compile(r"'[^']*'|\d+")
 _KIND: Final = 48
-# So many are kept of one operation, and of one kind of fault there.
+# Requests that are kept of one operation, and of one kind of fault there.
 _MOST: Final = 400
 _ALIKE: Final = 2
-# A velocity, and a delivery, that every robot refuses.
+# A velocity and a delivery that every robot refuses.
 _BEYOND: Final = Velocity(angular_z=1e4)
 #: A frame that no robot knows.
 NO_FRAME: Final = "no_such_frame"
 _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
-# How many are sent again, of a fast robot and at least.
+# Requests that are sent again: for a fast robot by effort, and at least.
 _COUNTS: Final = {"quick": 60, "standard": 300}
 _FEWEST: Final = 8
-# For so long they are sent at most where the rate of requests is limited, s.
+# Longest time for them where the rate of requests is limited, s.
 _LONGEST_S: Final = 0.5
-# So many kinds of fault of an operation are sent before the next ones of all operations, by the operation's rank.
+# Kinds of fault of an operation that are sent before the next ones of all operations, by the operation's rank.
 _DEPTH: Final = (6, 2, 1)
 
 

@@ -67,7 +67,7 @@ class Velocity(NamedTuple):
 STILL: Final = Velocity()
 
 
-# Odometry is no rarer than that where nothing is declared, Hz.
+# Lowest rate of odometry that is assumed where none is declared, Hz.
 _SELDOM_HZ: Final = 5.0
 
 

@@ -17,7 +17,7 @@ from conformance.papers_robot.delivery import COFFEE
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.parallel import Addressed
 
-# Where a robot may have a plan to, seen from where it is, m.
+# Places to which a robot may have a plan, relative to the robot, m.
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))
 
 

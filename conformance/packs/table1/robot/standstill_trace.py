@@ -8,7 +8,7 @@ from conformance.scenarios.rule import NotTested
 from conformance.transport.exchange import Exchange, Unanswered
 from conformance.verdict.evidence import Case
 
-#: What is found of a robot that rests and has a goal.
+#: The word for a robot that rests and has a goal.
 GOAL: Final = "an active goal"
 
 

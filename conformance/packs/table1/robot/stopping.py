@@ -14,14 +14,14 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
 from conformance.transport.pace import Pace
 
-# A robot with a queue of missions starts the next one when the first is cancelled: cancel again for so long, s.
+# Time for which a cancellation is repeated, s: a robot with a queue of missions starts the next one.
 _CANCEL_S: Final = 3.0
-# Beyond the settle time, which a loaded machine and a far network may stretch, s.
+# Time that is allowed beyond the settle time, which a loaded machine and a far network may stretch, s.
 _GRACE_S: Final = 1.5
 _STEP_S: Final = 0.02
-# Between two readings that both have to show rest, s.
+# Pause between two readings that must both show rest, s.
 _AGAIN_S: Final = 0.002
-# At the end of a run a robot that does not answer must not keep the user waiting, s.
+# Deadline of one request, and of all, for a robot that does not respond at the end of a run, s.
 _LAST_TIMEOUT_S: Final = 0.7
 _LAST_S: Final = 3.0
 

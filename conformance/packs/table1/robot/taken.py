@@ -21,16 +21,16 @@ from conformance.transport.exchange import Exchange
 # How a PUT is sent.
 Put = Callable[[], Exchange]
 PutGoal = Callable[[dict[str, Any]], Exchange]
-# What is done, and whether it has its effect; None where that cannot be said.
+# An action that is carried out; returns whether it had its effect, or None if that is not known.
 Act = Callable[[], bool | None]
-# So many readings at rest, each of another sample of the odometry, are no chance.
+# Readings at rest, each of another odometry sample, that show that it is no chance.
 _READINGS: Final = 3
 _STEP_S: Final = 0.02
-# Of the settle time: from then on a velocity is there.
+# Multiple of the settle time after which a velocity has to be reached.
 _SETTLED: Final = 1.1
-# A goal with another heading: far enough, rad, that the robot is not there before anybody looks.
+# Turn to a goal with another heading, rad: large enough to last until it is read.
 _TURN: Final = 2.5
-# A robot that has moved by so much on its way to a goal has had it, m and rad.
+# A robot that has moved by this much towards a goal had that goal, m and rad.
 _MOVED_M: Final = 0.2
 _MOVED_RAD: Final = 0.3
 

@@ -13,20 +13,19 @@ from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.no_commands import refuse_goal
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
-# Beyond any limit, or not to be actuated; and by the linear part alone.
+# Velocities beyond any limit, or in a direction without a drive; and one of the linear part alone.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
 _BAD_LINEAR: Final = Velocity(linear_x=1e3)
-# Where an answer takes longer, a velocity may end before all of them are sent, s.
+# A response that takes longer lets a velocity end before all requests are sent, s.
 _QUICK_S: Final = 0.02
-# A robot that drops its angular velocity needs so long to show it, s.
+# Time in which a robot that drops its angular velocity shows it, s.
 _SHOWS_S: Final = 0.2
-# What could not be seen in time is tried so often.
+# Tries of what could not be seen in time.
 _TRIES: Final = 3
-# And a velocity that was renewed too late is begun anew so often: where nobody knows whether it can be renewed, the
-# verdict stays open.
+# Tries of a velocity that was renewed too late: if nobody knows whether it can be renewed, the verdict stays open.
 _RENEWED_TRIES: Final = 5
 _STEP_S: Final = 0.01
-# A look that takes so many times as long as usual must not make a renewal late.
+# A look may take this many times as long as usual before it makes a renewal late.
 _LOOKS: Final = 4
 
 

@@ -8,7 +8,7 @@ from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.letting_go import Way
 from conformance.packs.table1.robot.robot import Robot, Velocity
 
-# Of a limit: a slow velocity. Or so many times what may be taken for rest, but never more than the last.
+# A slow velocity, as a share of its limit, or as a multiple of what may pass for rest, but at most the last share.
 _SLOW: Final = 0.1
 _TOLD: Final = 4
 _MOST: Final = 0.6

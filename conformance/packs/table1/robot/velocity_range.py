@@ -7,11 +7,11 @@ from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, tur
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
-# Where no limits are declared the robot may be slower than the figures that it is judged by.
+# Share of the assumed figures that a robot may reach where it declares no limits.
 _UNDECLARED: Final = 0.6
-# A drive needs more room than a turn: so much of the share.
+# Share of that for a drive, which needs more room than a turn.
 _SLOWER: Final = 0.5
-# So many times as fast as what may still be rest, by its tolerance and its noise, a robot does not rest.
+# A robot faster than this multiple of tolerance and noise does not rest.
 _MOVES: Final = 1.6
 
 

@@ -8,10 +8,10 @@ from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
 from conformance.packs.table1.robot.robot import STILL, Velocity
 from conformance.packs.table1.robot.walk import Walk
 
-# Of the limits: fast enough to differ from rest, slow enough to stay near.
+# Shares of the limits: fast enough to differ from rest, slow enough to stay near.
 _LINEAR_SHARE = 0.35
 _ANGULAR_SHARE = 0.6
-# Farther than this from where the walk began, the next way leads back, m.
+# Beyond this distance from the start of the walk, the next way leads back, m.
 _LEASH_M = 0.25
 _SHARES = st.floats(0.15, 1.0)
 

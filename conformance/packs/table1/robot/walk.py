@@ -13,7 +13,7 @@ from conformance.verdict.effort import Effort
 
 _TIME_IS_UP = "the time is up"
 _ENOUGH = "all steps that were planned are done"
-# A command takes about this long to be reached, at least; and this part of the settle time of a robot that is slow.
+# Least time until a command is reached, s, and share of a slow robot's settle time.
 _COMMAND_S = 0.4
 _OF_SETTLE = 0.25
 # A pause without any request, s; once in a walk.

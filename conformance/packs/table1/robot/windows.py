@@ -13,9 +13,9 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_trace import ALL, Turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 
-# Where stamps do not tell: no robot's odometry is slower than this, so that a later reading is another sample, s.
+# Where stamps do not advance: odometry is at least this frequent, so that a later reading is another sample, s.
 LONGEST_SAMPLE_S: Final = 0.25
-# What is still so far away, of what it was at first, has not come nearer.
+# A distance that is still this share of the first one has not become shorter.
 _NO_NEARER: Final = 0.8
 
 

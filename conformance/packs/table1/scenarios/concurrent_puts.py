@@ -23,10 +23,10 @@ from conformance.transport.exchange import Attempt, Exchange, Outgoing, Unanswer
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 
-# How often velocities are put that ended before a read showed them, or that the robot did not reach in time.
+# Tries of velocities that ended before a read, or that were not reached in time.
 _TRIES: Final = 3
 _CLIENTS: Final = 4
-# How long after it was cancelled a goal is read, s: each fifth time for longer.
+# How long a goal is read after it was cancelled, s: each fifth time for longer.
 _WATCHED_S: Final = 0.03
 _WATCHED_LONGER_S: Final = 0.1
 _GOAL_STEP_S: Final = 0.02

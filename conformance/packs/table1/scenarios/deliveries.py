@@ -19,12 +19,12 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.verdict.effort import Effort
 from conformance.verdict.explorer import Explorer
 
-# A robot's list holds at least the last fifty: no batch makes more messages than half of that.
+# Orders in a batch: they make at most half as many messages as a robot's list must hold (fifty).
 _ORDERS: Final = 12
-# After so many batches in which deliveries were lost or added, no more are sent: each of them takes a long wait.
+# Batches with lost or added deliveries after which no more are sent: each takes a long wait.
 _ENOUGH: Final = 3
 _KINDS: Final = ("same", "rest", "soap", "coffee")
-# Where a double or an integer ends; by their places the values stay different from each other.
+# Limits of doubles and integers, by place, so that values stay different from each other.
 _CORNERS: Final = (
     ("twice", (3, 0.5, -0.0, 1.0, 5e-324, -5e-324, 2.2250738585072009e-308)),
     ("rest", (3, -0.0, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, -1.7976931348623157e308, 0.1)),
@@ -32,11 +32,11 @@ _CORNERS: Final = (
     ("same", (4, 0.30000000000000004, 123456789.123456789, -0.0, 1e-300, 1e300, 5e-324)),
 )
 _CLIENTS: Final = (("rest", COURIER), ("soap", COURIER), ("rest", COURIER), ("coffee", COFFEE)) * 2
-# So many rounds of clients at once make no more messages than a robot's list holds for certain.
+# Rounds of concurrent clients: a robot's list must hold all their messages.
 _ROUNDS: Final = 3
 # The styles that write a number in another way come first among the styles of a sender.
 _STYLES: Final = len(TEXTS)
-# How long late messages are awaited, s: at any effort, and at quick.
+# Wait for late messages, s: at any effort, and at quick.
 _LATER_S: Final = (2.0, 0.45)
 _NEEDS: Final = (Need.REST, Need.PUBLISHERS, Need.MOTION)
 

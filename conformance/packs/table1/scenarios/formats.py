@@ -27,11 +27,11 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# First readings that are out after so many changes of one kind are no chance.
+# Changes of one kind after which the first reading must be wrong to count.
 _CHANGES: Final = 3
-# Ids that YAML, by any of its versions, takes for another type where they are not quoted.
+# Ids that some version of YAML reads as another type if they are not quoted.
 _LIKE_OTHER_TYPES: Final = ("123", "null", "true", "-1.5", "0x1F")
-# Over a slow link, or a robot that arrives soon, a goal may be over when it is read.
+# Tries: over a slow link, or if the robot arrives soon, a goal may be over when it is read.
 _TRIES: Final = 3
 
 

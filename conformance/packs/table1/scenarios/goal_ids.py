@@ -32,10 +32,10 @@ _KNOWN: Final = (
     " with spaces ",
     "A",
 )
-# Ids that a robot which folds letters or compares the first characters takes for one.
+# Ids that a robot confuses if it ignores case or compares only the first characters.
 _ALIKE: Final = ("goal", "Goal", "a" * 64 + "1", "a" * 64 + "2")
 _READINGS: Final = 3
-# One goal in so many is put just after the one before was cancelled; not those whose ids are alike.
+# One goal in this many is put just after the one before was cancelled, unless their ids are alike.
 _AFTER_DELETE: Final = 3
 
 

@@ -29,13 +29,13 @@ from conformance.verdict.evidence import Case
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
-# Where a look takes longer, a velocity may have ended before it is read, s.
+# A look that takes longer lets a velocity end before it is read, s.
 _LOOK_S: Final = 0.1
-# For so long after a cancelled goal the robot has to stay where it is: longer than second thoughts take, s.
+# How long the robot must stay where it is after a cancelled goal, s.
 _STAYS_S: Final = 1.3
 _STEP_S: Final = 0.02
 _TIMES: Final = 3
-# Another heading than a goal's, rad.
+# A heading that differs from a goal's, rad.
 _OTHER_RAD: Final = 1.0
 _AFTER: Final = "the goal was cancelled"
 

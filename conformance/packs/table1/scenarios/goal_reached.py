@@ -27,13 +27,13 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
-# How long a robot that comes nearer is waited for, at 0.01 m/s and with hindrances on the way, s.
+# Wait for a robot that comes nearer, at 0.01 m/s and with obstacles on the way, s.
 _LONGEST_S: Final = 120.0
-# How far away a goal is: this, m, or twice the tolerance, so that a goal given up on the way is not taken for reached.
+# Distance of a goal, m, or twice the tolerance, so that a goal given up on the way does not pass for reached.
 _AWAY_M: Final = 0.6
-# So far the robot has to come from where it was, where the goal is that much beyond the tolerance, m.
+# Way that the robot must have made, where the goal is farther away than this plus the tolerance, m.
 _MOVED_M: Final = 0.15
-# The heading of a goal differs by so much from the direction of the way there, rad, or by twice the tolerance.
+# Difference between a goal's heading and the way there, rad, or twice the tolerance.
 _TURN_RAD: Final = 0.6
 _DETOUR: Final = 1.3
 # Another heading at the goal, rad.
@@ -42,7 +42,7 @@ _LOOKED_S: Final = 1.0
 _STEP_S: Final = 0.05
 _DISPLACED: Final = "displaced"
 _REACHED: Final = "reached"
-# What counts as progress.
+# Least progress of a position, m, and of a heading, rad.
 _NEARER_M: Final = 0.02
 _TURNED_RAD: Final = 0.05
 

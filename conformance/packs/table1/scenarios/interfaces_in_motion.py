@@ -27,13 +27,13 @@ from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.effort import Effort
 
-# First readings that are out after so many changes of one kind are no chance.
+# Changes of one kind after which the first reading must be wrong to count.
 _CHANGES: Final = 3
-# How often a state is compared that stays as it is.
+# Comparisons of a state that stays as it is.
 _TIMES: Final = 4
-# Goals that displaced another one, one after another: so many whose first answer is out are no chance.
+# Goals, each displacing the one before, whose first response must be wrong to count.
 _GOALS: Final = 3
-# So many goals are first read in one way: more than the first answers that are no chance.
+# Goals that are first read in one way: more than _GOALS.
 _IN_A_ROW: Final = 4
 
 

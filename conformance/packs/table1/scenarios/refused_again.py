@@ -40,13 +40,13 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
 _AFTER: Final = "requests that were refused before, sent again"
-# Another client of the robot orders once; a robot that takes refused requests for orders does so again.
+# Times that a refused request must act: another client of the robot may order once.
 _TWICE: Final = 2
-# A robot that has driven less than this, m and rad, stood still.
+# A robot that has moved less than this stood still, m and rad.
 _STOOD_M: Final = 0.01
 _STOOD_RAD: Final = 0.02
 _OTHER_RAD: Final = 1.0
-# A robot may end its goal at every third refusal: to see that it does, so many are sent again.
+# Refusals that are sent again: a robot may end its goal at every third one.
 _AGAIN: Final = 8
 # A quaternion whose length is off by more is refused (contract.md#poses).
 _NO_UNIT: Final = 2e-3

@@ -18,11 +18,11 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Case
 
-# No robot of this contract is as fast, even if its statement declares no limit: m/s and rad/s.
+# Speeds that no robot of this contract reaches, even without a declared limit, m/s and rad/s.
 _BEYOND_ANY: Final = 1e3
 _FARTHER: Final = (1e6, 1e308)
 _REACHED: Final = 0.1
-# A slow velocity in a direction that the robot does not have, as a share of its range.
+# A slow velocity in a direction without a drive, as a share of its range.
 _SLOW: Final = 0.1
 _AFTER: Final = "refused velocities"
 

@@ -23,10 +23,10 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# A delivery with these coordinates is none that any other check sends.
+# No other check sends a delivery with this coordinate.
 _DEPOT_X: Final = 4711.125
 _STEP_S: Final = 0.02
-# A robot has read both of two requests, one after the other, by then, s.
+# Time after which a robot has read both of two successive requests, s.
 _LISTED_S: Final = 1.0
 #: The goal's id.
 GOAL_ID: Final = "roaas-soap-goal"

@@ -30,27 +30,26 @@ from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
-# Of the hold time: so long after a command it is given again, and holds from then on; so long after it a robot that
-# has reached it already has time to hold it.
+# Shares of the hold time: renew a command after the first; until the second a robot still has time to hold it.
 _AGAIN: Final = 0.25
 _SOON: Final = 0.45
-# Of the hold time: so long after its end the suite does not read the robot, if that is enough for it to come to rest.
+# Share of the hold time after its end in which the suite does not read the robot, if it can come to rest in it.
 _BRIEF: Final = 0.2
-# After the last velocity of longer runs, so long: a robot must not show what it showed before a pause, s.
+# Pause after the last velocity of longer runs, s: a robot must not show values from before a pause.
 _PAUSE_S: Final = 1.1
-# For so many times the hold time a linear part is renewed.
+# Multiple of the hold time for which a linear part is renewed.
 _RENEWED: Final = 1.4
-# How often a measurement of how long a velocity holds is tried that a stall of the suite or a late response spoilt.
+# Tries of a hold time's measurement that a stall of the suite or a late response spoilt.
 _ATTEMPTS: Final = 3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
-# Of the limit: how fast the robot drives along an arc.
+# Share of the limit at which the robot drives along an arc.
 _ASIDE: Final = 0.3
-# Beside one of so many looks the state is also read over SOAP, where a response does not take longer than this, s.
+# One look in this many also reads the state over SOAP, if a response takes less than this, s.
 _BESIDE: Final = 4
 _QUICK_S: Final = 0.02
 _STATES: Final = ("GetPose", "GetVelocity")
-# In this time several samples come, from any robot, s.
+# Time in which any robot sends several samples, s.
 _SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 

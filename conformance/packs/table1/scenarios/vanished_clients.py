@@ -15,9 +15,9 @@ from conformance.transport.raw import PartialRequest
 from conformance.verdict.evidence import Case
 
 _AFTER: Final = "clients vanished in the middle of a request"
-# For so long the robot is watched after the requests, before what comes next; s.
+# How long the robot is watched after the requests, before the next step, s.
 _WATCH_S: Final = 0.06
-# For so long a robot has time to read the sent part before the connection breaks, s.
+# Time that a robot has to read the sent part before the connection breaks, s.
 _READ_S: Final = 0.03
 
 

@@ -12,7 +12,7 @@ from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# Of no declared hold time: what it is taken to be when a velocity is renewed, s.
+# Hold time that is assumed where none is declared, when a velocity is renewed, s.
 _RENEWED_S: Final = 2.0
 
 

@@ -19,7 +19,7 @@ from proof.table1.independent_robots.plain.server import Answer
 from proof.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, written
 
 _FRAMES = ("map", "odom")
-# So long a goal is accepted before it is executing (action_msgs/GoalStatus), s.
+# Time for which a goal is accepted before it is executing (action_msgs/GoalStatus), s.
 _NEW_S = 0.05
 SENSORS = [
     {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/msg/LaserScan"},

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 MAX_BODY = 256 * 1024
 MAX_TARGET = 8000
-# Of a request that was refused by its head: so much more is read, and for so long, before the connection is closed.
+# Octets and time, s, for which a refused request is read on before the connection is closed.
 MAX_UNREAD = 16 * 1024 * 1024
 _LINGER_S = 2.0
 

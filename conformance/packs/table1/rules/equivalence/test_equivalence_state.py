@@ -28,26 +28,25 @@ from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest", "subscribers")
 _SAME: Final = Slack(0.0, 0.0)
-# More than any tolerance that is asked for here, m.
+# Larger than any tolerance that is requested here, m.
 _END_OFF: Final = 0.3
-# At standard effort: of a state that is out once in sixty answers, one pose is compared, and two velocities, for which
-# at most so many times as many are read.
+# Comparisons at standard effort, which find a state that is wrong once in sixty responses: poses, and velocities, for
+# which at most this multiple is read.
 _POSES: Final = 200
 _VELOCITIES: Final = 320
 _READ: Final = 4
-# Of so many states one is read over SOAP just after a request that is refused, and one just after one that acts.
+# States between two that are read over SOAP just after a refused request, and just after one that acts.
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
-# So often each state is read over REST before and after; so many rounds of several clients; in so many of their
-# responses a value differs by rule. Noise in coarse steps, of odometry that seldom comes, may have been the same before
-# and after, but not so often.
+# Reads of each state over REST before and after; rounds of several clients; share of their responses that must differ.
+# Coarse noise of rare odometry may repeat before and after, but not that often.
 _ALONE: Final = 4
 _ROUNDS: Final = 10
 _MOST: Final = 0.8
 _REPEATS: Final = 3
 # By place: a response that differs, the known value, and the other one.
 _Odd = dict[str, tuple[Exchange, Any, Any]]
-# Between the headings of plans, rad: small ones are among them.
+# Difference between the headings of plans, rad: small ones are among them.
 _STEP: Final = 0.07
 # How far ahead a plan in the odometry's frame leads, m.
 _AHEAD: Final = 0.3

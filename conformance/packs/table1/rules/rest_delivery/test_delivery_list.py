@@ -18,9 +18,9 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-# What the list holds at least.
+# Deliveries that the list holds at least.
 _LEAST: Final = 50
-# A robot that writes its list after it has answered has done so by then, s.
+# Reading interval, and time by which a robot that writes its list after responding has done so, s.
 _STEP_S, _SOON_S = 0.05, 1.0
 
 

@@ -7,10 +7,10 @@ from conformance.packs.table1.robot.clock import SPAN_S, Clock
 from conformance.packs.table1.robot.robot import POSE, Robot
 from conformance.verdict.evidence import Judge
 
-# Late in a run: the longer it has lasted, the better its stamps tell.
+# Late in a run: its stamps show more the longer the run has lasted.
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _STEP_S = 0.1
-# How far the clock may be off, and how old the odometry may be; a Date has no part of a second.
+# Error that the clock may have; age that odometry may have; resolution of Date, s.
 _OFF_S, _OLD_S, _UNIT_S = 5.0, 1.0, 1.0
 
 

@@ -11,16 +11,16 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-# A robot whose odometry is slow, or that has just been started, gets so long, s.
+# Wait for a robot whose odometry is slow, or that has just been started, s.
 _PATIENCE_S = 5.0
-# At standard effort: what is out once in sixty readings is judged several times.
-# A busy machine misses samples, and what lies beside those is not judged: so many times as many readings, at most.
+# Readings at standard effort, which find what is wrong once in sixty; a busy machine misses samples, so at most this
+# multiple is read.
 _TURNS = 250
 _READ = 4
 # Twice as long as the odometry has to be steady, s.
 _LONG_S = 0.6
 _SAMPLE, _BESIDE = "rest-resources/pose-sample", "rest-resources/velocity-odometry"
-# So many readings in a row without an odometry, and there is none.
+# Readings in a row without odometry after which there is none.
 _UNREAD = 5
 
 

@@ -20,11 +20,11 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# A stop is answered so much later than the settle time allows at most, s: a robot may wait until it is at rest. So
-# many usual response times are added for the network.
+# Time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests. Usual response times
+# that are added for the network.
 _ANSWERED_S: Final = 1.0
 _USUAL: Final = 4
-# So many late responses are the robot's.
+# Late responses that are the robot's fault.
 _LATE_RESPONSES: Final = 2
 _LATE = NotTested("responses came too late to measure how long a velocity holds")
 

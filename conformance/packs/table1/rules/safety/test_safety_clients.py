@@ -16,9 +16,9 @@ from conformance.transport.raw import PartialRequest
 from conformance.verdict.evidence import Case, Judge
 
 pytestmark = pytest.mark.needs("rest")
-# The usual time may be a tenth of a millisecond; a scheduler's turn on a busy machine is no failure, s.
+# Usual response time that is assumed at least, s: scheduling on a busy machine is no failure.
 _USUAL_S: Final = 1.0
-# Nor is a response that the network delayed: a robot that waits for the other requests does not respond to the third.
+# Tries: a network may delay one response, but a robot that waits for other requests never responds to the third.
 _TRIES: Final = 3
 
 

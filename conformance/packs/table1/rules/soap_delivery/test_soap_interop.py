@@ -18,12 +18,12 @@ from conformance.verdict.evidence import Judge
 if TYPE_CHECKING:
     from conformance.api.soap.zeep_client import ZeepCaller
 
-# What a user would look for in what zeep returns.
+# Values that a user expects in zeep's result.
 _VALUES = {
     "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
     "GetVelocity": ("linear.x", "angular.z"),
 }
-# How long odometry may be late before the robot is held to have none, s, and how often to ask meanwhile.
+# How long odometry may be late before the robot counts as having none, and how often it is read meanwhile, s.
 _MOST_STALE_S = 2.0
 _AGAIN_S = 0.2
 

@@ -22,7 +22,7 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
-# A path that is not told right after so many refusals, and is otherwise, is not told because of them.
+# Refusals after which a path must be wrong, and right otherwise, to count as their effect.
 _REFUSALS = 3
 # Frames of these names are asked for one after another.
 _MARKS = ("first-frame", "second-frame")
