@@ -205,7 +205,6 @@ class _Thing:
             # A JSON patch has no members: the first one that changes something.
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._refused(change, refusable)
-            # The writes below restore what these have changed.
             self._at_once(change, bodies)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
@@ -258,7 +257,10 @@ class _Thing:
             self.get()
 
     def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
-        """Write by two clients at the same moment that have the same copy, of which one has to be refused."""
+        """Write by two clients at the same moment that have the same copy, of which one has to be refused.
+
+        What they have changed is restored, so that each write after it changes its member, whoever was first.
+        """
         names = {one.name.lower() for one in change.parameter("header")}
         now = self._members()
         others = [one for one in bodies if any(not same(now.get(name), one[name]) for name in one)]
@@ -268,6 +270,8 @@ class _Thing:
             fields = [tuple(one for one in own[0].headers if one[0].lower() != "if-match"), self._current()]
             requests = [replace(one, target=self.target, headers=(*fields[0], *fields[1])) for one in own]
             send_together([[(self.api.client, one) for one in requests]])
+            self.get()
+            self.sent(change, bodies[-1], *self._current())
             self.get()
 
     def _other(self, bodies: Sequence[Any]) -> Any:
@@ -470,7 +474,7 @@ class _Thing:
         whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
         values = another(schema, whole, 1, self.surveyor.values.collections)
         chosen = {name: value for name, value in values.items() if value != whole.get(name)}
-        chosen |= {name: one for name, one in _texts(schema, values).items() if name in chosen}
+        chosen |= {name: one for name, one in _texts(schema, whole).items() if name in chosen}
         found = []
         for name, value in chosen.items():
             body = {name: value} if change.method == "PATCH" else {**whole, name: value}
@@ -499,11 +503,11 @@ def _with_texts(create: Operation, body: Any) -> Any:
 
 
 def _texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
-    """Return a text beyond ASCII for each free text of an object."""
+    """Return another text, beyond ASCII, for each free text of an object."""
     parts = flat(schema).get("properties", {})
     free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
-    found = {name: next((text for text in TEXTS if fits(parts[name], text)), "") for name in free}
-    return {name: text for name, text in found.items() if text}
+    found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
+    return {name: texts[0] for name, texts in found.items() if texts}
 
 
 def _is_beyond_ascii(body: dict[str, Any]) -> bool:
