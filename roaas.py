@@ -206,7 +206,7 @@ class FrontDoor:
 
     @staticmethod
     def prepare() -> None:
-        """Load what render() needs, which takes a sixth of a second, at a moment when nobody waits for it."""
+        """Load what render() needs, which takes a sixth of a second, while the run waits for the device anyway."""
         import_module("reports.rendering")
 
     @staticmethod

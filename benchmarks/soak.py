@@ -46,7 +46,7 @@ ASKED = (  # (operation, SOAP or REST, method, target, content); deliveries seld
 
 @dataclass
 class Good:
-    """What good clients got: statuses, and what was wrong."""
+    """The responses that good clients got: statuses, and what was wrong in them."""
 
     statuses: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)

@@ -323,7 +323,7 @@ class _Goals:
         return CancelResponse.REJECT if refused else CancelResponse.ACCEPT
 
     def execute(self, goal: Any) -> Any:
-        """Do with a goal what its step says; return the result."""
+        """Carry out a goal as its step says; return the result."""
         id_ = bytes(goal.goal_id.uuid)
         with self._lock:
             step = self._by_goal[id_] = self._accepted.popleft()

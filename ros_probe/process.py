@@ -26,7 +26,7 @@ class ProbeError(Exception):
 
 
 class RosProcess:
-    """A ROS node in a process of its own, which does as told (player.py); call await_ready() before anything else.
+    """A ROS node in a process of its own, which follows commands (player.py); call await_ready() before anything else.
 
     Args:
         name: of the node.

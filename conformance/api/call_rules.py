@@ -56,7 +56,7 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True)
 class CallRules:
-    """What the user says of what may be called.
+    """The user's rules on which operations may be called.
 
     Attributes:
         allow: patterns of operations that may be called although they are not safe.
@@ -130,7 +130,7 @@ def words_of(text: str) -> set[str]:
 
 
 def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[str] = ()) -> list[str]:
-    """Return in lines what a run calls and what not, and why.
+    """Return lines on which operations a run calls, and why not the others.
 
     Args:
         rules: what the user says.

@@ -21,7 +21,7 @@ NO_MOTION = "it may move the robot, and --allow-motion was not given"
 
 
 class Permission:
-    """What one run may send.
+    """The rules on which requests one run may send.
 
     Args:
         run: says whether the robot may be moved.
@@ -101,7 +101,7 @@ class Permission:
         return f"{method} {path[:200]} was not sent: {reason}"
 
     def _moves(self, method: str, url: str) -> bool | None:
-        """Return what the contract pack says of a request's operation (x-roaas-motion); None: it says nothing."""
+        """Return whether the contract pack says that a request's operation moves (x-roaas-motion); None: unknown."""
         base = (self._run.statement.endpoints.rest or "").rstrip("/")
         path = _place(url).removeprefix(base)
         if not base or not _place(url).startswith(f"{base}/") or not is_normal(path):

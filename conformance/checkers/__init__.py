@@ -1,1 +1,1 @@
-"""Checkers judge what was exchanged. They send nothing, and know neither the checks nor where it was written down."""
+"""Judge exchanges. A checker sends nothing, and knows neither the checks nor the history."""

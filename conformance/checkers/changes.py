@@ -96,7 +96,7 @@ class Changes:
         self._known: dict[str, _State] = {}
 
     def forget(self) -> None:
-        """Forget what a request may have changed of which nobody knows what it did."""
+        """Forget what a request of unknown effect may have changed."""
         self._there.clear()
         self._known.clear()
         self._claims.clear()
@@ -178,7 +178,7 @@ class Changes:
             yield from self._state(occasion, operation, path, state)
 
     def _state(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
-        """Judge the state of a thing by what was read or told of it before."""
+        """Judge the state of a thing by its earlier states in responses."""
         name = self._states[operation.template.rstrip("/")]
         sent_s = occasion.sent_s
         for claim, state in self._claims.pop(path, ()):
@@ -209,7 +209,7 @@ class Changes:
         self._known[path] = _State(now, occasion.response.received_s)
 
     def _fallen(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
-        """Judge members of a thing of which the description says that they never become less."""
+        """Judge the members of a thing that never decrease, as the description says."""
         names, answer = self._growing.get(template, frozenset()), occasion.response
         value = read_json(answer.body).value if names and is_json(answer.media_type) else None
         now = {name: one for name, one in represented(value, names).items() if name in names and is_number(one)}
@@ -227,7 +227,7 @@ class Changes:
 
 
 def state_of(read: Operation) -> str:
-    """Return the member of a thing that has one of several states, some of them final; empty if it has none."""
+    """Return the member that contains a thing's state, if some of its values are final; empty if there is none."""
     outer = flat(read.shape or {}).get("properties", {})
     inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
     parts = ((name, flat(one)) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict))

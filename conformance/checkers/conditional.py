@@ -1,4 +1,4 @@
-"""Conditions and ranges (RFC 9110 13, 14): 304 to whoever has a current copy alone, 206 to whoever asked for a part."""
+"""Conditions and ranges (RFC 9110 13, 14): 304 only for a current copy, 206 only for a requested part."""
 
 import re
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ _TAG = re.compile(r'"[^"]*"')
 
 
 class Conditional:
-    """Judges the responses to conditions; what is current it knows from the entity tags and dates of the run."""
+    """Judges responses to conditions, by the entity tags and dates that the run has seen."""
 
     def __init__(self) -> None:
         # By URL: the entity tags that were sent, and whether a time of change was.

@@ -45,12 +45,12 @@ _KEEPS: Final = re.compile(
 
 
 def keeps_octets(media_type: str) -> bool:
-    """Return whether what is sent in a media type is a file, whose octets say something each."""
+    """Return whether content of a media type is a file, in which every byte matters."""
     return media_type in _FILES or media_type.partition("/")[0] in {"image", "audio", "video"}
 
 
 class _Key(NamedTuple):
-    """What chooses one representation: where it is, and the header fields that ask for it."""
+    """Identifies one representation: its URL, and the header fields that select it."""
 
     url: str
     fields: Fields
@@ -118,7 +118,7 @@ class Contents:
             yield from self._file(occasion, sent)
 
     def _file(self, occasion: Occasion, sent: Occasion | None) -> Iterator[Case]:
-        """Judge a read by the file that was sent just before; one that was there before may be there for a while."""
+        """Judge a read by the file that was sent just before; the file before that may stay for a moment."""
         body, known = occasion.response.body, self._known.setdefault(occasion.request.url, set())
         if sent is not None and (sent.request.body == body or hash(body) not in known):
             octets, label = sent.request.body, label_of(occasion.operation)
@@ -174,7 +174,7 @@ def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:
 
 
 def _digests(occasion: Occasion) -> Iterator[Case]:
-    """Judge the digests of a content, and those of a representation that is all of it."""
+    """Judge the digests of a content, and those of the whole representation."""
     answer = occasion.response
     is_whole = occasion.request.method == "GET" and answer.status == HTTPStatus.OK
     for name in ("Content-Digest", "Repr-Digest", "Digest") if is_whole else ("Content-Digest",):

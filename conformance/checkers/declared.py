@@ -177,7 +177,7 @@ class WriteOnly:
 
 
 def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:
-    """Return the name of a member that is shown and writeOnly; empty if there are such that are not; else None."""
+    """Return the writeOnly member that a response shows; empty if it shows none; None if the schema has none."""
     given = flat(schema)
     if isinstance(value, list):
         inner = given.get("items")

@@ -1,4 +1,4 @@
-"""What entity tags promise: one name for one content, and conditions that hold (RFC 9110 8.8.1, 13.1)."""
+"""Entity tags: each stands for one content, and conditions on them hold (RFC 9110 8.8.1, 13.1)."""
 
 import re
 from collections.abc import Iterator
@@ -50,7 +50,7 @@ class _Condition(NamedTuple):
 
 
 class EntityTags:
-    """Judges entity tags and conditions; what is current it knows from the last read, if nothing was written since."""
+    """Judges entity tags and conditions; the current tag is that of the last read, if nothing was written since."""
 
     def __init__(self) -> None:
         self._named: dict[object, Response] = {}
@@ -87,7 +87,7 @@ class EntityTags:
             yield from self._read(occasion)
 
     def _read(self, occasion: Occasion) -> Iterator[Case]:
-        """Compare a content with the one that had the same tag, and with what was written just before."""
+        """Compare a content with the earlier content of the same tag, and with the one before the last write."""
         url, answer = occasion.request.url, occasion.response
         waiting, wrote = self._waiting.pop(url, None), self._wrote.pop(url, None)
         if answer.status == HTTPStatus.OK and url in self._stale:
@@ -225,7 +225,7 @@ class EntityTags:
 
 
 def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
-    """Judge a request to what exists that has no If-Match, or one that creates alone (RFC 9110 13.1.2, RFC 6585 3)."""
+    """Judge an unconditional request that needs If-Match, or If-None-Match: * (RFC 9110 13.1.2, RFC 6585 3)."""
     operation, answer = occasion.operation, occasion.response
     is_done = answer.ok and answer.status != HTTPStatus.ACCEPTED
     if operation is None or occasion.request.method not in {"PUT", "PATCH", "DELETE"}:

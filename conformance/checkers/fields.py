@@ -30,7 +30,7 @@ _ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
 
 
 def framing(occasion: Occasion) -> Iterator[Case]:
-    """Judge that a response has one length (RFC 9112 6.2): of two, readers may take either one."""
+    """Judge that a response has only one length (RFC 9112 6.2): of two, readers may take either."""
     answer = occasion.response
     both = answer.header("transfer-encoding") is not None and answer.header("content-length") is not None
     found = "Content-Length beside Transfer-Encoding"
@@ -48,7 +48,7 @@ def content_type(occasion: Occasion) -> Iterator[Case]:
 
 
 def once(occasion: Occasion) -> Iterator[Case]:
-    """Judge that no field is there twice whose value is no list (RFC 9110 5.3)."""
+    """Judge that no header field occurs twice unless its value is a list (RFC 9110 5.3)."""
     twice = occasion.response.repeated(*_SINGLE)
     expected = "no header twice, unless its value is a list"
     yield occasion.case("http/field-once", not twice, expected, f"{twice} several times")

@@ -1,4 +1,4 @@
-"""What tells the things of a collection apart: each path leads to its own (RFC 9110 9.3.1); what is unique stays so."""
+"""Identity of things in a collection: each path returns its own thing (RFC 9110 9.3.1), and unique members differ."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ class Lists:
             )
 
     def _bounds(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Judge bounds of members; where no description says that it is one, by its effect in earlier lists."""
+        """Judge bounds of members; an undescribed parameter is one if earlier lists show its effect."""
         for bound in listing.bounds:
             name = bound.parameter.name
             text, values = sent.get(name), list(self._known(listing, page, bound.member))
@@ -160,7 +160,7 @@ class Lists:
                 yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
 
     def _wrong(self, listing: Listing, name: str, asked: list[str], values: list[Any]) -> list[str] | None:
-        """Return a value that was not asked for, or nothing; None where that cannot be told."""
+        """Return an item's value that the filter excludes; empty if there is none; None if unknown."""
         parameter, member = listing.filters[name], flat(listing.members[name])
         choices = _choices(parameter)
         others = [text for one in values for text in [_text(one)] if not _holds(one, asked)]
@@ -218,7 +218,7 @@ class Lists:
 
 
 def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # noqa: FBT001 - None: either
-    """Return whether items of one kind come before the others, such as pinned ones or folders, each kind in order."""
+    """Return whether items of one kind stand before all others, such as pinned ones or folders, each kind sorted."""
     items = [members_of(one) for one in page.items[:_COMPARED]]
     for name in {name for one in items[:1] for name, value in one.items() if isinstance(value, bool | str)}:
         kinds = [str(one.get(name)) for one in items]
@@ -243,7 +243,7 @@ def _text(value: Any) -> str:
 
 
 def _holds(value: Any, asked: list[str]) -> bool:
-    """Return whether a member is, or has, one of the values that were asked for, whatever their case."""
+    """Return whether a member equals or contains one of the requested values, ignoring case."""
     wanted = {one.strip().casefold() for one in asked}
     own = value if isinstance(value, list) else [value]
     return any(isinstance(one, dict | list) or text_of(one).casefold() in wanted for one in own)
@@ -259,7 +259,7 @@ _MEANING: Final = re.compile(
 
 
 def is_before(one: Any, other: Any) -> bool | None:
-    """Return whether a value is less than another one; None where they are equal, or where that depends on the way.
+    """Return whether a value is less than another one; None if equal, or if that depends on the collation.
 
     Numbers and times are compared by value, and texts only where all collations agree.
     """

@@ -1,4 +1,4 @@
-"""What became of things, by all reads of a run: what was deleted stays gone, what was created is there, writes last.
+"""Things over a run, by all reads: deleted things stay gone, created things exist, and writes last.
 
 A device may take a while, things may end and values may change by themselves, as a velocity that nobody renews does. So
 only what lasted for as long in another thing of the same collection has to last, and what is being changed is not
@@ -65,7 +65,7 @@ _STAYS: Final = re.compile(
 
 @dataclass
 class _Thing:
-    """One thing, by what this run did to it.
+    """One thing, with what this run did to it.
 
     Attributes:
         path: as it was written; of a device that knows case, another spelling is another thing.
@@ -150,7 +150,7 @@ class Memory:
         self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
 
     def forget(self, *, deletes: bool = True) -> None:
-        """Forget what a request may have changed of which nobody knows what it did: all things if it ``deletes``."""
+        """Forget what a request of unknown effect may have changed: all things, if it ``deletes``."""
         self._things = {} if deletes else {key: one for key, one in self._things.items() if not one.gone}
         for thing in self._things.values():
             thing.written.clear()
@@ -231,7 +231,7 @@ class Memory:
         self._things[path.casefold()] = thing
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
-        """Return what the run has put below a thing, and ends with it by what the description of its DELETE says."""
+        """Return the things that end together with a thing, as the description of its DELETE says."""
         found = [one.path for one in self._things.values() if _is_below(one.path, path) and not one.gone]
         said = ending_with(delete)
         return [one for one in found if one in self._made and said & set(map(singular, one[len(path) :].split("/")))]
@@ -310,7 +310,7 @@ class Memory:
                 )
 
     def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
-        """Judge whether no request has written what is the device's, nor changed what stays for ever."""
+        """Judge whether a request has written members that the device sets, or members that never change."""
         own = self._own[item.template.rstrip("/")]
         answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         shape = flat(item.shape or {}).get("properties", {})
@@ -406,7 +406,7 @@ class Memory:
                 self._pending[kept].append((age, seen, case))
 
     def _differs(self, kept: tuple[str, str], age_s: float, seen: str, case: Case) -> Iterator[Case]:
-        """Yield a case if another value lasted as long: not the one that is read now, to which they may all return."""
+        """Yield a case if another value lasted as long; the value read now does not count, as all may return to it."""
         if any(age >= age_s for value, age in self._lasted[kept].items() if value != seen):
             yield case
         elif len(self._pending[kept]) < _MOST_PENDING:
@@ -450,7 +450,7 @@ def _read_only(item: Operation) -> frozenset[str]:
 
 
 def _sent_of(occasion: Occasion) -> dict[str, Any]:
-    """Return the members of a JSON object in a request, whatever the description says of them."""
+    """Return the members of a JSON object in a request, with or without a description of them."""
     request = occasion.request
     is_short = len(request.body) <= _MOST_OCTETS and is_json(request.media_type)
     value = read_json(request.body).value if is_short else None
@@ -458,13 +458,13 @@ def _sent_of(occasion: Occasion) -> dict[str, Any]:
 
 
 def ending_with(delete: Operation) -> frozenset[str]:
-    """Return the words for what ends with a thing, by the clauses of a description that do not say what stays."""
+    """Return the words for things that end with another one, from the clauses that do not say what stays."""
     clauses = [one for one in re.split(r"[.;]\s", delete.text) if not _STAYS.search(one)]
     return frozenset(singular(word) for one in clauses for word in words_of(one))
 
 
 def _is_for_ever(item: Operation, create: Operation) -> bool:
-    """Return whether no other thing gets the identifier of a deleted one: it is a UUID, or the description says so."""
+    """Return whether no later thing gets a deleted identifier: it is a UUID, or the description says so."""
     parameter, parts = item.parameter("path")[-1], flat(item.shape or {}).get("properties", {})
     named = [flat(one) for name, one in parts.items() if plain_name(name) in {plain_name(parameter.name), "id"}]
     given = flat(parameter.schema)
@@ -487,7 +487,7 @@ def _is_below(path: str, other: str) -> bool:
 
 
 def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
-    """Return the object that a request has written; None if it is another content, or one that is not allowed."""
+    """Return the object that a request has written; None if the content is no object, or not allowed."""
     is_first = occasion.request.media_type == next(iter(operation.bodies), None)
     is_first = is_first and len(occasion.request.body) <= _MOST_OCTETS
     value = read_json(occasion.request.body).value if is_first and is_json(occasion.request.media_type) else None

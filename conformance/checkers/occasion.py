@@ -43,7 +43,7 @@ class Occasion:
 
     @property
     def operation(self) -> Operation | None:
-        """The operation that it is for, or None."""
+        """The operation of the request, or None."""
         return self.context.operation
 
     @property
@@ -53,7 +53,7 @@ class Occasion:
 
     @cached_property
     def validity(self) -> Validity:
-        """What the contract says of parameters and body."""
+        """Whether the contract allows the parameters and the body."""
         request = self.request
         return validity(self.contract, request.method, self.context.target, request.media_type, request.body)
 

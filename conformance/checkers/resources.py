@@ -1,4 +1,4 @@
-"""What one resource says by several methods: HEAD as GET, and 405 for a method that it does not have."""
+"""Compare the methods of one resource: HEAD with GET, and 405 for undeclared methods."""
 
 import hashlib
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ class _Shown(NamedTuple):
 
 
 class Resources:
-    """Judges methods of one resource by each other; what is there it knows from the responses of the run."""
+    """Judges the methods of a resource by each other; the run's responses show which resources exist."""
 
     def __init__(self) -> None:
         self._got: dict[object, _Shown] = {}
@@ -144,7 +144,7 @@ class Resources:
             self._suspects.append((path, occasion))
 
     def _declared(self, occasion: Occasion, path: str) -> Iterator[Case]:
-        """Note what a declared operation shows of a path, and judge what waits for that."""
+        """Note what a response of a declared operation shows of a path, and judge the cases that waited for it."""
         status = occasion.response.status
         if status in _GONE or (occasion.request.method == "DELETE" and occasion.response.ok):
             gone = [one for one in self._there if one == path or one.startswith(f"{path.rstrip('/')}/")]
@@ -201,7 +201,7 @@ def _declared_refusal(occasion: Occasion, resource: Resource) -> Iterator[Case]:
 
 
 def _places(path: str, resource: Resource) -> set[str]:
-    """Return the paths whose presence shows that a path is there: its own, and its thing's where it ends in a name."""
+    """Return the paths that show that a path exists: the path itself, and its thing's path if it ends in a name."""
     above, _, last = resource.template.rstrip("/").rpartition("/")
     return {path} if "{" in last or "{" not in above else {path, path.rstrip("/").rpartition("/")[0]}
 

@@ -48,7 +48,7 @@ class RestCheckers:
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
-        """Forget what may have been changed by a request of which nobody knows what it did."""
+        """Forget what a request of unknown effect may have changed."""
         self._memory.forget(deletes=deletes)
         self._writes.forget()
         self._changes.forget()

@@ -1,4 +1,4 @@
-"""What SOAP operations wrote, created and removed, by what others tell later: SetGain beside GetGain.
+"""Judge what SOAP operations wrote, created and removed by what other operations return: SetGain by GetGain.
 
 Names alone blame nobody. A value has to be read as it was written only where two other values were, for as long, and
 only within what was kept so far: a device may limit a number, reach a target slowly, or let a command expire.
@@ -36,7 +36,7 @@ _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
 
 @dataclass
 class _Write:
-    """What one request wrote: ``key`` names the thing, ``values`` are texts by name; both of names in lower case.
+    """What one request wrote: ``key`` names the thing, ``values`` are its texts; all names are in lower case.
 
     ``shown`` are those that were read so since, ``late`` those that first were not; ``refused`` what was refused since.
     """
@@ -51,7 +51,7 @@ class _Write:
 
 @dataclass
 class _Thing:
-    """What one request created, by the value by which the device knows it."""
+    """A thing that one request created, with the value by which the device identifies it."""
 
     creator: Act
     name: str
@@ -62,7 +62,7 @@ class _Thing:
 
 @dataclass
 class _Past:
-    """What is known of one value of a reading operation.
+    """The history of one value of a reading operation.
 
     ``kept`` are texts that were read as written, with for how long, s; ``lost`` is what was read of others.
     ``pending`` are failures if another value was kept as long, each with its age, s, and what was read.
@@ -78,7 +78,7 @@ class _Past:
 
     @property
     def moves(self) -> bool:
-        """Whether it comes to what is written by and by, so that another value may take any time."""
+        """Whether the value approaches the written one step by step, so that a change may take any time."""
         return self.late * _FEW > self.prompt
 
     def longest(self, text: str) -> float:
@@ -86,7 +86,7 @@ class _Past:
         return max((age for other, age in self.kept.items() if other != text), default=0.0)
 
     def lasted(self, age_s: float, text: str) -> Iterator[Case]:
-        """Yield what should have been kept, as another value was for so long, s; once it was seen again."""
+        """Yield the values that should have lasted as long as another one did, once that one was read again."""
         waiting, self.pending = self.pending, []
         for one in waiting:
             if one[0] > age_s or one[1] == text:
@@ -98,7 +98,7 @@ class _Past:
 
 
 class SoapMemory:
-    """Judges each response of an operation that reads by what others have done before.
+    """Judges the responses of reading operations by the effects of other operations.
 
     Args:
         found: what the WSDL describes.
@@ -234,7 +234,7 @@ class SoapMemory:
             yield from past.lasted(past.longest(got), "")
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past) -> bool:
-        """Return whether a device keeps what was written beside a value, and never the value itself."""
+        """Return whether a device stores the values beside one, and never that value."""
         beside = [
             self._past[writer.label, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
         ]
@@ -247,7 +247,7 @@ class SoapMemory:
         )
 
     def _listed(self, act: Act, exchange: Exchange, told: dict[str, list[str]]) -> Iterator[Case]:
-        """Judge whether a list has what was created, and not what was removed."""
+        """Judge whether a list contains what was created, and nothing that was removed."""
         ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
         for thing in self._things:
             if not act.lists(thing.creator):

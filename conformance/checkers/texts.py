@@ -20,7 +20,7 @@ _SPACE: Final = re.compile(r"\s+")
 
 
 class _Write(NamedTuple):
-    """A write whose texts a read has to show: the request, its texts beyond ASCII, and what was there before."""
+    """A write whose texts a read must show: the request, its non-ASCII texts, and the state before."""
 
     request: Request
     texts: dict[str, str]

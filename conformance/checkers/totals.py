@@ -55,7 +55,7 @@ class _Part:
 
 @dataclass
 class _Count:
-    """What is known of one total of one operation, with one choice of filters.
+    """The history of one total of one operation with one choice of filters.
 
     Attributes:
         agrees: whether it was the number of items the first time that a whole list was shown; None: none was.
@@ -80,7 +80,7 @@ class _Count:
     other: list[tuple[Occasion, int]] = field(default_factory=list)
 
     def learn(self, total: int, part: _Part) -> None:
-        """Note what a total means beside the end of a list; where a server may have cut it, only what agrees counts."""
+        """Note what a total counts at the end of a list; of a list that may be cut, only an equal count is noted."""
         agrees = total == part.least
         if self.agrees is None and (part.sure or agrees):
             self.agrees = agrees
@@ -107,7 +107,7 @@ class _Count:
 
 
 class Totals:
-    """Judges totals over a run, each by what it meant the first time that it was seen beside a whole list."""
+    """Judges totals over a run, each by what it counted when it was first seen with a whole list."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
@@ -119,7 +119,7 @@ class Totals:
         self._changed_s = when_s
 
     def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Yield the cases of one response; none where the parameters do not tell which part of the list it shows."""
+        """Yield the cases of one response; none if the parameters do not say which part of the list it shows."""
         label, shown = listing.operation.label, len(page.items)
         self._longest[label] = max(self._longest[label], shown)
         elsewhere = {one.name for one in (listing.page, listing.cursor) if one is not None}
@@ -152,7 +152,7 @@ class Totals:
                 yield from self._judged(count, part, name, total)
 
     def _judged(self, count: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
-        """Yield the cases of one total whose meaning is known."""
+        """Yield the cases of a total whose meaning is known."""
         shown, least = len(part.page.items), part.least
         is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
         if part.whole and total == least:
@@ -187,7 +187,7 @@ class Totals:
 
 
 def says_filtered(listing: Listing) -> set[str]:
-    """Return the totals that are those of what the filters leave, as the description says of them."""
+    """Return the totals that count the filtered items, as the description says."""
     return {name for name, text in listing.says.items() if plain_name(name) in TOTALS and _FILTERED.search(text)}
 
 

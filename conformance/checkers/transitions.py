@@ -1,4 +1,4 @@
-"""Operations of a thing, by what the description says of its states: from which it starts, and what a refusal keeps."""
+"""State-dependent operations by the description: the states they start from, and what a refusal leaves unchanged."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class Transitions:
 
 
 def state_member(read: Operation) -> str:
-    """Return the member of a thing that says which of several states it is in; empty if it has none."""
+    """Return the member that contains a thing's state; empty if there is none."""
     parts = flat(read.shape or {}).get("properties", {}) if collection_of(read.template) else {}
     named = (name for name, one in parts.items() if plain_name(name) in _STATES and len(flat(one).get("enum", ())) > 1)
     return next(named, "")

@@ -1,4 +1,4 @@
-"""What a write makes of a resource, by its method and media type: the read after it is compared with the one before.
+"""Effect of a write, by method and media type: compare the read after it with the one before.
 
 PUT replaces: what it leaves out has its default. A merge patch changes members and removes by null (RFC 7396). A JSON
 patch does all its operations, or none (RFC 6902). What is refused changes nothing. Only a read, one write and a read
@@ -49,7 +49,7 @@ _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
 
 
 class _State(NamedTuple):
-    """What a read has shown, and when it came, s of the monotonic clock."""
+    """A state as a read showed it, and when, s of the monotonic clock."""
 
     members: dict[str, Any]
     at_s: float
@@ -321,7 +321,7 @@ class Writes:
         return f"{shown(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
-        """Judge whether what a PUT leaves out has its declared default, or is gone where the description says so."""
+        """Judge whether members that a PUT leaves out get their default, or disappear if the description says so."""
         is_said, needed = GONE.search(change.operation.text), flat(item.shape or {}).get("required", ())
         for name, part in _parts(change.schema).items():
             given = flat(part) if isinstance(part, dict) else {}
@@ -366,7 +366,7 @@ class Writes:
             yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
 
     def _reset_within(self, change: _Change, name: str) -> str:
-        """Return a member of an object that a patch has reset, which names another one with the value that it had.
+        """Return an object's member that a patch has changed although it names only another member of the object.
 
         One member may follow another one. Two that reset each other, by values that change nothing, do not.
         """

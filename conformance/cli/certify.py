@@ -264,7 +264,7 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
 
 
 def _write_baseline(path: Path, outcome: Certification, contract: Contract, old: Path | None) -> None:
-    """Write what fails to a baseline file, and say what is to be done with it."""
+    """Write what fails to a baseline file, and print what the user has to do with it."""
     from conformance.verdict.baseline import baseline_text, load_baseline  # noqa: PLC0415 - only for this option
 
     found = [
@@ -331,7 +331,7 @@ def _certify(
 
 
 def _places(contract: Contract, statement: Path | None, source: str | None) -> dict[str, Any]:
-    """Return the lines that reports point to; of a description at a URL those of the copy beside the result."""
+    """Return the file lines that reports point to; for a description at a URL, those of the copy beside the result."""
     if not contract.openapi_path or contract.is_claimed:
         return places(contract, statement)
     api = api_of(statement) if statement and source is None else None

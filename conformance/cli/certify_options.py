@@ -49,7 +49,7 @@ class CertifyOptions(DeviceOptions):
 
     @property
     def calls(self) -> CallRules:
-        """What the options alone say of what may be called."""
+        """The call rules from the options alone."""
         return CallRules(self.allow, self.never)
 
     def check_new_baseline(self) -> None:
@@ -63,7 +63,7 @@ class CertifyOptions(DeviceOptions):
             raise click.UsageError(f"--write-baseline: {path} exists; give it as --baseline as well, to renew it")
 
     def check_nonce(self) -> None:
-        """Check that the seed follows from the nonce, where there is one.
+        """Check that the seed follows from the nonce, if there is one.
 
         Raises:
             click.UsageError: the nonce is not printable, or a seed is given as well.

@@ -94,7 +94,7 @@ def export(directory: Path, pack: str, *, force: bool) -> None:
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="Write the page there.  [default: stdout]")
 @click.pass_obj
 def coverage(door: Any, /, pack: str, out: Path | None) -> None:
-    """Show which checks and which mutants bind each requirement.
+    """Show which checks judge each requirement, and which mutants break it.
 
     Exit code 1 when ledger, checks and mutants disagree.
     """

@@ -1,4 +1,4 @@
-"""``roaas explain``: what a requirement asks, why, by whose word, how it is judged, and how to meet it."""
+"""``roaas explain``: what a requirement demands, why, its sources, how it is judged, and how to meet it."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class Explanation:
 
     @property
     def why(self) -> str:
-        """Return what breaks in practice: what the ledger says of this requirement, then what is so of its subject."""
+        """Return what breaks in practice: the ledger's text on this requirement, then the text on its subject."""
         return " ".join(filter(None, (self.requirement.breaks, self.topic.why if self.topic else None)))
 
 

@@ -1,4 +1,4 @@
-"""Choose requirements by the options: named ones, those of classes, or those that failed in the run before."""
+"""Choose requirements by the options: by id, by class, or those that failed in the last run."""
 
 import json
 from collections.abc import Container, Iterable, Mapping
@@ -64,7 +64,7 @@ def _fitting(pattern: str, judged: Mapping[str, Requirement], option: str) -> fr
 
 
 def failed_before(result: Path) -> frozenset[str]:
-    """Return the ids that failed, or came to no verdict, in the run whose result.json this is.
+    """Return the ids that failed or were inconclusive in the run of this result.json.
 
     Raises:
         SelectionError: there is no such result, or nothing failed in it.

@@ -102,7 +102,7 @@ def _print_answers(found: Sequence[Mapping[str, str]]) -> None:
 
 
 def warning(document: Mapping[str, Any], which: str = "") -> str:
-    """Return the line that says that the robot may still move, which comes before all others; or an empty text."""
+    """Return the warning that the robot may still move, which is printed first, or an empty text."""
     said = document.get("stop_undelivered", "")
     return f"WARNING: {which}{inert(said)}\n" if said else ""
 
@@ -176,6 +176,6 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
 
 
 def _command(curl: str, number: int, folder: Path) -> str:
-    """Return the command that sends a finding's request; what nobody can read is left to the result."""
+    """Return the command that sends a finding's request; a command that is too long stays in the result."""
     shown = len(curl) <= _SHOWN_CURL and curl.startswith("curl ")
     return curl if shown else f"roaas replay {shlex.quote(str(folder))} {number}"

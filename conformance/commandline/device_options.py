@@ -66,7 +66,7 @@ _CLIENT_CERTIFICATE = (
 
 
 def advice(*texts: str) -> str:
-    """Return the first of these texts that names no option that the running command lacks; empty if there is none.
+    """Return the first text whose options the running command has; empty if there is none.
 
     Several commands read the same files and reach the same servers, with different options. Where no command runs, the
     first text is returned.

@@ -38,7 +38,7 @@ def end_like_ctrl_c() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Ignore what would end the process, for what takes a bounded time: a robot is being stopped."""
+    """Ignore signals during a block of bounded time, in which the robot is being stopped."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -14,7 +14,7 @@ EXTRAS: Final = {
 
 
 def lacking(extra: str, user: str) -> str | None:
-    """Return what to tell a user whose installation lacks an extra; None if all its modules are installed.
+    """Return the message to a user without the modules of an extra; None if all are installed.
 
     Args:
         extra: name of the extra.
@@ -37,7 +37,7 @@ def lacking_ros(user: str) -> str | None:
 
 
 def told(module: str | None, user: str) -> str | None:
-    """Return what to tell a user about a module that could not be imported; None if no extra brings it."""
+    """Return the message to a user about a module that could not be imported; None if no extra contains it."""
     top = (module or "").partition(".")[0]
     extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
     return _told(user, top, extra) if extra else None

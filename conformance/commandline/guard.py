@@ -42,7 +42,7 @@ def lacks_addresses(command: str) -> str:
 
 
 class _Lenient(io.FileIO):
-    """A file descriptor whose reader may go away, as `head` does: what can no longer be written is dropped."""
+    """A file descriptor whose reader may close, as `head` does: further output is then dropped."""
 
     def write(self, octets: Any, /) -> int:
         try:

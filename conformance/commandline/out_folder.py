@@ -71,7 +71,7 @@ def _try_to_write(folder: Path) -> None:
 
 
 def _locked(path: Path) -> int:
-    """Return the descriptor of a locked file, which says whose it is.
+    """Return the descriptor of a locked file, which contains the owner's name.
 
     The lock ends with the process, however that ends.
     """

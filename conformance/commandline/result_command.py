@@ -26,13 +26,13 @@ class CommandResult(NamedTuple):
 
 
 class FrontDoor(Protocol):
-    """What such a command needs from roaas.py, which is the click context's object."""
+    """The functions of roaas.py that such a command calls; the click context holds the object."""
 
     def notary(self, key: Path, pack: str | None = None) -> Any:
         """Return a signer with a private key for results by a pack; raise a usage error if the key cannot be read."""
 
     def prepare(self) -> None:
-        """Load what render() needs, at a moment when nobody waits for it."""
+        """Load what render() needs, while the run waits for the device anyway."""
 
     def render(self, written: Path, notary: Any) -> list[Path]:
         """Write the pages of a result file, sign it if there is a signer, and return their paths."""

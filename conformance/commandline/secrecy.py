@@ -79,7 +79,7 @@ _OUR_WORDS: Final = ("reports/schemas/*.json", "conformance/rules/requirements.t
 
 
 class _Form(NamedTuple):
-    """One form of a secret: what is searched for first, the whole, and what is written in its place."""
+    """One form of a secret: the text to search for first, the whole form, and its replacement."""
 
     beginning: str
     whole: str
@@ -234,7 +234,7 @@ class Secrets:
 
 
 def _weakness(secret: str) -> str:
-    """Return why a secret cannot be masked without masking what is none, or an empty text."""
+    """Return why a secret cannot be masked without masking other text, or an empty text."""
     if len(secret) < _SHORTEST:
         return f"has {len(secret)} character{'' if len(secret) == 1 else 's'}, too few to be recognized"
     if len(secret) < _SHORTEST_WORD and (secret.isalpha() or secret.isdigit()):
@@ -246,7 +246,7 @@ def _weakness(secret: str) -> str:
 
 
 def _forms(secret: str) -> tuple[set[str], set[str]]:
-    """Return the forms of a secret in which the case of letters does not matter, in lower case, and the others."""
+    """Return the forms of a secret that are compared without case, in lower case, and the others."""
     octets, wide = secret.encode("utf-8", "surrogateescape"), secret.encode("utf-16-le", "surrogatepass")
     small = {secret, secret.replace(" ", "+"), re.sub(r"\\+", r"\\", secret)}
     small |= {form.encode("utf-8", "surrogateescape").decode("latin-1") for form in small}

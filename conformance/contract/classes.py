@@ -30,7 +30,7 @@ class Level(StrEnum):
 
 
 class Origin(StrEnum):
-    """Where a requirement comes from, which decides whom it binds."""
+    """The kind of source of a requirement, which decides which devices it binds."""
 
     NORM = "norm"  # a clause of an RFC, SOAP 1.1, WSDL 1.1, WS-I or XML Schema: every HTTP or SOAP service
     DESCRIPTION = "description"  # the OpenAPI or WSDL file at hand: the service that it describes
@@ -69,7 +69,7 @@ class CauseKind(StrEnum):
 
 
 class Prerequisite(StrEnum):
-    """What a run must have, beside the interface, to judge a requirement."""
+    """What a run must have, besides the interface, to judge a requirement."""
 
     MOTION = "motion"  # permission to move the device
     OBSERVER = "observer"  # a ROS probe, or another way to see the effects of a request

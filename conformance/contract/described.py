@@ -1,4 +1,4 @@
-"""A contract pack made from an API's own description: what binds every web API, and what the description says."""
+"""A contract pack made from an API's own description: rules for every web API, and the description's own rules."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def write_described_pack(
 
 
 def copy_as_data(pack: Path, folder: Path, readable: Callable[[dict[str, Any]], dict[str, Any]]) -> Path:
-    """Copy a described pack from a result, whose writer nobody knows, without anything that could be executed.
+    """Copy a described pack from a result of unknown origin, without anything that could be executed.
 
     Args:
         pack: the folder in the result.

@@ -101,7 +101,7 @@ def _refused(name: str) -> float:
 
 
 def _real(text: str) -> float:
-    """Return a number as a double; what is beyond every double becomes the last one, as bounds compare alike."""
+    """Return a number as a double; a number beyond the range becomes the last double, as bounds compare alike."""
     return max(-sys.float_info.max, min(sys.float_info.max, float(text)))
 
 
@@ -120,7 +120,7 @@ def _yaml(text: str) -> Any:
 
 
 class _Reader:
-    """Makes values of YAML's events, one after the other, so that what they hold is counted as it comes."""
+    """Builds values from YAML events one by one, so that they are counted while they are read."""
 
     def __init__(self, text: str) -> None:
         self._loader = _Loader(text)
@@ -133,7 +133,7 @@ class _Reader:
         self._loader.dispose()
 
     def document(self) -> Any:
-        """Return the value of the only document; None if there is none."""
+        """Return the value of the only document, or None."""
         self._next()
         if isinstance(self._next(), yaml.StreamEndEvent):
             return None
@@ -257,7 +257,7 @@ def check_yaml(text: str) -> None:
 
 
 def _tag_of(event: Any) -> str:
-    """Return a scalar's tag; that of a plain one, whose type its text decides, is `_PLAIN`."""
+    """Return a scalar's tag; `_PLAIN` if the text of a plain scalar decides its type."""
     if event.tag is not None and event.tag != "!":
         return str(event.tag)
     return _PLAIN if event.implicit[0] else _TAG + "str"

@@ -96,7 +96,7 @@ def renamed(ledger: Mapping[str, Requirement]) -> dict[str, str]:
 
 
 def twins(ledger: Mapping[str, Requirement]) -> dict[str, str]:
-    """Return the id of the requirement that asks the same as one that a contract does not have, by that one's id."""
+    """Return by each id in `same_as` that a contract lacks the id of its requirement that asks the same."""
     return {other: item.id for item in ledger.values() for other in item.same_as if other not in ledger}
 
 

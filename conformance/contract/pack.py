@@ -205,7 +205,7 @@ class Contract:
 
     @cached_property
     def openapi(self) -> dict[str, Any]:
-        """The OpenAPI document; empty if there is none.
+        """The OpenAPI document, or an empty one.
 
         Raises:
             ContractError: the file is neither YAML nor JSON, or not an object.
@@ -327,7 +327,7 @@ class Contract:
 
     @cached_property
     def plugin(self) -> ModuleType | None:
-        """The pack's Python module, which defines its device model; None if it has none.
+        """The pack's Python module, which defines its device model, or None.
 
         Raises:
             ContractError: the module cannot be imported.

@@ -87,7 +87,7 @@ def load_set(contract: Contract, name: str) -> RequirementSet:
 
 
 def current(contract: Contract, ledger: Mapping[str, Requirement]) -> RequirementSet:
-    """Return a ledger as a set, under the name of the frozen set with the same content if there is one."""
+    """Return a ledger as a set, with the name of the frozen set of the same content if there is one."""
     requirements = {id_: frozen(item) for id_, item in ledger.items()}
     sets = (load_set(contract, name) for name in names(contract))
     same = next((one for one in sets if one.requirements == requirements), None)

@@ -244,7 +244,7 @@ class _Bundle:
         return found
 
     def _moved(self, reference: str, location: str, root: str) -> str | None:
-        """Return a reference as one within the whole document; None if its file cannot be read."""
+        """Return a reference to another file as one within the whole document; None if the file cannot be read."""
         file, _, pointer = reference.partition("#")
         if not file:
             return f"{root}{self._pointer(location, pointer)}"

@@ -1,4 +1,4 @@
-"""Faults of a description itself: what is wrong with the file, whatever the device does.
+"""Find faults of a description file, apart from any device.
 
 What cannot be read is left out of the description, so that the rest is judged; `file-valid` judges the file.
 """
@@ -75,7 +75,7 @@ def reason(error: Exception, faults: list[tuple[str, str]], *places: Iterable[ob
 
 @lru_cache(maxsize=4)
 def validator(version: str) -> Any:
-    """Return what judges a description by the schema of its version, such as "3.1".
+    """Return the validator of descriptions of a version, such as "3.1".
 
     The schemas of the OpenAPI Initiative come from Schemathesis, which is a dependency anyway. They are read from its
     source, because importing it takes a fifth of a second.
@@ -122,7 +122,7 @@ def _path_parameters(document: Schema) -> Iterator[str]:
 
 
 def _schemas(document: Schema) -> Iterator[str]:
-    """Yield schemas that no validator can use, such as one with a regular expression that does not compile."""
+    """Yield schemas that no validator can compile, such as one with an invalid regular expression."""
     told: set[str] = set()
     for place, schema in _every_schema(document):
         try:
@@ -322,7 +322,7 @@ def _some(lines: list[str]) -> list[str]:
 
 
 def _bare(value: Any) -> Any:
-    """Return a part of a document without its schemas, which are what takes time to read."""
+    """Return a part of a document without its schemas, which take longest to read."""
     if isinstance(value, list):
         return [_bare(item) for item in value]
     if not isinstance(value, dict):
@@ -369,7 +369,7 @@ def _outermost(document: Schema) -> Iterator[Any]:
 
 
 def _fault(schema: Any) -> str:
-    """Return why a schema is none; empty if it is one."""
+    """Return why a schema is invalid, or an empty text."""
     try:
         error = next(iter(_META.iter_errors(modern(schema))), None)
     except _UNREADABLE as broken:

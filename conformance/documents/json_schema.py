@@ -137,7 +137,7 @@ def lazy_reference(document: Schema, reference: str) -> str:
 
 
 def changed_alike(schema: Schema, change: str) -> Schema:
-    """Return a changed schema in which a lazy reference leads to a schema that is changed alike.
+    """Return a changed schema whose lazy references lead to schemas with the same change.
 
     Args:
         schema: the schema after the change.
@@ -167,7 +167,7 @@ def referred(uri: str) -> Any:
 
 
 def whole(schema: Schema) -> Schema:
-    """Return a schema with the words that its lazy reference leads to; one without such a reference as it is."""
+    """Return a schema together with the keywords of its lazy reference's target, or the schema itself."""
     reference = schema.get("$ref")
     if reference is None:
         return schema
@@ -285,7 +285,7 @@ def is_number(value: Any) -> bool:
 
 
 def bundled(schema: Schema) -> Schema:
-    """Return a schema with what its lazy references lead to below ``$defs``; one without any as it is."""
+    """Return a schema with the targets of its lazy references below ``$defs``, or the schema itself."""
     waiting: list[str] = []
     result: Schema = bundled_into(schema, waiting)
     found: dict[str, Any] = {}

@@ -178,7 +178,7 @@ def _patterns_in(schema: Any, *, names: bool) -> Iterator[str]:
 
 
 def _without_names(schema: Any) -> Any:
-    """Return a schema that allows any member wherever patterns say what members it has."""
+    """Return a schema that allows any member where patternProperties decide which members exist."""
     if isinstance(schema, list):
         return [_without_names(item) for item in schema]
     if not isinstance(schema, dict):
@@ -359,7 +359,7 @@ class Shape:
             _FOLLOWING.left = before
 
     def _first_error(self, value: Any) -> ValidationError | None:
-        """Return the worst violation; of alternatives, that in the one which fits best, if there is one."""
+        """Return the worst violation; among alternatives, that of the best fitting one."""
         from jsonschema.exceptions import relevance  # noqa: PLC0415 - as above
 
         _FOLLOWING.left = _MOST_FOLLOWED
@@ -493,7 +493,7 @@ def wrong_formats(schema: Schema, value: Any) -> list[tuple[Any, str, str]]:
 
 
 def _validator(schema: Schema, *, whole: bool = False) -> Any:
-    """Return the validator of a schema with its formats, with all that it refers to if `whole`; None if it has none."""
+    """Return the validator of a schema with its formats, with all that it refers to if `whole`; None if invalid."""
     if "'format'" not in str(schema) and "roaas-lazy:" not in str(schema):
         return None
     checks = {"byte": is_base64, "base64url": is_base64}

@@ -1,4 +1,4 @@
-"""The operations of a contract, from its OpenAPI description: which one is for a path and a method."""
+"""Operations of a contract from its OpenAPI description: find the one for a path and a method."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Operation:
         return None if key is None else self.responses[key]
 
     def response_key(self, status: int) -> str | None:
-        """Return the key under which a status is declared: itself, its class or ``default``; None if it is not."""
+        """Return the key under which a status is declared: itself, its class or ``default``, or None."""
         keys = (str(status), f"{status // 100}XX", f"{status // 100}xx", "default")
         return next((key for key in keys if key in self.responses), None)
 

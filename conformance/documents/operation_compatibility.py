@@ -1,4 +1,4 @@
-"""Compare two descriptions of an API by operations: what breaks clients of the older one, and what else changed."""
+"""Compare two descriptions of an API by operation: which changes break old clients, and which do not."""
 
 from __future__ import annotations
 
@@ -270,7 +270,7 @@ def _schema_of(given: Schema) -> Any:
 
 
 def _of_text(schema: Any, media_type: str) -> Any:
-    """Return the schema of a body; one that is neither JSON, XML nor a form is a text, whether that is said or not."""
+    """Return the schema of a body; a body that is neither JSON, XML nor a form is a text."""
     structured = "json" in media_type or "xml" in media_type or "*" in media_type or _is_form(media_type)
     if structured or not isinstance(schema, dict) or schema.keys() - {"format", "contentMediaType", "contentEncoding"}:
         return schema
@@ -331,7 +331,7 @@ def _alternatives(document: Schema, operation: Schema) -> list[_Alternative]:
 
 
 def _known(name: str, scheme: Any) -> tuple[str, ...]:
-    """Return a scheme as a client knows it, whatever its name is; the name where it is not described."""
+    """Return a security scheme as a client sees it, whatever its name; the name if it is not described."""
     kind = scheme.get("type") if isinstance(scheme, dict) else None
     if kind not in {*_KNOWN, "oauth2", "mutualTLS"}:
         return (name,)
@@ -391,7 +391,7 @@ class Change:
 
 
 def changes(old: Schema, new: Schema) -> list[Change]:
-    """Return what changed between two OpenAPI 3 documents: what breaks clients, what may, and the rest.
+    """Return the changes between two OpenAPI 3 documents: breaking ones, possibly breaking ones, and the rest.
 
     Raises:
         UnresolvedError, AttributeError, TypeError, KeyError: a document is malformed.

@@ -190,7 +190,7 @@ def _scalars(schema: Schema, text: str) -> tuple[list[Any], bool]:
 
 
 def _typed(schema: Schema, value: Any) -> tuple[Any, bool]:
-    """Return a value with its texts as what their schemas ask for, and whether no reader takes them otherwise."""
+    """Return a value whose texts are converted to the types of their schemas, and whether every reader agrees."""
     if isinstance(value, list):
         prefix, rest = schema.get("prefixItems", []), schema.get("items")
         items = [_typed_part(prefix[i] if i < len(prefix) else rest, item) for i, item in enumerate(value)]
@@ -225,7 +225,7 @@ def _agreed(schema: Schema, readings: Iterator[Reading]) -> str:
 
 
 def _unprefixed(parameter: Parameter, text: str, decode: Callable[[str], str]) -> str | None:
-    """Return a text without what the styles label and matrix put before it; None where that is missing."""
+    """Return a text without the prefix of the styles label and matrix; None if the prefix is missing."""
     if parameter.style == "label":
         return text[1:] if text.startswith(".") else None
     if parameter.style != "matrix":

@@ -153,7 +153,7 @@ class _Worker:
         raise SlowPatternError(f"the pattern {pattern[:200]!r} takes too long")
 
     def _reply(self, source: str, flags: str, text: str) -> str:
-        """Return what the process says; empty if it said nothing in time."""
+        """Return the worker's reply; empty if none came in time."""
         if self._process is None:
             self._process = subprocess.Popen(  # noqa: S603 - this module's own program
                 [sys.executable, "-P", "-c", _WORKER],
@@ -183,7 +183,7 @@ class _Worker:
         return process.stdout.readline().strip()
 
     def end(self) -> None:
-        """End the process, if there is one."""
+        """End the worker process, if there is one."""
         if self._process is not None:
             self._process.kill()
             self._process.communicate()
@@ -213,7 +213,7 @@ _OTHERS: Final = {r"\D": "[^0-9]", r"\W": "[^A-Za-z0-9_]", "[^]": r"[\s\S]", "[]
 
 @lru_cache(maxsize=1024)
 def for_python(pattern: str) -> str | None:
-    """Return a pattern that Python reads; its texts match the given one, if not all of them. None: there is none."""
+    """Return a pattern for Python that matches a subset of the given pattern's texts, or None."""
     try:
         check(pattern)
         written = _Writer(pattern).text()

@@ -106,7 +106,7 @@ def by_itself(body: bytes) -> Any:
 
 
 def _stray_text(root: etree._Element) -> str:
-    """Return which text is between the child elements of another element; empty if none is."""
+    """Return the text between an element's children; empty if there is none."""
     for element in root.iter():
         if isinstance(element.tag, str) and xml.elements(element) and (text := xml.text_of(element).strip()):
             return f"the text {text[:40]!r} between the child elements of <{local_name(element)}>"
@@ -254,7 +254,7 @@ def flat(schema: Schema, within: frozenset[str] = frozenset()) -> Schema:
 
 
 def discriminator_of(schema: Schema) -> tuple[str, tuple[str, ...]]:
-    """Return the member that says which alternative a value is, and its mapped values; empty where that is not said."""
+    """Return the member that names the alternative, and its mapped values; empty if there is none."""
     given = schema.get("discriminator")
     mapping = given.get("mapping") if isinstance(given, dict) else None
     if not isinstance(given, dict) or not isinstance(mapping, dict):

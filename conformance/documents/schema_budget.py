@@ -53,7 +53,7 @@ Parts = Callable[[Schema], Iterator[Any]]
 
 
 class Growth:
-    """Judges the schemas of one document; what is beyond the budget counts as 1 for the schemas that refer to it."""
+    """Judges the schemas of one document; a schema beyond the budget counts as 1 in those that refer to it."""
 
     def __init__(self, document: Schema) -> None:
         self._document = document
@@ -99,7 +99,7 @@ class Growth:
         return self._patterns[pattern]
 
     def _target(self, schema: Schema) -> Any:
-        """Return what a schema refers to; None if it refers to nothing."""
+        """Return the target of a schema's reference, or None."""
         try:
             return pointed(self._document, schema["$ref"]) if isinstance(schema.get("$ref"), str) else None
         except UnresolvedError:
@@ -229,7 +229,7 @@ def _unrolled(pattern: str) -> tuple[int, int]:
 
 
 def crowd_in(document: Schema) -> str:
-    """Return the place of a list or object with more members than a description has; empty if there is none."""
+    """Return the place of a list or object with too many members; empty if there is none."""
     waiting: list[tuple[Any, str]] = [(document, "#")]
     while waiting:
         value, place = waiting.pop()
@@ -244,7 +244,7 @@ def crowd_in(document: Schema) -> str:
 
 
 def long_text_in(document: Schema) -> str:
-    """Return the place of a text that is longer than any name, address or pattern; empty if there is none.
+    """Return the place of a text that is too long for a name, address or pattern; empty if there is none.
 
     Only texts for people, extensions and values of bodies may be longer; values of parameters and servers may not.
     """

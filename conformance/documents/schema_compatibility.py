@@ -1,4 +1,4 @@
-"""Compare two schemas of the same place: what breaks who sends or reads by the older one.
+"""Compare two schemas of the same place: which changes break senders or readers that know the older one.
 
 Which values are valid decides whether a change breaks (schema_containment). What changed is found word by word.
 """
@@ -105,7 +105,7 @@ class _Comparison:
         return one, other
 
     def _ordered(self, old: Any, new: Any) -> tuple[Any, Any]:
-        """Return the schema of what is sent, and that of what the receiver takes."""
+        """Return the schema of the sent values, and that of the values that the receiver accepts."""
         return (old, new) if self.request else (new, old)
 
     def _compared(self, old: Any, new: Any) -> list[Finding]:
@@ -201,7 +201,7 @@ class _Comparison:
                 yield Finding(None, f": not compared: {word}", always=True)
 
     def _parts(self, old: Schema, new: Schema) -> Iterator[Finding]:
-        """Yield the changes of what allOf demands, where it could not be written as one schema."""
+        """Yield the changes of allOf's parts that could not be merged into one schema."""
         parts = old.get("allOf", []), new.get("allOf", [])
         if len(parts[0]) == len(parts[1]):
             for pair in zip(*parts, strict=True):
@@ -261,7 +261,7 @@ class _Comparison:
         yield from self._other_members(old, new)
 
     def _against_others(self, other: Schema, name: str, schema: Any, *, old_has: bool) -> Iterator[Finding]:
-        """Yield changes of a member that one schema describes, and the other among those that have no name."""
+        """Yield changes of a member that only one schema names, while the other covers it by additionalProperties."""
         if any(word in other for word in ("patternProperties", *_WIDE)):
             yield Finding(None, f", member {name}: not compared: patternProperties")
         rest = True if name in other.get("properties", ()) else other.get("additionalProperties", True)
@@ -313,7 +313,7 @@ _WITHOUT: Final = "none"
 
 
 def name_of(schema: Any, example: str = "") -> str:
-    """Return what a shape is: its values or its type, and a value where the type says little."""
+    """Return a shape's name: its values or its type, and a value if the type says little."""
     if not isinstance(schema, dict):
         return example or "anything"
     if "const" in schema or "enum" in schema:

@@ -27,7 +27,7 @@ Placed = tuple[Any, Side]
 
 
 def is_covered(inner: Placed, outer: Placed, barred: frozenset[str] | None) -> bool:
-    """Return whether it is proven that the outer schema allows whatever the inner one does.
+    """Return whether it is proven that the outer schema allows every value of the inner one.
 
     Args:
         inner: schema of what is sent.
@@ -44,7 +44,7 @@ def is_covered(inner: Placed, outer: Placed, barred: frozenset[str] | None) -> b
 
 
 def witness(inner: Placed, outer: Placed, barred: frozenset[str] | None) -> str | None:
-    """Return a value of the inner schema that is none of the outer, as JSON: the shortest found, or None."""
+    """Return the shortest found value of the inner schema that the outer one forbids, as JSON, or None."""
     small, large = _pair(inner, outer, barred)
     try:
         allows, refuses = (
@@ -141,7 +141,7 @@ def _members(schema: Any) -> set[str]:
 
 
 def _barred(schema: Any, names: frozenset[str]) -> Any:
-    """Return a schema whose objects have none of these members, unless they have a schema for undescribed ones."""
+    """Return a schema whose objects lack these members, unless a schema for undescribed members covers them."""
     if not names or not isinstance(schema, dict):
         return schema
     found: Schema = {

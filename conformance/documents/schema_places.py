@@ -199,7 +199,7 @@ def without_foreign_words(document: Schema) -> Schema:
 
 
 def in_one_version(document: Schema) -> Schema:
-    """Return a document whose schemas mix the words of two versions as one of OpenAPI 3.1; any other as it is.
+    """Return a document that mixes schema keywords of two versions as OpenAPI 3.1; any other document unchanged.
 
     Each word keeps its meaning, because its author means that.
     """
@@ -225,7 +225,7 @@ def _is_old(document: Schema) -> bool:
 
 
 def _found(document: Schema) -> Iterator[tuple[Holder, Any, str, str]]:
-    """Yield what holds each such word, its key there, the word as it is told, and the JSON pointer of its schema."""
+    """Yield the holder of each such keyword, its key, its name in messages, and the JSON pointer of its schema."""
     is_old = _is_old(document)
     others = [] if _is_2020(document.get("jsonSchemaDialect")) else [""]
     for holder, key, pointer in schema_places(document):

@@ -40,7 +40,7 @@ _WITHOUT_MEANING: Final = frozenset({"double", "password", "binary"})
 
 
 class Side:
-    """The schemas of one description, of values that go in one direction.
+    """The schemas of one description for values that go in one direction.
 
     Args:
         name: of the side, in its references.
@@ -254,7 +254,7 @@ _BOUNDS: Final = {
 
 
 def alternatives(schema: Any, side: Side, depth: int = 0) -> list[Any]:
-    """Return schemas of which a value has at least one: those of anyOf, oneOf and several types."""
+    """Return schemas of which a value meets at least one: those of anyOf, oneOf and several types."""
     given = plain(schema, side)
     if not isinstance(given, dict) or depth > _DEPTH:
         return [given]
@@ -287,7 +287,7 @@ def plain(schema: Any, side: Side, depth: int = 0) -> Any:
 
 
 def _merged(one: Any, other: Any) -> Any:
-    """Return a schema that demands what both do; None if the two cannot be written as one."""
+    """Return a schema that demands what both do; None if they cannot be merged into one."""
     if one in (True, {}) or other in (True, {}):
         return other if one in (True, {}) else one
     if one is False or other is False:

@@ -1,4 +1,4 @@
-"""What a description says of credentials: where its security schemes put them, and which operations demand some."""
+"""Security schemes of a description: where credentials go, and which operations demand them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recognise what no body should be: internals of a program, such as tracebacks, and JSON or XML that is malformed."""
+"""Recognise bodies that show a program's internals, such as tracebacks, and malformed JSON or XML."""
 
 import html
 import re

@@ -100,7 +100,7 @@ class SoapPort:
 
 @dataclass(frozen=True, eq=False)
 class Wsdl:
-    """What a WSDL and the documents that it refers to describe; read when it is asked for.
+    """A WSDL and the documents that it refers to; parts are read when they are needed.
 
     Attributes:
         documents: the WSDL and the documents that it refers to.
@@ -149,7 +149,7 @@ class Wsdl:
         return next(filter(None, written), "")
 
     def find(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
-        """Return what a QName in an attribute refers to, or None."""
+        """Return the component that a QName in an attribute refers to, or None."""
         return self._reader.find(path, reference, attribute)
 
     @cached_property
@@ -217,7 +217,7 @@ class Wsdl:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the suite does not know of the WSDL, through no fault of the device."""
+        """Parts of the WSDL that the suite does not support, which is no fault of the device."""
         faults, notes = self._judged
         return (*notes, *(faults if self.foreign else ()))
 
@@ -240,7 +240,7 @@ class _Reader:
         self._by_name: dict[str, dict[str, etree._Element]] = {}
 
     def find(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
-        """Return what a QName in an attribute refers to, or None."""
+        """Return the component that a QName in an attribute refers to, or None."""
         if path not in self._by_name:
             self._by_name[path] = {  # of two with one name the first counts
                 clark(_space_of(one), one.get("name") or ""): one for one in reversed(self._all(path))

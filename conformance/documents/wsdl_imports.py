@@ -1,4 +1,4 @@
-"""Collect the documents of a WSDL by its imports and those of its schemas, each once; tell what is missing of them."""
+"""Collect the documents of a WSDL by its imports and those of its schemas, each once, and report the missing ones."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -168,7 +168,7 @@ class SchemaFolder:
         return found
 
     def at(self, place: str) -> bytes | None:
-        """Return the document whose path ends as a location does, with `.xsd` or without; None if there is none."""
+        """Return the document whose path ends as a location does, with or without `.xsd`, or None."""
         wanted = PurePosixPath(urlsplit(place).netloc + urlsplit(place).path).parts[::-1]
 
         def fits(path: Path) -> int:
@@ -193,7 +193,7 @@ _AMBIGUOUS: Final = ("determinist", "Unique Particle Attribution")
 def gaps(
     found: Collected, types: Types, location: str, named: Iterable[tuple[str, str]]
 ) -> tuple[list[str], list[str]]:
-    """Return what is wrong with the documents of a WSDL, and what is not known of them through no fault of the device.
+    """Return the faults of a WSDL's documents, and the gaps that are no fault of the device.
 
     A device is to blame for the documents on its own server, and for names that no document declares.
 

@@ -76,7 +76,7 @@ def write_soap_pack(
 
 
 def _operations(found: Wsdl) -> dict[str, Any]:
-    """Return the operations in the form in which those of other APIs are known."""
+    """Return the operations in the same form as those of other APIs."""
     paths: dict[str, Any] = {}
     for port, operation in each(found.ports):
         marks = {"x-roaas-reads": True} if _READS.match(operation.name) else {}
@@ -119,7 +119,7 @@ def each(ports: Iterable[SoapPort]) -> Iterable[tuple[SoapPort, SoapOperation]]:
 
 @lru_cache(maxsize=4)
 def own_wsdl(contract: Contract) -> str:
-    """Return the URL from which a pack's WSDL came; empty where it came from a file, or the pack has none."""
+    """Return the URL of a pack's WSDL; empty if it came from a file, or the pack has none."""
     path = contract.directory / DOCUMENTS_NAME
     location = str(json.loads(path.read_text(encoding="utf-8"))["location"]) if path.is_file() else ""
     return location if urlsplit(location).scheme in {"http", "https"} else ""
@@ -127,7 +127,7 @@ def own_wsdl(contract: Contract) -> str:
 
 @lru_cache(maxsize=4)
 def services_of(contract: Contract) -> Wsdl | None:
-    """Return what the WSDL of a pack describes; None if the pack has none.
+    """Return the services that a pack's WSDL describes, or None.
 
     Raises:
         WsdlError: it describes no service.

@@ -143,7 +143,7 @@ class Types:
         return (first or second)[:_SHOWN] if second else ""
 
     def _without_unknown_types(self, element: etree._Element) -> etree._Element:
-        """Return a copy without each xsi:type that names a type of which no document is there."""
+        """Return a copy without any xsi:type whose type no document declares."""
         alone, spaces = copy.deepcopy(element), {one.space for one in self.unknown}
         for one in alone.iter(etree.Element):
             prefix, _, name = one.get(_TYPE, "").strip().rpartition(":")
@@ -251,7 +251,7 @@ def _patterns(documents: Sequence[SchemaDocument]) -> str:
 
 
 def _chain(uses: Mapping[Component, Sequence[Component]]) -> str:
-    """Return which component begins a chain of more than the allowed number; empty if there is none."""
+    """Return the component at the start of a chain that is too long; empty if there is none."""
     depths: dict[Component, int] = {}
     for start, first in uses.items():
         # What is under way has no depth yet: a type within itself is no longer chain.

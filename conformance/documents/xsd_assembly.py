@@ -122,7 +122,7 @@ def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
 
 
 def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
-    """Return the namespaces that each document has: one without takes those of the documents that include it."""
+    """Return the namespaces of each document: one without a namespace takes those of the documents that include it."""
     found = {one.location: {one.namespace} if one.namespace or one.inline else set() for one in documents}
     changed = True
     while changed:
@@ -146,7 +146,7 @@ def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
 
 
 def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
-    """Return the documents that others redefine, and what those include: nothing else may include them."""
+    """Return the documents that others redefine, with what those include: nothing else may include them."""
     by_place = {one.location: one for one in documents}
     waiting = [target for one in documents for target in one.targets(*_REDEFINE)]
     found: set[str] = set()
@@ -159,7 +159,7 @@ def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
 
 
 def _declare(known: dict[Component, bytes], root: etree._Element, space: str, *, drop: bool) -> list[Component]:
-    """Add the components that a document declares, and leave out what is there; return those that differ."""
+    """Add a document's components, skip equal ones that exist, and return those that differ."""
     differ: list[Component] = []
     parents = [root, *root.iterchildren(*_REDEFINE)]
     for child in [one for parent in parents for one in parent.iterchildren(etree.Element) if one.get("name")]:
@@ -179,7 +179,7 @@ def kind_of(tag: str) -> str:
 
 
 def references(root: etree._Element, space: str, *, deep: bool = True) -> Iterator[Component]:
-    """Yield the components that a document or a part of it refers to; without ``deep``, those of the part alone."""
+    """Yield the components that a document or a part refers to; without ``deep``, only the part's own references."""
     for element in root.iter(etree.Element) if deep else (root,):
         for attribute, text in element.attrib.items():
             kind = kind_of(element.tag) if attribute == "ref" else _NAMED.get(str(attribute))

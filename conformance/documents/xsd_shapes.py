@@ -229,7 +229,7 @@ _TEXT: Final = "#text"
 
 
 class NoElementError(ValueError):
-    """Raised for a value that no element can have; the message names the member and those that there are."""
+    """Raised for a member that no element can hold; the message names it and the possible elements."""
 
 
 def value_of(element: etree._Element) -> Any:

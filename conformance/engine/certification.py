@@ -292,7 +292,7 @@ class _LoadedForGood:
 
 
 def _run_and_repeat(robot: RobotUnderTest, teller: Progress, remarks: list[str], recordings: Recordings) -> None:
-    """Run the checks, and send the requests of findings again. Whatever breaks, what was judged until then is kept."""
+    """Run the checks, and repeat the requests of findings. Whatever breaks, verdicts up to then are kept."""
     run = robot.run
     try:
         run.interrupted |= _run_checks(robot, teller, remarks, recordings)

@@ -77,7 +77,7 @@ class ChecksPlugin:
         return tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in self.parts_of(item)))
 
     def parts_of(self, item: pytest.Item) -> tuple[str, ...]:
-        """Return the ids by which a check names what it judges; an alias is a part of a requirement."""
+        """Return the ids by which a check names its requirements; an alias is a part of a requirement."""
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
         return expanded(marked, self._robot().run.contract.ledger)
 

@@ -52,7 +52,7 @@ class Commanded:
 
     @property
     def little(self) -> float:
-        """A little of it: a tenth of what is declared, or 0.05 m/s or 0.1 rad/s."""
+        """A small change of the number: a tenth of the declared range, or 0.05 m/s or 0.1 rad/s."""
         usual = _TURN if self.turns else _WAY
         if self.declared is None:
             return usual
@@ -98,7 +98,7 @@ def is_axis(name: str) -> bool:
 
 
 def unique_names(places: Sequence[str]) -> dict[str, str]:
-    """Return a name for each place, as short as tells it from the others."""
+    """Return a name for each place, as short as possible and unique."""
     parts = {at: [part for part in re.split(r"[/#]", at.strip("{}")) if part] or ["value"] for at in places}
     for length in range(1, _DEPTH + 2):
         names = {at: "_".join(one[-_least(one, length) :]) for at, one in parts.items()}
@@ -115,13 +115,13 @@ def _least(parts: Sequence[str], length: int) -> int:
 
 
 def body_type(operation: Operation) -> str:
-    """Return the media type in which a map's body is written: JSON, if it is declared; empty: there is no body."""
+    """Return the media type of a map's body: JSON, if declared; empty without a body."""
     json = next((name for name in operation.bodies if is_json(name)), "")
     return json or next((name for name in operation.bodies if name in _FORMS), "")
 
 
 def body_schema(operation: Operation) -> Schema | None:
-    """Return the schema of the body that a map fills; None: the operation has none that can be filled."""
+    """Return the schema of the body that a map fills; None if the operation has no such body."""
     name = body_type(operation)
     return operation.bodies[name].schema if name else None
 

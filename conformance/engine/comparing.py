@@ -45,7 +45,7 @@ def _is_of_result(source: str) -> bool:
 
 
 def _of_result(source: str) -> Description:
-    """Return the description in a result, which is a whole one.
+    """Return the complete description in a result.
 
     Raises:
         DescriptionError: it cannot be used.

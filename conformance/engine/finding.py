@@ -134,7 +134,7 @@ def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, 
 
 
 def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
-    """Return the operation in the same folder that is called stop or the like; one that latches is none."""
+    """Return the operation in the same folder that is called stop or the like and does not latch."""
     folder = posixpath.dirname(drive.template)
     for one in operations:
         named = posixpath.basename(one.template)
@@ -156,7 +156,7 @@ def _named(operations: Sequence[Operation], label: str, option: str) -> Operatio
 def _reads(
     operations: Sequence[Operation], rules: CallRules, values: Mapping[str, str], drive: str, names: frozenset[str]
 ) -> Iterator[Operation]:
-    """Yield what may be read and has JSON: first what tells numbers of these names, is beside, or is called a state.
+    """Yield readable operations with JSON: first those with these names, those in the same folder, or a state.
 
     Args:
         operations: of the description.
@@ -223,7 +223,7 @@ class Finder(ABC):
         """
 
     def _look(self) -> None:
-        """Read one of the operations; one that does not tell numbers is not read again."""
+        """Read one of the operations; one without numbers is not read again."""
         operation = self._reads[self._turn % len(self._reads)]
         self._turn += 1
         sent = self._clock.now()

@@ -100,7 +100,7 @@ def _acts(operation: Operation) -> bool:
 
 
 def body_of(operation: Operation) -> Schema | None:
-    """Return the schema of the JSON that an operation takes; None: it takes none."""
+    """Return the schema of the JSON body that an operation accepts, or None."""
     return next((one.schema for name, one in operation.bodies.items() if is_json(name)), None)
 
 

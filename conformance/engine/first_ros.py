@@ -96,7 +96,7 @@ class Fit:
 
 @dataclass
 class _Proposal:
-    """The table of one operation, how it writes numbers and octets, and why it is a guess; empty: it is none."""
+    """The proposed table of one operation, how it writes numbers and bytes, and why it is a guess; or empty."""
 
     keys: dict[str, Any]
     forms: dict[str, str] = field(default_factory=dict)
@@ -133,7 +133,7 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
 
 
 def _settled(robot: Robot) -> dict[str, Any]:
-    """Return what is on the graph, when other nodes were found and no more come."""
+    """Return the ROS graph once other nodes were found and no more appear."""
     until, seen = WALL_CLOCK.now() + _DISCOVERY_S, robot.tell("graph")
     while True:
         WALL_CLOCK.sleep(_SETTLES_S)
@@ -214,7 +214,7 @@ def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal 
 
 
 def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -> tuple[str, str]:
-    """Return the end of the graph that an operation fits best, and why that is a guess; empty: there is none."""
+    """Return the graph's end that an operation fits best, and why that is a guess; empty if there is none."""
 
     def rank(name: str) -> tuple[bool, bool, int, float]:
         return name not in written, not fits[name].lacks, fits[name].size, _shared(one, name)
@@ -283,7 +283,7 @@ def _states(leaf: Schema) -> dict[str, list[str]]:
 
 
 def _lists(one: Operation, graph: Graph, read: Any) -> _Proposal | None:
-    """Return the proposal that an operation lists what is on the graph, if it has all of one kind."""
+    """Return the proposal that an operation lists the graph, if its response contains all names of one kind."""
     for at, leaf in _leaves(one.shape or {}):
         items = _items(leaf)
         members = dict(_leaves(items)) if items else {}

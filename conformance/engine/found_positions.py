@@ -1,4 +1,4 @@
-"""Find by moving a device a little how it is sent to positions: those whose names a reading has."""
+"""Find how a device is sent to positions, by moving it a little: the positions that a reading also contains."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class PositionFinder(Finder):
         return found
 
     def _followed(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
-        """Send one axis a little to each side, less far if it does not get there; return how it followed, or None."""
+        """Move one axis a little to each side, less far if it does not arrive; return how it followed, or None."""
         found, why = None, "its limits leave no room"
         # Of what is declared, a part is safe; of what is not, nobody knows how far it may go.
         for part in _PARTS[1:] if number.declared else _PARTS:
@@ -223,7 +223,7 @@ class PositionFinder(Finder):
         yield from self._stop_lines()
 
     def _stop_lines(self) -> Iterator[str]:
-        """Yield the stop beside the operation that moves the device, if what it takes is known."""
+        """Yield the stop beside the operation that moves the device, if its parameters are known."""
         stop = self._plan.stop
         if stop is None:
             return

@@ -138,7 +138,7 @@ class VelocityFinder(Finder):
         return found
 
     def _measured(self, responses: Mapping[str, Mapping[tuple[str, str], Response]]) -> dict[str, tuple[str, Response]]:
-        """Return by which place of one operation each commanded number is measured.
+        """Return, for each commanded number, the place in one operation's response that measures it.
 
         Raises:
             NotPossibleError: nothing shows any of them.
@@ -306,7 +306,7 @@ def _off(ratio: float) -> float:
 
 
 def _unit(ratio: float) -> tuple[float, tuple[str, str]]:
-    """Return by how much a velocity has to be multiplied, and what its unit is called; the ratio, if it is none."""
+    """Return the factor of a velocity and the name of its unit; the ratio, if the unit is unknown."""
     near = min(_UNITS, key=lambda unit: abs(math.log(abs(ratio) / unit)))
     if abs(math.log(abs(ratio) / near)) < math.log(_NEAR):
         return near, _UNITS[near]

@@ -33,7 +33,7 @@ from conformance.verdict.verdicts import Verdict
 
 @dataclass(frozen=True)
 class Judged:
-    """What came of it.
+    """The outcome of judging a stored run again.
 
     Attributes:
         verdicts: those with a case, in the ledger's order.
@@ -49,7 +49,7 @@ class Judged:
 
 
 def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path) -> Judged:
-    """Judge the history and the traces in a result's folder; at least one of them has to be there.
+    """Judge the history and the traces in a result's folder; at least one of them must exist.
 
     Args:
         robot: with statement and contract; it is not asked.

@@ -172,7 +172,7 @@ class LostDevice:
         return _Found((last,))
 
     def _smallest(self, request: Request) -> Request:
-        """Return the smallest request that still does what this one does."""
+        """Return the smallest request that has the same effect."""
         tried: set[Request] = set()
         while True:
             for one in smaller(request):
@@ -214,7 +214,7 @@ class LostDevice:
         return True
 
     def _record(self, requirement: str, kind: NoAnswer | None, sent: Sequence[Request], found: _Found) -> None:
-        """Record the finding, because of which what cannot be judged any more is not tested."""
+        """Record the finding that keeps the remaining requirements from being tested."""
         judge, last = self._run.judge, found.requests[-1]
         problems: dict[NoAnswer | None, str] = {
             NoAnswer.TIMEOUT: f"no response within {self._connection.timeout_s:g} s",

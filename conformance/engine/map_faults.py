@@ -95,7 +95,7 @@ def _velocities(velocity: Velocity) -> Iterator[_Command]:
 def _filled(
     table: str, call: str, body: Any, values: Mapping[str, Any], media_type: str = "", root: str = ""
 ) -> Iterator[_Command]:
-    """Yield a command; one that needs what only the device can tell is left out."""
+    """Yield a command with its values, unless it needs values that only the device knows."""
     try:
         yield table, filled(call, values), filled(body, values), media_type, root
     except NoValueError:

@@ -32,7 +32,7 @@ _NO_LIMITS: Final = "no limits are declared that are refused"
 
 
 def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: Recordings) -> list[dict[str, str]]:
-    """Return question, answer ("yes", "no" or "not seen"), figure and picture of each; empty if none was asked.
+    """Return question, answer ("yes", "no" or "not seen"), figure and picture of each; empty without a map.
 
     The picture is what ``reports`` calls the drive or move: its name in the traces.
     """
@@ -160,7 +160,7 @@ def _drives_on(drive: Drive, motion: MotionMap) -> bool:
 
 
 def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
-    """Return how long after a moment a device was at rest, by how far it still came; None if that was not seen."""
+    """Return how long after a moment a device came to rest, s, by its remaining way; None if that was not seen."""
     name = max(drive.wanted, key=lambda one: abs(drive.wanted[one]), default="")
     speed = motion.velocity.axes.get(name) if motion.velocity else None
     if speed is None or not drive.under_way or len(drive.after) < SEVERAL:

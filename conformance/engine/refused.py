@@ -106,7 +106,7 @@ class RefusalListener(Listener):
                 raise NotPossibleError(self.run.aborted)
 
     def _demands(self, request: Request) -> bool | None:
-        """Return whether a request is for what demands credentials; None if it shows nothing of that."""
+        """Return whether a request's operation demands credentials; None if unknown."""
         contract, rest = self.run.contract, self.rest()
         if request.method == "POST" and "xml" in request.media_type and _speaks_soap(contract):
             return True

@@ -179,7 +179,7 @@ def longest_s(chosen: Iterable[tuple[str, Mapping[str, Any]]]) -> float:
 
 
 class _Stop:
-    """The stop of the robot of a result, as the contract says; a guard process sends it if this one is killed."""
+    """Stops the result's robot as its contract says; a guard process does so if this one is killed."""
 
     def __init__(
         self, result: Mapping[str, Any], connection: Connection, rest: str | None, contract: Contract | None
@@ -258,7 +258,7 @@ def judged_by_checks(
 def _still_there(
     id_: str, recorded: Mapping[str, Any], request: Request, came: Attempt, rest: str | None, contract: Contract | None
 ) -> tuple[bool | None, str]:
-    """Return whether the new response shows the finding again, or None if it cannot tell, and how that was decided."""
+    """Return whether a new response shows the finding again (None if unclear), and how that was decided."""
     if not isinstance(came, Exchange):
         same = recorded["status"] is None and str(recorded.get("error", ""))[:_ALIKE] == came.problem[:_ALIKE]
         return (True if same else None), _BY_SILENCE

@@ -130,7 +130,7 @@ def _digest(value: Any) -> str:
 
 
 def _faults(run: Run) -> dict[str, Any]:
-    """Return what could not be judged because of an error in the suite, under its key; empty if there was none."""
+    """Return what an error in the suite kept from being judged, under its key; empty if there was none."""
     faults = [{"text": text, "requirements": ids} for text, ids in run.judge.faults.items()]
     return {"suite_errors": faults} if faults else {}
 
@@ -159,7 +159,7 @@ def left_out(robot: RobotUnderTest) -> dict[str, Any]:
 
 
 def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:
-    """Return what the web server does by itself, under its key; empty where the verdict has it, or none was judged."""
+    """Return the verdicts on the web server, under their key; empty if they are in the verdict, or none was judged."""
     found = web_server(aside, robot.rest.server if robot.rest else "")
     return {"web_server": {**found, "requirements": [_requirement(one) for one in aside]}} if found else {}
 

@@ -227,21 +227,21 @@ class RobotUnderTest:
             self._guard.release(stopped=not self.run.stop_undelivered)
 
     def keep_history(self, history: HistoryWriter) -> None:
-        """Write down from now on what is sent and what comes back."""
+        """Record in the history what is sent and received from now on."""
         self._history = self.connection.recorder = history
 
     def begin(self, check_name: str) -> None:
-        """Begin a check, or, with an empty name, what belongs to none."""
+        """Begin a check; an empty name begins a phase outside of checks."""
         self.run.judge.begin(check_name)
         self.begin_span(check_name)
 
     def begin_span(self, name: str) -> None:
-        """Say in the history what the suite does from now on."""
+        """Note in the history what the suite does from now on."""
         if self._history is not None:
             self._history.begin(name)
 
     def end_history(self) -> tuple[str, ...]:
-        """Close the history; return what has to be said of it."""
+        """Close the history; return remarks on it."""
         if self._history is None:
             return ()
         self._history.close()
@@ -313,7 +313,7 @@ class RobotUnderTest:
         return f"{said} It ends after about {run.limit.minutes:g} minutes." if run.limit.minutes is not None else said
 
     def note_uncalled(self) -> None:
-        """Keep which operations were not called for want of time."""
+        """Note which operations were not called because time was over."""
         if self.run.limit.is_struck and self.log and self.rest:
             self.run.limit.uncalled = tuple(self.log.uncalled(self.rest.call_rules))
 

@@ -1,4 +1,4 @@
-"""What result.json says of each operation of a ROS map: what was compared, and the first thing that differs."""
+"""The part of result.json on a ROS map: what was compared for each operation, and the first difference."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RosEnds:
             self._compared.update(self._calls(exchange.request))
 
     def _calls(self, request: Request) -> list[str]:
-        """Return the operations of the map that a request concerns: of several in one template, the one it names."""
+        """Return the map's operations that a request concerns; of several with one template, the one that it names."""
         labels = list(self._concerned(request))
         found: dict[str, str] = {}
         for call, one in self._ros.operations.items():

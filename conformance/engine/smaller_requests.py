@@ -1,4 +1,4 @@
-"""Smaller requests than a given one, to find the part of it that makes a device crash or hang."""
+"""Make a request smaller, to find the part of it that makes a device crash or hang."""
 
 import json
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ _LONG: Final = 64
 
 
 def smaller(request: Request) -> Iterator[Request]:
-    """Yield requests that lack one part of this one, those that lack much before those that lack little."""
+    """Yield requests that lack one part of this one, the largest parts first."""
     if request.raw is not None:
         return
     if request.body:

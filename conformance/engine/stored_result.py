@@ -90,7 +90,7 @@ def read_result(path: Path) -> dict[str, Any]:
 
 
 def not_well_made(path: Path, error: Exception) -> StoredResultError:
-    """Return the error for a result whose content raised another one."""
+    """Return the error for a result whose content raised another error."""
     said = inert(f"{type(error).__name__}: {error}")[:_SHOWN]
     return StoredResultError(f"{path} is no well-made {_FORMAT}: {said}")
 

@@ -1,4 +1,4 @@
-"""What a run says of the web server before a device's application: judged, told once, and beside the verdict."""
+"""The result's part on the web server in front of a device's application, which is judged beside the verdict."""
 
 from collections.abc import Collection, Iterator, Sequence
 from functools import cache

@@ -1,4 +1,4 @@
-"""The texts beside the ledger: advice by subject (advice.toml), and what sources say in own words (sources.toml)."""
+"""Texts beside the ledger: advice by subject (advice.toml), and the sources in own words (sources.toml)."""
 
 import re
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""Keep what happened in a run, event by event: what was sent and came back, what was seen, what the suite was doing."""
+"""Record a run event by event: requests, responses, observations, and what the suite was doing."""

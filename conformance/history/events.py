@@ -1,4 +1,4 @@
-"""The events of a history, as they are written: one JSON object each, told apart by ``event``.
+"""The events of a history, each written as one JSON object whose key ``event`` names its type.
 
 All times are seconds since the run began, by its monotonic clock. What a later version adds has a default, so that
 older histories are still read: what they lack was not seen.
@@ -173,7 +173,7 @@ def _came(response: Response) -> Came:
 
 
 class Began(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="began"):
-    """The first event: of which version the history is, which suite wrote it, and when the run began (RFC 3339)."""
+    """The first event: version of the format, suite, and time when the run began (RFC 3339)."""
 
     version: int
     suite: str
@@ -194,7 +194,7 @@ class Withdrawn(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="even
 
 
 class Seen(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="seen"):
-    """What an eye saw beside the requests, such as a message on a ROS topic, dated where it was seen."""
+    """An observation beside the requests, such as a ROS message, with the time at which it was made."""
 
     at_s: float
     eye: str

@@ -65,7 +65,7 @@ class HistoryWriter(Recorder):
         self._queue.put(Withdrawn(number))
 
     def begin(self, span: str) -> None:
-        """Say what the suite does from now on."""
+        """Note what the suite does from now on."""
         self._span = span
         self._queue.put(Span(self._since(time.monotonic()), span))
 

@@ -1,1 +1,1 @@
-"""Estimators: what several readings show together. Pure functions, which talk to no device and judge nothing."""
+"""Estimators over several readings. Pure functions: they talk to no device and judge nothing."""

@@ -70,7 +70,7 @@ def response_to(
 
 
 def agreed(responses: Sequence[Response | None]) -> Response | None:
-    """Return what the drives of one velocity there and back tell of a number; None if they do not agree."""
+    """Return what the drives there and back at one velocity show of a number; None if they disagree."""
     found = [one for one in responses if one is not None]
     if len(found) < len(responses) or not found or len({one.is_position for one in found}) > 1:
         return None
@@ -81,7 +81,7 @@ def agreed(responses: Sequence[Response | None]) -> Response | None:
 
 
 def rests_from(samples: Sequence[Sample], sigma: float, moving: float) -> float | None:
-    """Return since when a number stays where it is at the end; None if it still changes there.
+    """Return the time from which a number stays at its final value; None if it still changes.
 
     Args:
         samples: after the last command.

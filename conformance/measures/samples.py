@@ -1,4 +1,4 @@
-"""Medians, slopes and noise of several samples, of which no single one decides anything.
+"""Medians, slopes and noise of several samples, so that no single sample decides.
 
 A device publishes its state 5 to 100 times a second, with noise in each sample; a client may read it faster or slower.
 """
@@ -59,7 +59,7 @@ def slope(samples: Sequence[Sample]) -> float | None:
 
 
 class Noise(NamedTuple):
-    """What samples of a device at rest show: how far they are off zero, and the standard deviation of one."""
+    """Noise of a device at rest: the samples' offset from zero, and the standard deviation of one sample."""
 
     off: float
     sigma: float
@@ -73,7 +73,7 @@ class Noise(NamedTuple):
         return cls(abs(centre), max(declared, _SIGMA * median(abs(one - centre) for one in values)))
 
     def room(self, samples: Sequence[Sample]) -> float:
-        """Return how far the median of such samples may be off zero; those that repeat one value are one."""
+        """Return how far the median of such samples may be off zero; repeated values count once."""
         distinct = 1 + sum(one[1] != other[1] for one, other in itertools.pairwise(samples))
         return self.off + FARTHEST * self.sigma / math.sqrt(distinct)
 

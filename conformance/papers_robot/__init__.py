@@ -1,1 +1,1 @@
-"""What the paper says of its robot: for the pack that judges it, the robot itself, and the load test."""
+"""The paper's facts on its robot: for the pack that judges it, the robot itself, and the load test."""

@@ -1,4 +1,4 @@
-"""What a vendor says of the paper's robot to whoever calls it: its ROS side, and where its contract is."""
+"""The statement's tables for every client of the paper's robot: its ROS side, and its contract."""
 
 from pathlib import Path
 from typing import Annotated, Self

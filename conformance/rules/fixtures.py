@@ -75,7 +75,7 @@ def _watched(
 
 
 def _descriptions(service: SoapService) -> Iterator[Wsdl]:
-    """Yield what the robot says of a service, and what the contract does."""
+    """Yield the robot's and the contract's description of a service."""
     if service.own is not None:
         yield service.own
     if service.contract_wsdl_path is not None:
@@ -84,14 +84,14 @@ def _descriptions(service: SoapService) -> Iterator[Wsdl]:
 
 @pytest.fixture(scope="session")
 def other_exchanges(run: Run, interfaces: Interfaces) -> OtherExchanges | None:
-    """Return what keeps the exchanges that no scenario records; None where no rule asks for them."""
+    """Return the keeper of exchanges that no scenario records; None if no rule needs them."""
     asked = not run.contract.ledger.keys().isdisjoint({"description/status-declared", "robustness/no-server-error"})
     return OtherExchanges(interfaces.rest) if asked and interfaces.rest else None
 
 
 @pytest.fixture(scope="session")
 def kept_exchanges(run: Run, interfaces: Interfaces) -> KeptExchanges | None:
-    """Return what keeps exchanges to compare with the robot's own description; None where nothing asks for that."""
+    """Return the keeper of exchanges that are compared with the robot's own description; None if no rule needs them."""
     asked = "describe/openapi-answers" in run.contract.ledger
     return KeptExchanges(interfaces.rest) if asked and interfaces.rest else None
 
@@ -105,7 +105,7 @@ def values(run: Run) -> Values:
 
 @pytest.fixture(scope="session")
 def motion(run: Run) -> MotionMap:
-    """Return the motion map; the class that needs it is judged only where there is one."""
+    """Return the motion map; its class is judged only if there is one."""
     if run.statement.motion_map is None:
         raise NotPossibleError("the statement has no motion map")
     return run.statement.motion_map
@@ -121,7 +121,7 @@ def mapped(interfaces: Interfaces, motion: MotionMap) -> MappedDevice:
 
 @pytest.fixture(scope="session")
 def state_map(run: Run) -> StateMap:
-    """Return the state map; the class that needs it is judged only where there is one."""
+    """Return the state map; its class is judged only if there is one."""
     if run.statement.state_map is None:
         raise NotPossibleError("the statement has no state map")
     return run.statement.state_map
@@ -129,7 +129,7 @@ def state_map(run: Run) -> StateMap:
 
 @pytest.fixture(scope="session")
 def ros(run: Run) -> RosMap:
-    """Return the ROS map; the class that needs it is judged only where there is one."""
+    """Return the ROS map; its class is judged only if there is one."""
     if run.statement.ros_map is None or not run.ros:
         raise NotPossibleError("a gateway is judged with --ros or --ros-play, by the table [ros] of its statement")
     return run.statement.ros_map

@@ -1,4 +1,4 @@
-"""Tell what several operations have in common once, with the list of the operations."""
+"""Report what several operations have in common as one finding, with the list of the operations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with one response.
+    """The fault of one response.
 
     Attributes:
         cause: faults of the same cause are told once.
@@ -72,7 +72,7 @@ def told_once(
 
 
 def held_back(probes: Iterable[Probe]) -> Iterator[NotSeen]:
-    """Yield the operations of which a device shows nothing, because its state allowed none of these requests."""
+    """Yield the operations whose state allowed none of these requests, so that nothing was shown."""
     statuses: dict[str, set[int]] = {}
     for probe in probes:
         statuses.setdefault(probe.operation, set()).add(probe.status)

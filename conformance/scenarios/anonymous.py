@@ -103,7 +103,7 @@ def _life_of(item: str) -> tuple[tuple[str, str], ...]:
 
 
 def _beyond_ascii(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
-    """Send one read with a key beyond ASCII in the query: functions that compare secrets fail on such a text."""
+    """Send one read with a non-ASCII key in the query: functions that compare secrets fail on such a text."""
     schemes = api.run.contract.openapi.get("components", {}).get("securitySchemes", {})
     names = [one["name"] for one in schemes.values() if (one.get("type"), one.get("in")) == ("apiKey", "query")]
     reads = [one for one in closed if one.method == "GET" and one.label not in api.streams]

@@ -148,13 +148,13 @@ class Chosen:
                     yield read, found
 
     def _is_said(self, read: Operation) -> bool:
-        """Return whether the description says that the things are counted which are there now."""
+        """Return whether the description says that a count is of the things that exist now."""
         things = plain_name(collection_of(self.living.read.template).rpartition("/")[2])
         said = flat(members_of(parts_of(read.shape or {})).get(things, {})).get("description")
         return isinstance(said, str) and bool(_NOW.search(said)) and not _EVER.search(said)
 
     def _counted(self, read: Operation, value: Any) -> tuple[Exchange, int | None]:
-        """Return how many things a resource says that there are with a value; None if it does not say it."""
+        """Return the number of things with a value that a resource reports, or None."""
         things = plain_name(collection_of(self.living.read.template).rpartition("/")[2])
         path = read.template.replace(f"{{{read.parameter('path')[0].name}}}", quote(str(value), safe=""))
         found = self.living.writer.send(read, path)
@@ -168,7 +168,7 @@ class Chosen:
         self.living.note(Kind.SHOWN, read.label, found, expected, "" if told == right else str(told), thing)
 
     def _ordered(self, listing: Listing, things: list[Thing]) -> None:
-        """Give two things numbers whose order as texts is another one, and sort by them; a checker judges lists."""
+        """Give two things numbers that sort differently as texts, and sort by them; a checker judges the lists."""
         sort = listing.sort
         if sort is None or len(things) < len(_NUMBERS):
             return
@@ -182,7 +182,7 @@ class Chosen:
 
 
 def _filters(listing: Listing) -> Iterator[tuple[str, Parameter]]:
-    """Yield the filters whose values are known: one equals the member."""
+    """Yield the filters with known values that are compared with a member."""
     for name, parameter in listing.filters.items():
         is_named = "enum" in flat(parameter.schema) or kinds_of(parameter.schema) == {"boolean"}
         if is_named and name not in LEVELS and "array" not in kinds_of(parameter.schema):

@@ -105,7 +105,7 @@ class DescribedMessages:
         given: Mapping[str, Sequence[str]] = _NONE,
         current: Mapping[str, str] = MappingProxyType({}),
     ) -> tuple[Element | None, Node | None]:
-        """Return the declaration of an operation's request, and a valid message of it; None if its Body is empty.
+        """Return the declaration of an operation's request, and a valid message; None if its Body is empty.
 
         Args:
             operation: the operation.

@@ -1,4 +1,4 @@
-"""Things that go on and end, such as jobs: begin, cancel and leave some; and things in use, which are deleted.
+"""Things that go on and end, such as jobs: begin, cancel and leave some; and delete things in use.
 
 `checkers.changes` judges the states of things by all reads of a run.
 """
@@ -66,7 +66,7 @@ class Ended:
 
 
 def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
-    """Create two things of each collection with states: begin one and end it twice, and begin the other one.
+    """Create two things of each collection with states: begin one and end it twice, and begin the other.
 
     Of a collection in which nothing can be created, the usual thing goes through its states.
     """
@@ -101,7 +101,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
 
 
 def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
-    """Read again what was begun and ended, and try to end one thing that is done."""
+    """Read again what was begun and ended, and try to end a thing that is done."""
     writer = Writer(api, values)
     for kind in begun:
         ends = [one for one in kind.actions if _ends(one)][:1]
@@ -248,7 +248,7 @@ def _referring(writer: Writer, create: Operation, name: str, id_: Any) -> dict[s
 
 
 def _said_of(api: RestInterface, operation: Operation) -> str:
-    """Return what the description says of an operation and its 409."""
+    """Return the description's texts on an operation and its 409."""
     given: Any = api.run.contract.openapi.get("paths", {}).get(operation.template, {}).get(operation.method.lower(), {})
     said = represented(given.get("responses", {}).get("409", {}), ()).get("description")
     return f"{operation.text} {said if isinstance(said, str) else ''}"

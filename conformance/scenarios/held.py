@@ -31,7 +31,7 @@ _FINAL: Final = frozenset({"cancel", "abort", "stop", "end", "finish", "terminat
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
 def held_operations(api: RestInterface, values: Values) -> Survey:
-    """Call what the state forbade on a new thing, after other operations of it and those that the description names."""
+    """Call operations that the state forbade on a new thing, after its other operations and those described."""
     callable_ = {key: one for key, one in callable_operations(api).items() if not one.motion}
     surveyor, actions = Surveyor(api, values), [one for one in callable_.values() if _acts(one)]
     is_held = {one.label: api.usual_status.get(one.label) in HELD and one.label not in api.working for one in actions}
@@ -49,7 +49,7 @@ def _acts(operation: Operation) -> bool:
 
 @dataclass
 class _Held:
-    """One operation, with what may bring its state about."""
+    """One operation, with the operations that may lead to its state."""
 
     surveyor: Surveyor
     operations: Mapping[tuple[str, str], Operation]

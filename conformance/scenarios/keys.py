@@ -52,7 +52,7 @@ UNSPENT: Final = re.compile(
 
 @dataclass(frozen=True)
 class Keyed:
-    """One request with a key that was sent before, or beside one.
+    """One request with a key that was sent before, or concurrently.
 
     Attributes:
         operation: its label.
@@ -71,7 +71,7 @@ class Keyed:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
-    """Repeat requests with the key of an earlier one; what is found wrong counts if a second round finds it too."""
+    """Repeat requests with the key of an earlier one; a fault counts if a second round shows it too."""
     by_key = callable_operations(api)
     found, tried = list[Keyed](), 0
     for operation in by_key.values():
@@ -173,7 +173,7 @@ class _Rounds:
         return Keyed(self.operation.label, "same request", shown, expected, fault)
 
     def _unspent(self, keys: list[str], inputs: Inputs, made: list[Exchange]) -> Iterator[Keyed]:
-        """Judge a key that came with a request which was refused; a new key shows that the right one can be taken."""
+        """Judge a key whose request was refused; a new key shows that the correct request can be accepted."""
         wrong = next(half_valid(self.operation, inputs, inputs.body), None) if isinstance(inputs.body, dict) else None
         if wrong is None or not is_refused(self._send(self._request(keys[0], replace(inputs, body=wrong)))):
             return
@@ -185,7 +185,7 @@ class _Rounds:
         yield Keyed(self.operation.label, "refused before", taken, expected, fault)
 
     def _later(self, request: Outgoing, first: Exchange, item: Operation, path: str) -> Iterator[Keyed]:
-        """Judge a retry after what was made has changed: the description says that it gets the first response."""
+        """Judge a retry after its thing has changed: the description says that it gets the first response."""
         changes = (self.operations.get((method, item.template.rstrip("/"))) for method in ("PUT", "PATCH"))
         written = (self.writer.change(one, item, path, _TURN) for one in changes if one is not None)
         write = next((one for one in written if one is not None), None)
@@ -213,7 +213,7 @@ class _Rounds:
         return [one for one in found if one]
 
     def _bodies(self, turn: int) -> list[Inputs]:
-        """Return inputs with three different bodies; with one alone where a body cannot be another one."""
+        """Return inputs with three different bodies, or one if the body cannot vary."""
         usual, values = usual_inputs(self.operation, self.writer.values)[0], self.writer.values
         first, found = renewed(self.operation, usual, values), list[Inputs]()
         for number in range(3):
@@ -224,7 +224,7 @@ class _Rounds:
         return found if len(found) == 3 else found[:1]  # noqa: PLR2004 - see above
 
     def _name(self, exchange: Exchange) -> str:
-        """Return what a response says that it has made: where it is, or its identifier; empty if it says neither."""
+        """Return how a response names what it made: its location, or its identifier; empty if neither."""
         if self._item is not None:
             if path := located(self.writer.api, self._item, exchange):
                 return path

@@ -71,7 +71,7 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
 
 
 def _seen_twice(cycle: Callable[[int], _Cycle]) -> list[Life]:
-    """Return the lives of a cycle, with what it found wrong if the second one finds such a thing as well.
+    """Return the lives of a cycle, with its faults if the second cycle shows such a fault as well.
 
     Another client may have changed or deleted something once. Things that change or end without any request are told by
     one that is left alone for as long.
@@ -89,7 +89,7 @@ def _seen_twice(cycle: Callable[[int], _Cycle]) -> list[Life]:
 
 @dataclass
 class _Cycle:
-    """The things of one collection. If the device's state did not allow one, the status is noted in ``held``."""
+    """The things of one collection. If the device's state forbids one, the status is noted in ``held``."""
 
     writer: Writer
     create: Operation
@@ -140,7 +140,7 @@ class _Cycle:
         return any(found)
 
     def _create_all(self, count: int) -> None:
-        """Create things; after each, the others are read. The last one but few comes after a change and a refusal."""
+        """Create things; after each, read the others. Near the end, one is created after a change and a refusal."""
         for turn in range(count):
             if turn == max(1, min(2, count - 1)):
                 self._change(self.living.things[0], 0)
@@ -152,7 +152,7 @@ class _Cycle:
             self.living.look(thing.life.created, self.create.label, thing)
 
     def _change_all(self) -> None:
-        """Refuse changes of one thing, and then change the others."""
+        """Send changes of one thing that must be refused, and then change the others."""
         for turn, thing in enumerate(self.living.of(State.ALIVE)):
             if turn == 0:
                 for change in self._changes if not self.living.is_over else ():
@@ -186,7 +186,7 @@ class _Cycle:
                 self._act_on(action, thing)
 
     def _act_on(self, action: Operation, thing: Thing) -> None:
-        """Call an operation of a thing, and read the thing until it shows what the response says has changed."""
+        """Call an operation of a thing, and read the thing until it shows the change in the response."""
         living, before, said = self.living, self.writer.send(self.read, thing.path), dict[str, Any]()
         sent = self.writer.send(action, thing.path.rstrip("/") + action.template[len(self.item) :])
         if is_refused(sent):
@@ -283,7 +283,7 @@ class _Cycle:
                 self._deleted(thing, delete)
 
     def _taken(self, created: Exchange, before: set[str] | None) -> bool:
-        """Take what a POST has created, by the identifiers that were there before; return whether it is new."""
+        """Register what a POST has created, by the identifiers known before; return whether it is new."""
         status = created.response.status
         id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
@@ -368,7 +368,7 @@ class _Cycle:
         return re.fullmatch(template, path.rstrip("/")) is not None
 
     def _absent(self, path: str) -> str:
-        """Return the path of a thing that hardly exists, beside another one; empty if none can be made."""
+        """Return the path of a thing that probably does not exist, beside another one; empty if none can be made."""
         found = path_chosen(self.read, _NEVER)
         above, _, last = path.rstrip("/").rpartition("/")
         return found and f"{above}/{found.rstrip('/').rpartition('/')[2]}{path[len(above) + 1 + len(last) :]}"

@@ -113,7 +113,7 @@ def _pages_of(reader: Reader) -> Iterator[Paged]:
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield one value of the sort, with its member, and one of a filter that leaves several items."""
+    """Yield one value of the sort with its member, and one of a filter that leaves several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
         ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
@@ -166,7 +166,7 @@ class Reader:
 
     @property
     def until(self) -> float:
-        """The time at which enough of it was read, if it is read from now on, s of the monotonic clock."""
+        """The time at which reading the list ends if it begins now, s of the monotonic clock."""
         share = _SLOW_SHARE if self.listing.operation.label in self.api.slow else 1
         return time.monotonic() + _BUDGETS * self.api.run.effort.budget_s / share
 
@@ -199,7 +199,7 @@ class Reader:
             self.api.send(written(self.listing.operation, one.inputs))
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
-        """Return a request as `read` sends it and the list in its response; None if there is none."""
+        """Return a request as `read` sends it and the list in its response, or None."""
         exchange = self.read(query)
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
@@ -301,7 +301,7 @@ def _elsewhere(value: Any, *, is_least: bool) -> str | None:
 
 
 def _together(listing: Listing, page: Page) -> dict[str, Any]:
-    """Return values of two filters at once of which each leaves an item that the other one does not; else nothing."""
+    """Return values of two filters, each of which excludes an item that the other one leaves; else nothing."""
     items = [members_of(one) for one in page.items]
     for (name, first), (other, second) in combinations(listing.filters.items(), 2):
         for one, two in product(_choices(first, name, page), _choices(second, other, page)):
@@ -460,7 +460,7 @@ class _Parts:
         return None if cursor is None else self._walk(whole, cursor.name, lambda read, _: {} if not read else None)
 
     def _size(self, whole: Page) -> int:
-        """Return how many items a page is asked to have, so that there are about three; 0 where none is allowed."""
+        """Return the page size to request, so that there are about three pages; 0 if no size is allowed."""
         count = self._count(whole)
         sizes = range((count + 2) // 3, count)
         return next((one for one in sizes if fitting(self.reader.listing.limit, one)), 0)
@@ -543,7 +543,7 @@ def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
 
 
 def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:
-    """Yield the texts and numbers below members whose names tell of a next page."""
+    """Yield the texts and numbers in members whose names announce a next page."""
     if isinstance(value, dict) and depth <= _DEPTH:
         for name, one in value.items():
             yield from _following(one, depth + 1, said=said or bool(_NEXT.fullmatch(plain_name(name))))

@@ -52,7 +52,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Look:
-    """One read after a request to something else, or after a refused one.
+    """One read after a request to another thing, or after a refused request.
 
     Attributes:
         kind: what it would show.
@@ -73,7 +73,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Life:
-    """One thing that was created, or one that is always there and was written.
+    """The recorded life of a thing that was created, or that always exists and was written.
 
     Attributes:
         create, read, delete: labels of the operations; an empty one was not sent.
@@ -110,7 +110,7 @@ class State(StrEnum):
 
 @dataclass
 class Thing:
-    """A thing, its life so far, and what is known of it now.
+    """A thing, its life so far, and its current state as far as known.
 
     Attributes:
         path: where it is.
@@ -257,7 +257,7 @@ class Living:
 
     @staticmethod
     def _is_ended(thing: Thing) -> bool:
-        """Return whether a thing has ended by itself, by what was last read of it."""
+        """Return whether a thing has ended by itself, by its last read."""
         now = members(thing.last, _STATES)
         return any(isinstance(one, str) and one.casefold() in _ENDED for one in now.values())
 
@@ -273,7 +273,7 @@ class Living:
     def look(
         self, after: Exchange, operation: str, own: Thing | None = None, said: Mapping[str, Any] | None = None
     ) -> None:
-        """Read the other things after a request to one of them, or to none, and the list; said: see other()."""
+        """Read the list, and the other things after a request to one of them, or to none; said: see other()."""
         if self.is_over:
             return
         created = own.life.created if own else None
@@ -327,7 +327,7 @@ class Living:
             self.note(Kind.SHOWN, operation, listing.exchange, expected, "; ".join(wrong), thing)
 
     def look_at_older(self) -> None:
-        """Look whether the list has what the run created before, and what can be read and is in a listed state."""
+        """Check whether the list has the things created before that can still be read and have a listed state."""
         lister, before, parameters = self.lister, self.listing, self.read.parameter("path")
         if lister is None or before is None or len(parameters) > 1 or chooses(lister) or not self._shown:
             return
@@ -356,7 +356,7 @@ class Living:
         return read_whole(self.writer, self.lister, self.read, path)
 
     def _wrong(self, listing: WholeList) -> list[tuple[Thing, Kind, str, str]]:
-        """Return what is wrong in a list: the thing, what that shows, what was expected, and what was found."""
+        """Return a list's fault: the thing, the exchange that shows it, what was expected, and what was found."""
         found: list[tuple[Thing, Kind, str, str]] = []
         # A list that has never shown a created thing may leave out such things, if it can leave out any.
         leaves_out = self.lister is None or chooses(self.lister) or not all(listing.ids) or len(listing.ids) >= _MANY
@@ -398,7 +398,7 @@ def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[st
 
 
 def _is_other(value: Any, listed: Any) -> bool:
-    """Return whether two scalars differ: not in what a list shortens, nor times, which may be written in two ways."""
+    """Return whether two scalars differ, apart from shortened texts in lists and times in two notations."""
     if isinstance(value, bool) or isinstance(listed, bool) or (is_number(value) and is_number(listed)):
         return bool(value != listed)
     if not (isinstance(value, str) and isinstance(listed, str)):

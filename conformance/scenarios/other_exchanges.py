@@ -87,7 +87,7 @@ class OtherExchanges(Listener):
                     self.things.popitem()
 
     def unanswered(self, request: Unanswered) -> None:
-        """Keep a request whose connection was closed; several clients at once may be refused, and are not told."""
+        """Keep a request whose connection was closed; those of concurrent clients may be refused, and are not kept."""
         if request.kind is NoAnswer.CLOSED:
             self._keep(request, (request.kind,))
 
@@ -166,7 +166,7 @@ def _has_few(schema: object) -> bool:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
-    """Read what was created or deleted once more, and return what other checks have sent and received."""
+    """Read again what was created or deleted, and return what other checks have sent and received."""
     with suppress(NoAnswerError, TimeIsOverError):
         things = dict(islice(other_exchanges.things.items(), _MOST_THINGS))
         sent = _read(api, things)

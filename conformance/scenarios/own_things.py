@@ -130,7 +130,7 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
 
 
 def located(api: RestInterface, read: Operation, made: Exchange) -> str:
-    """Return the path by which a created thing is read, as far as the response says where it is, or nothing."""
+    """Return the path of a created thing, as far as the response tells its location, or an empty text."""
     sent, answer = made.request.url, made.response
     location, targets = answer.header("location"), []
     if location and is_same(joined(sent, location), sent):
@@ -257,7 +257,7 @@ class _Thing:
             self.get()
 
     def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
-        """Write by two clients at the same moment that have the same copy, of which one has to be refused.
+        """Write from two clients at the same moment with the same copy; one of them must be refused.
 
         What they have changed is restored, so that each write after it changes its member, whoever was first.
         """
@@ -289,7 +289,7 @@ class _Thing:
         self.get()
 
     def filled(self) -> None:
-        """Send files to it, or to what is below it and keeps one, and read that: all octets are those of the file."""
+        """Upload files to a thing or to a sub-resource, and read them back: all bytes must be the same."""
         own = self.read.template.rstrip("/")
         operations = {(one.method, one.template): one for one in operations_of(self.api.run.contract)}
         for (method, template), read in operations.items():
@@ -359,7 +359,7 @@ class _Thing:
         return members(self.last, ()) if self.last is not None else {}
 
     def _special(self, change: Operation) -> Iterator[Any]:
-        """Yield bodies with other values for what the device sets itself, with what is left out, null or wrong."""
+        """Yield bodies with other values for members that the device sets, and with missing, null or wrong members."""
         media_type, values = next(iter(change.bodies), ""), self.surveyor.values
         if not is_json(media_type) or self.last is None:
             return
@@ -375,7 +375,7 @@ class _Thing:
             )
 
     def made_alike(self, create: Operation, changes: list[Operation], delete: Operation | None) -> None:
-        """Give it what only one thing may have, from another thing that is created for that."""
+        """Give the thing a value that only one thing may have, taken from a thing that is created for this."""
         unique = self.surveyor.values.unique
         path = created_path(self.surveyor, create, self.read)
         other = _Thing(self.surveyor, self.read, path)
@@ -399,7 +399,7 @@ class _Thing:
             other.sent(delete, None, *other._current())
 
     def _current(self, second: Operation | None = None) -> tuple[tuple[str, str], ...]:
-        """Return If-Match with its entity tag; a weak one matches none (RFC 9110 13.1.1).
+        """Return If-Match with the thing's entity tag; a weak tag never matches (RFC 9110 13.1.1).
 
         Args:
             second: for this operation it is the second of two tags, if the schema of the field allows a list.
@@ -464,7 +464,7 @@ class _Thing:
             time.sleep(_PAUSE_S)
 
     def _bodies(self, change: Operation, now: dict[str, Any]) -> list[Any]:
-        """Return bodies that change one member each, and one at the end that restores them."""
+        """Return bodies that change one member each, and a last one that restores them."""
         writer = Writer(self.api, self.surveyor.values)
         made = writer.bodies(change, 1, now)
         media_type = next(iter(change.bodies), "")
@@ -493,7 +493,7 @@ def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]
 
 
 def _with_texts(create: Operation, body: Any) -> Any:
-    """Return a JSON object with texts beyond ASCII in the place of its texts; None where that is none."""
+    """Return a JSON object with non-ASCII texts in place of its texts, or None."""
     media_type = next(iter(create.bodies), "")
     if not is_json(media_type) or not isinstance(body, dict):
         return None

@@ -25,7 +25,7 @@ _OURS: Final = re.compile(r"(?:roaas |r)\d+")
 
 
 def is_refused(exchange: Exchange, operation: Operation | None = None) -> bool:
-    """Return whether a device says that it has not done what a request asks."""
+    """Return whether a device reports that it has not performed a request."""
     return refuses(exchange.response.status, operation)
 
 
@@ -68,7 +68,7 @@ def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange) ->
 
 
 def refuse_creation(living: Living, create: Operation, turn: int) -> None:
-    """Send creations that should be refused, and look in the list for what each asks for."""
+    """Send creations that should be refused, and look for each in the list."""
     if living.lister is None or living.listing is None or not living.things:
         return
     writer, tried = living.writer, list[Exchange]()

@@ -19,7 +19,7 @@ class NotTested:
 
 @dataclass(frozen=True)
 class NotSeen:
-    """Outcome of a rule: the device's state kept it from showing something; ``reason`` says what."""
+    """Outcome of a rule: the device's state kept it from showing the behaviour; ``reason`` names the behaviour."""
 
     reason: str
 

@@ -1,4 +1,4 @@
-"""Read all there is by GET, HEAD and OPTIONS, and look before and after whether what a client wrote has changed.
+"""Read everything by GET, HEAD and OPTIONS, and check before and after whether a client's values have changed.
 
 Only what clients write counts, and what they create: counters, times and measured values change by themselves, and so
 may states. What has changed counts if it stays as it is for as long without these requests, and changes with them, in
@@ -45,7 +45,7 @@ _SINGLE: Final = 150
 
 @dataclass(frozen=True)
 class Watched:
-    """What safe requests have made of one resource.
+    """The effect of safe requests on one resource.
 
     Attributes:
         operation: label of the operation that reads it.
@@ -111,7 +111,7 @@ class _Watch:
                 self.resources += self._resource(path, read)
 
     def _resource(self, path: str, read: Operation) -> list[_Resource]:
-        """Return a resource to watch: one that is written where it always is, or one that is created."""
+        """Return a resource to watch: one that always exists and is written, or one that is created."""
         writes = [self._operations[name, path] for name in ("PUT", "PATCH") if (name, path) in self._operations]
         writes = [one for one in writes if is_json(next(iter(one.bodies), ""))]
         write = writes[0] if writes else None
@@ -174,7 +174,7 @@ class _Watch:
         return bool(one.was)
 
     def _changed(self, one: _Resource) -> None:
-        """Write other values to what is always there; where it does not read so, it is watched as it is."""
+        """Write other values to a resource that always exists; if it does not show them, watch it as it is."""
         if one.write is None or one.path or one.last is None:
             return
         schema = one.write.bodies[next(iter(one.write.bodies))].schema
@@ -194,7 +194,7 @@ class _Watch:
         return self.writer.send(one.read, one.path)
 
     def _safe(self, methods: Sequence[str]) -> Iterator[Outgoing]:
-        """Yield requests by safe methods: of each operation that reads, of what this run has created where there is."""
+        """Yield safe requests: for each operation that reads, on what this run created if possible."""
         made = {one.read.template.rstrip("/"): one.path for one in self.resources if one.path}
         for (method, template), read in self._operations.items():
             if method != "GET":
@@ -247,7 +247,7 @@ class _Watch:
         return Watched(one.read.label, last, expected)
 
     def _guilty(self, one: _Resource, methods: Sequence[str]) -> Exchange | None:
-        """Return the safe request after which a resource has changed; None if only several together change it."""
+        """Return the safe request after which a resource changed; None if only several together change it."""
         if not self._restored(one):
             return None
         for request in islice(self._safe(methods), _SINGLE):

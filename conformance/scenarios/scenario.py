@@ -14,7 +14,7 @@ class NotPossibleError(Exception):
 
 
 class NoOccasionError(NotPossibleError):
-    """Raised when the device gave no occasion, such as a goal in reach. What other checks judged stays judged."""
+    """Raised when the device gave no opportunity, such as a goal in reach. The verdicts of other checks stay."""
 
 
 class NotSeenError(NotPossibleError):
@@ -22,7 +22,7 @@ class NotSeenError(NotPossibleError):
 
 
 class NotDeclaredError(NotPossibleError):
-    """Raised when the statement does not say what the scenario needs. What no other check judges is not claimed."""
+    """Raised when the statement does not declare what the scenario needs. What no other check judges is not claimed."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class PartialTraceError(Exception):
 
 @contextmanager
 def partial_trace(trace: Callable[[], Any]) -> Iterator[None]:
-    """Raise PartialTraceError with what was recorded so far where the block is aborted."""
+    """Raise PartialTraceError with the record so far if the block is aborted."""
     try:
         yield
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Write to what is always there, such as settings: several values of each member, and read each on two connections."""
+"""Write to resources that always exist, such as settings: several values per member, read on two connections."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _BUDGETS, _TURNS = 2, 3
 
 
 def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) -> list[Life]:
-    """Return what became of the resources that are always there and can be read and written."""
+    """Return the outcomes of resources that always exist and can be read and written."""
     lives = list[Life]()
     for (method, path), read in operations.items():
         write = operations.get(("PUT", path)) or operations.get(("PATCH", path))
@@ -77,7 +77,7 @@ def is_free(write: Operation, path: str) -> bool:
 
 
 def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
-    """Write values of each member one after another, and at the end what was there before."""
+    """Write values of each member one after another, and restore the first values at the end."""
     media_type, before = usual_inputs(write, writer.values)[0].media_type, writer.send(read)
     if not is_json(media_type) or not before.response.ok or before.response.cut:
         return []
@@ -152,7 +152,7 @@ def _body(done: Write) -> dict[str, Any]:
 
 
 def _write(writer: Writer, read: Operation, write: Operation, body: Any, before: Exchange) -> list[Write]:
-    """Write a value; return that with what was read on the connection, and on another one. Nothing if it is refused."""
+    """Write a value; return it with the reads on the same and on another connection; empty if it is refused."""
     sent = writer.conditional(write, read, "", body)
     if not sent.response.ok or sent.response.status == _ACCEPTED:
         return []

@@ -1,4 +1,4 @@
-"""Change what a device tells over SOAP, read it back, be refused in between, and leave it as it was.
+"""Change values over SOAP, read them back, with refused requests in between, and restore them.
 
 What comes of it is judged by the checkers of every exchange (checkers/soap_memory), and by the rules of the survey.
 """
@@ -88,7 +88,7 @@ class _Changes:
         return [(act, declared, node) for act, declared, node in self.acts if act.role is role and declared and node]
 
     def write(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
-        """Write other values again and again, read them, and write what was there."""
+        """Write other values repeatedly, read them, and restore the first ones."""
         readers = [one for one in self.acts if one[0].shows(act)]
         if not readers:
             return
@@ -136,7 +136,7 @@ class _Changes:
         return any(seen)
 
     def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, str]:
-        """Read what a message concerns; return the values that come once, by name."""
+        """Read what a message concerns; return the values that occur once, by name."""
         names = {written.at(path).name.lower(): written.at(path).text for path in written.paths()}
         found: dict[str, str] = {}
         for _ in range(times):
@@ -239,7 +239,7 @@ class _Changes:
         return self.caller.api.client, sent
 
     def vary(self) -> None:
-        """Send what the schema allows beside the usual: values of enumerations, other forms of booleans and of XML."""
+        """Send other values that the schema allows: enumerations, other forms of booleans and of XML."""
         for act, declared, node in self.acts:
             if act.role in {Role.CREATES, Role.REMOVES}:
                 continue
@@ -304,7 +304,7 @@ def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -
 
 
 def _other(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa: FBT001 - one caller
-    """Return another value of a type; the same one where none is known to be valid."""
+    """Return another value of a type, or the same one if no other is surely valid."""
     if simple.enumeration:
         return simple.enumeration[turn % len(simple.enumeration)]
     if simple.builtin == "boolean":

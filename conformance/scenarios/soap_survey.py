@@ -77,7 +77,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class SoapProbe:
-    """One message and what came of it.
+    """One message and its outcome.
 
     Attributes:
         operation: label.
@@ -179,7 +179,7 @@ class Caller:
                     self.current |= {name: texts[0] for name, texts in told.items() if len(texts) == 1}
 
     def known(self, act: Act) -> dict[str, list[str]]:
-        """Return values by name, first those of what the suite created; for what ends or removes a thing no others."""
+        """Return values by name, first those of things that the suite created; for ending operations no others."""
         found: dict[str, list[str]] = {}
         for name, simple in act.sent.items():
             own = [text for key in act.keys(name, simple) for text in self.made.get(key, ())]
@@ -188,7 +188,7 @@ class Caller:
         return found
 
     def renew(self, act: Act) -> bool:
-        """Create anew what an operation needs; return whether there is something new."""
+        """Create the things that an operation needs; return whether there is a new one."""
         needed = {key for name, simple in act.sent.items() for key in act.keys(name, simple)}
         for label, node in list(self.accepted.items()):
             maker = self.acts[label]
@@ -264,7 +264,7 @@ def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
 
 
 def _explore(caller: Caller, act: Act) -> Iterator[None]:
-    """Send the messages of one operation; yield after the usual one and after each group of others."""
+    """Send the messages of one operation; yield after the usual message and after each group of others."""
     try:
         yield from _groups(caller, act)
     except NotPossibleError as error:

@@ -1,4 +1,4 @@
-"""Bodies that show what a write makes of a resource: what is left out, null, one wrong member, and patches."""
+"""Bodies that show the effect of a write: with missing members, null, one wrong member, and patches."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _TIME: Final = "2026-02-{:02}T12:34:56+02:00"
 def special_bodies(
     change: Operation, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[Any]:
-    """Yield bodies for a write, each to be followed by a read; the last one restores what was there.
+    """Yield bodies for writes that are each followed by a read; the last one restores the first values.
 
     Args:
         change: the write.
@@ -144,7 +144,7 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
 def _nulls(
     parts: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[dict[str, Any]]:
-    """Yield merge patches that remove members, each beside another change, and one that changes a part of an object."""
+    """Yield merge patches that remove members beside another change, and one that changes a part of an object."""
     needed, there = flat(read.shape or {}).get("required", ()), now()
     usable = {name: one for name, one in there.items() if name in parts and one is not None and may(name)}
     own = {name for name in usable if is_devices(name, parts[name], frozenset())}
@@ -273,7 +273,7 @@ def _pointer(name: str) -> str:
 
 
 def with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] | None:
-    """Return a body with values for what the schemas mark as the device's; None where they do not allow it."""
+    """Return a body with values for members that the device sets; None if the schemas forbid that."""
     media_type = next(iter(change.bodies), "")
     if not isinstance(body, dict):
         return None
@@ -287,7 +287,7 @@ def with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] 
 
 
 def _own_value(schema: Schema) -> Any:
-    """Return a value that a device hardly gives itself; None for what has few values."""
+    """Return a value that a device hardly chooses itself; None if the schema has few values."""
     given = flat(schema)
     candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
     return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)

@@ -68,7 +68,7 @@ class Walk:
 
 
 class _Walker:
-    """Leads one device.
+    """Leads one device through its states.
 
     Args:
         api: its interface.
@@ -113,7 +113,7 @@ class _Walker:
         return self._tried[name, state] >= (_TRIES if state in self._map.changes else 1)
 
     def _way(self, is_wanted: Callable[[str], bool]) -> str | None:
-        """Return the first operation of the shortest way to a state, "" to wait; None: there is none."""
+        """Return the first operation of the shortest way to a state, "" to wait, or None without a way."""
         seen, left = {self.here}, deque[tuple[str, str | None]]([(self.here, None)])
         while left:
             state, begun_by = left.popleft()

@@ -82,7 +82,7 @@ _GENERATED_SHARE: Final = 0.85
 
 @dataclass(frozen=True)
 class Probe:
-    """One request of the survey and what came of it.
+    """One request of the survey and its outcome.
 
     Attributes:
         operation: method and path template.
@@ -242,7 +242,7 @@ class Surveyor:
         return self.probes[-1]
 
     def _note(self, operation: Operation, kind: Kind, request: Outgoing, exchange: Exchange) -> None:
-        """Remember what a response says for later requests."""
+        """Remember a response's values for later requests."""
         status = exchange.response.status
         if operation.safe and kind in _JUDGED:
             self.api.judged.add(request)
@@ -326,7 +326,7 @@ class Surveyor:
                 return
 
     def _candidates(self, operation: Operation) -> Iterator[Inputs]:
-        """Yield inputs of the usual request, at last with what the device asked for: a condition, or what is new."""
+        """Yield inputs of the usual request, at last with what the device demanded: a condition, or a new thing."""
         tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
         yield from tried
         if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
@@ -471,7 +471,7 @@ class Surveyor:
 
 
 def _is_near(template: str, other: str) -> bool:
-    """Return whether one path is below the other one, or beside it."""
+    """Return whether one path is below the other one, or in the same folder."""
     above = template.rstrip("/").rpartition("/")[0]
     return other.startswith(f"{template}/") or (bool(above) and f"{other}/".startswith(f"{above}/"))
 

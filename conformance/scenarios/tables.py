@@ -78,7 +78,7 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
 def _quoted_texts(
     api: RestInterface, values: Values, operations: Mapping[tuple[str, str], Operation]
 ) -> Iterator[None]:
-    """Let there be things whose texts have quotes, as far as the device takes them and deletes them afterwards."""
+    """Create things with quotes in their texts, if the device accepts and later deletes them."""
     lives = [
         (create, read, delete)
         for (method, path), read in operations.items()

@@ -29,7 +29,7 @@ _ROUND, _FEWEST = 5, 10
 
 @dataclass(frozen=True)
 class WholeList:
-    """What one reading of a list has shown.
+    """The outcome of one reading of a list.
 
     Attributes:
         exchange: the last page.
@@ -89,7 +89,7 @@ def read_whole(
 
 
 def _next(lister: Operation, exchange: Exchange, page: Page, count: int, number: int) -> dict[str, Any] | None:
-    """Return the query of the next page; None if nothing leads to it.
+    """Return the query of the next page, or None.
 
     Args:
         lister: the operation that lists.

@@ -50,7 +50,7 @@ class Write:
 
 @dataclass(frozen=True)
 class Settled:
-    """A read, and what is wrong in it and in those before it, as noun phrases."""
+    """A read, with its faults and those of the reads before it, as noun phrases."""
 
     exchange: Exchange
     wrong: tuple[str, ...]
@@ -136,7 +136,7 @@ class Writer:
         return [another(schema, first, turn, self.values.collections), first, usual.body]
 
     def until(self, read: Callable[[], _Read], holds: Callable[[_Read], bool]) -> _Read:
-        """Return the first read for which something holds, or the last one after a few seconds."""
+        """Return the first read that meets a condition, or the last one after a few seconds."""
         patience = Patience(self.api.client.connection.pace, _SETTLES_S)
         while True:
             found = read()
@@ -145,7 +145,7 @@ class Writer:
             time.sleep(_PAUSE_S)
 
     def settled(self, read: Callable[[], Exchange], wrong: Callable[[Exchange], Sequence[str]]) -> Settled:
-        """Return the first read in which nothing is wrong, or the last one and what was wrong in the last few."""
+        """Return the first read without a fault, or the last one and the faults of the last few."""
         seen: list[Sequence[str]] = []
 
         def holds(exchange: Exchange) -> bool:
@@ -166,7 +166,7 @@ class Writer:
         before: Exchange | None = None,
         fresh: bool = False,
     ) -> Write:
-        """Read a thing until it shows what a request has written; before: a read before that; fresh: anew each time."""
+        """Read a thing until it shows what a request has written; before: an earlier read; fresh: new connections."""
         found = self.settled(
             lambda: self.send(read, path, fresh=fresh),
             lambda exchange: self.differing(operation, read, sent, exchange, before),
@@ -176,7 +176,7 @@ class Writer:
     def differing(
         self, operation: Operation, read: Operation, sent: Exchange, found: Exchange, before: Exchange | None = None
     ) -> tuple[str, ...]:
-        """Return what differs between the content of a request and a response; none if they cannot be compared."""
+        """Return the differences between a request's and a response's content; empty if they cannot be compared."""
         body, media_type = read_json(sent.request.body).value, sent.request.media_type
         if not isinstance(body, dict) or not found.response.ok or media_type not in operation.bodies:
             return ()

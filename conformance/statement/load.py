@@ -1,4 +1,4 @@
-"""What a vendor says of a device's load tests: the limits of a test, the operations to measure, and service levels."""
+"""The statement's tables on load tests: limits of a test, operations to measure, and service levels."""
 
 from typing import Annotated, ClassVar
 

@@ -1,4 +1,4 @@
-"""The calls of a motion map: which operation each names, and what a person may write in place of a template.
+"""The calls of a motion map: the operation that each names, and the short forms that people may write.
 
 A path may have values in place of a description's parameters: `PUT /robots/7/velocity` names
 `PUT /robots/{id}/velocity`, and so does `PUT /robots/{id}/velocity` with `[values] id = [7]`. A `direction` is a member

@@ -75,7 +75,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return min(max(position, self.limits[0] + margin), self.limits[1] - margin)
 
     def apart(self, one: float, other: float) -> float:
-        """Return how far a position is from another one, and by the shorter way for what turns."""
+        """Return the distance of two positions, for angles the shorter way."""
         return math.remainder(one - other, _TURNS[self.unit]) if self.angle else one - other
 
     def moved(self, one: float, other: float) -> float:
@@ -91,7 +91,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return angle * _TURNS[self.unit] / math.tau
 
     def near(self, position: float, other: float) -> float:
-        """Return the position; for what turns, with so many whole turns that it is near another one."""
+        """Return the position, for angles with whole turns added so that it is near another one."""
         return other + self.apart(position, other) if self.angle else position
 
 
@@ -144,7 +144,7 @@ class Goto(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Action(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a move says of itself: a resource of its own that a client reads.
+    """A move's own resource, in which a client reads its state.
 
     Attributes:
         read: the operation, a template.
@@ -250,7 +250,7 @@ class Velocity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What has a few states and no positions between them, such as a gripper.
+    """A device part with a few states and no positions between them, such as a gripper.
 
     Attributes:
         send: the operation.

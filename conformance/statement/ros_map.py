@@ -1,4 +1,4 @@
-"""The ROS map: which operation of a web gateway is which topic, service or action (tables ``[ros]`` of a statement).
+"""The ROS map: which topic, service or action each operation of a web gateway stands for (tables ``[ros]``).
 
 Operations are written as in ``--call``: "METHOD PATH", the path as the description has it, or "POST /PORT/OPERATION" of
 a WSDL. Positions in bodies are JSON pointers (RFC 6901); in XML they go by local names. Message types are written as
@@ -124,7 +124,7 @@ class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a goal says of itself.
+    """How a goal's state is read.
 
     Attributes:
         read: the operation, a template: "{id}" is the goal's id.

@@ -1,4 +1,4 @@
-"""The state map: which operation a device takes in which of its states, and where it leads (tables ``[states]``)."""
+"""The state map: in which states a device accepts an operation, and which state follows (tables ``[states]``)."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return (self.read, *self.operations)
 
     def following(self, state: str) -> frozenset[str]:
-        """Return a state and those that it may become by itself, one after another."""
+        """Return a state and those that it may change to by itself, in order."""
         found, left = {state}, [state]
         while left:
             change = self.changes.get(left.pop())

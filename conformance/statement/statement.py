@@ -1,4 +1,4 @@
-"""The implementation conformance statement: what a vendor declares about a device, and what it is judged by."""
+"""The implementation conformance statement: the vendor's declarations on a device, by which it is judged."""
 
 import tomllib
 from pathlib import Path
@@ -22,7 +22,7 @@ class StatementError(TomlFileError):
 
 
 class Calls(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What may be called of an API of which only its description is known.
+    """The calls that are allowed to an API of which only its description is known.
 
     Attributes:
         allow: patterns of operations that may be called although they are not safe.
@@ -54,7 +54,7 @@ class Api(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Statement(msgspec.Struct, frozen=True):
-    """What a vendor declares about a device. A pack whose device has more to declare extends it.
+    """A vendor's declarations on a device. A pack whose device needs more tables extends it.
 
     Attributes:
         robot: name, vendor, version.
@@ -138,7 +138,7 @@ class _Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
 
 
 class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the vendor claims; without claims, each class is judged whose interfaces have an address.
+    """The vendor's claims; without any, each class is judged whose interfaces have an address.
 
     Attributes:
         profile: a profile of the contract, such as ``full``: all of its classes.
@@ -149,7 +149,7 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     classes: tuple[str, ...] | None = None
 
     def named(self, contract: Contract, path: Path) -> tuple[str, ...] | None:
-        """Return the classes that are claimed by profile or name, or None if none are.
+        """Return the classes that are claimed by profile or name, or None.
 
         Raises:
             StatementError: the contract has no such profile or class.
@@ -253,7 +253,7 @@ def load_statement(path: Path, contract: Contract) -> Statement:
 
 
 class _Addresses(msgspec.Struct, frozen=True):
-    """The tables of a statement that say which contract the rest is read by."""
+    """The tables of a statement that decide by which contract the rest is read."""
 
     api: Api = Api()
     endpoints: Endpoints = Endpoints()

@@ -1,4 +1,4 @@
-"""Make the settings of a connection from a statement: deadline, TLS, credentials, and a login where there is one."""
+"""Make connection settings from a statement: deadline, TLS, credentials, and a login if there is one."""
 
 import re
 import ssl
@@ -63,7 +63,7 @@ def connection_of(where: Endpoints) -> Connection:
 
 
 def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
-    """Return endpoints whose API key goes where the description wants one, unless they say where.
+    """Return endpoints whose API key goes where the description says, unless the user says where.
 
     Args:
         where: the endpoints.

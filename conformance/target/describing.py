@@ -200,7 +200,7 @@ def described_contract(
 
 
 def _without_cases(document: Schema) -> tuple[str, ...]:
-    """Return a remark on the operations that are too large for a generator; empty if there are none."""
+    """Return a remark on operations that are too large for generated requests, or an empty text."""
     paths = ((path, item) for path, item in document["paths"].items() if isinstance(item, dict))
     every = ((method, path, operation) for path, item in paths for method, operation in methods_of(item).items())
     large = [f"{method} {path}" for method, path, operation in every if unrolls(document, operation)]

@@ -43,7 +43,7 @@ _BY_MAP: Final = "--ros and --ros-play judge a gateway by its ROS map: give"
 
 @dataclass(frozen=True)
 class DeviceOptions:
-    """What a command says of a device; it overrides the statement.
+    """A command's options on a device, which override the statement.
 
     Attributes:
         endpoints: the given fields of Endpoints, by name.
@@ -79,7 +79,7 @@ class DeviceOptions:
 
     @classmethod
     def of(cls, options: Mapping[str, Any], **own: Any) -> Self:
-        """Return what the options of a command say, by their names in Python; ``own`` overrides them."""
+        """Return the options of a command by their names in Python; ``own`` overrides them."""
         given = {name: value for name, value in {**options, **own}.items() if value is not None and value != ()}
         where = {name: given[name] for name in Endpoints.__struct_fields__ if name in given}
         known = {one.name for one in fields(cls)} - {"endpoints"}
@@ -91,7 +91,7 @@ class DeviceOptions:
 
 
 class Judged(NamedTuple):
-    """What a device is judged by, and what the reader of the result should know of that."""
+    """The statement and contract by which a device is judged, with remarks for the reader of the result."""
 
     statement: Statement
     contract: Contract
@@ -143,7 +143,7 @@ def split_args(targets: tuple[str, ...], openapi: str | None, *, new: bool = Fal
 
 
 def _no_file(target: str) -> str:
-    """Return what to tell of an argument that is neither a URL nor a file."""
+    """Return the error text for an argument that is neither a URL nor a file."""
     scheme, found, _ = target.partition("://")
     if found:
         return f"{target}: {scheme}:// is not read; give the address as http:// or https://"

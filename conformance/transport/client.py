@@ -137,7 +137,7 @@ class Connection:
         return self.trust is None or self.trust.trusts(url)
 
     def unheard(self, **changes: Any) -> "Connection":
-        """Return a copy, with some settings changed, of which no listener is told."""
+        """Return a copy without listeners, with some settings changed."""
         return replace(self, **{"listeners": [], "heard": Heard.NEVER, **changes})
 
     def take_slot(self, *requests: tuple[str, str]) -> None:
@@ -163,7 +163,7 @@ class Connection:
         self.before_sending(*requests)
 
     def log_in_again(self) -> None:
-        """Get new credentials from the login, if there is one; raises what the login raises."""
+        """Get new credentials from the login, if there is one; raise the login's errors."""
         if self.log_in is not None:
             self.credentials = Credentials((*self.credentials.items[:-1], self.log_in()))
 

@@ -359,7 +359,7 @@ class ClientCertificate(NamedTuple):
     passphrase_file: str | None = None
 
     def load_into(self, context: ssl.SSLContext) -> None:
-        """Give a context the certificate with its key. Nobody is asked for a passphrase.
+        """Load the certificate and its key into a context, without asking for a passphrase.
 
         Raises:
             CertificateError: a file cannot be read or holds neither, or the passphrase is missing or wrong.

@@ -31,7 +31,7 @@ class DigestUser(HTTPDigestAuth):
         self.init_per_thread_state()
 
     def learn(self, headers: Iterable[tuple[str, str]]) -> bool:
-        """Take the challenge of a 401 response; return whether there is one that can be answered."""
+        """Take the challenge of a 401 response; return whether it can be answered."""
         offers = [value for name, value in headers if name.lower() == "www-authenticate"]
         for offer in offers:
             at = offer.lower().find(_SCHEME)

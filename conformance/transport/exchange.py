@@ -240,7 +240,7 @@ class Unanswered:
 
 
 class Sending(NamedTuple):
-    """A request that was sent, and why it got no response; None: it got one."""
+    """A request that was sent, and why it got no response, or None."""
 
     request: Request
     kind: NoAnswer | None

@@ -129,7 +129,7 @@ class Fetcher:
         problem: str = "",
         octets: bytes = b"",
     ) -> None:
-        """Record the responses on the way to a document, with its content as unpacked, or why there was none."""
+        """Record the responses on the way to a document, with its unpacked content, or why there was none."""
         ended = time.monotonic()
         link = 0, 0, 1, began, 0.0, ended, self._connection.timeout_s
         for one in came:
@@ -141,7 +141,7 @@ class Fetcher:
             self._connection.recorder.record(Passage(request, *link, None, problem, heard=Heard.NEVER))
 
     def _hint(self, url: str, status: int) -> str:
-        """Return what a status says of the way to the device, or which option sends the credentials asked for."""
+        """Return what a status suggests about the way to the device, or the option for the demanded credentials."""
         if status in {httpx.codes.BAD_GATEWAY, httpx.codes.SERVICE_UNAVAILABLE, httpx.codes.GATEWAY_TIMEOUT}:
             return ": a proxy answers, and the device behind it does not"
         if status not in {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}:

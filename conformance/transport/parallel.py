@@ -72,7 +72,7 @@ def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
 
 @contextmanager
 def meanwhile(to: HttpClient, request: Outgoing, timeout_s: float) -> Iterator["Future[tuple[Attempt, float]]"]:
-    """Send a request from a client of its own while the block runs; yield what comes and when (time.monotonic, s).
+    """Send a request from a client of its own while the block runs; yield its outcome and time (time.monotonic, s).
 
     It is awaited at the end of the block. No listener gets it, as its time is the point.
 
@@ -88,7 +88,7 @@ def meanwhile(to: HttpClient, request: Outgoing, timeout_s: float) -> Iterator["
 
 
 def crowd(to: HttpClient, requests: Sequence[Sequence[Outgoing]], timeout_s: float) -> list[list[Attempt]]:
-    """Send the requests of many clients at the same time, those of each client one after another.
+    """Send the requests of many clients at the same time; each client sends its own in a row.
 
     No listener gets them, as a device need not serve so many.
 

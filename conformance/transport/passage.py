@@ -1,4 +1,4 @@
-"""What a run records as it happens: each request that passes over a connection, and what an eye sees beside it.
+"""Base of what records a run as it happens: each request over a connection, and observations beside it.
 
 Every client calls the recorder of its connection settings, which copies of these settings share: those of concurrent
 clients, of the stop at the end, and of raw sockets. So nothing that is sent is hidden from the history.
@@ -12,7 +12,7 @@ from conformance.transport.exchange import NoAnswer, Request, Response
 
 
 class Heard(StrEnum):
-    """Whether what comes back is judged by the rules for every response."""
+    """Whether the checkers judge a response."""
 
     ALWAYS = "always"
     #: Several clients ask at once: that the device has too much to do is no fault.
@@ -23,7 +23,7 @@ class Heard(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One attempt to send a request over a connection, and what came back.
+    """One attempt to send a request over a connection, with its outcome.
 
     Attributes:
         request: the request, with variables in place of credentials.
@@ -65,7 +65,7 @@ class EyeState(StrEnum):
 
 
 class Recorder:
-    """Base class of what records a run. Does nothing. Any thread may call its methods, which return at once."""
+    """Base class of recorders of a run. Does nothing. Any thread may call its methods, which return at once."""
 
     def record(self, passage: Passage) -> int:  # noqa: ARG002 - for those that record
         """Record an attempt to send a request; return its number in the run, from 1."""

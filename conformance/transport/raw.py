@@ -269,7 +269,7 @@ def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) 
 
 
 def _parsed(octets: bytes, method: str, *, closed: bool, elapsed_ms: float) -> tuple[Response | None, bytes]:
-    """Return the first response in a byte stream, None for an interim one, and the bytes after it; see parse()."""
+    """Return the first response in a byte stream, None if it is interim, and the bytes after it; see parse()."""
     section, separator, _ = octets.partition(b"\r\n\r\n")
     if not separator:
         raise FramingError(f"no end of the header section in {octets[:60]!r} (RFC 9112 2.1)")

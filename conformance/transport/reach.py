@@ -33,7 +33,7 @@ class UnreachableError(Exception):
 
 
 class Origin(NamedTuple):
-    """Scheme, host and port in the one form in which they are compared (RFC 6454 4)."""
+    """Scheme, host and port in the normal form for comparison (RFC 6454 4)."""
 
     scheme: str
     host: str
@@ -53,7 +53,7 @@ class Origin(NamedTuple):
 
 
 def host_of(name: str) -> str:
-    """Return a host's name or address in the one form in which it is compared.
+    """Return a host's name or address in the normal form for comparison.
 
     Raises:
         ValueError: it is none.
@@ -153,7 +153,7 @@ def is_same(one: str, other: str) -> bool:
 
 
 def joined(base: str, reference: str) -> str:
-    """Return a reference as a URL; one that is none, as it is."""
+    """Return a reference as a URL; a text that is no reference unchanged."""
     try:
         return urljoin(base, reference)
     except ValueError:
@@ -161,7 +161,7 @@ def joined(base: str, reference: str) -> str:
 
 
 def path_of(url: str) -> str:
-    """Return the path of a URL; an empty text for what is none."""
+    """Return the path of a URL; an empty text if it is no URL."""
     try:
         return urlsplit(url).path
     except ValueError:

@@ -80,7 +80,7 @@ def shell_command(method: str, url: str, headers: Sequence[tuple[str, str]], bod
 
 
 def bytes_command(url: str, octets: bytes) -> str:
-    """Return a command that writes bytes to a socket and prints what comes back."""
+    """Return a command that writes bytes to a socket and prints the response."""
     where = urlsplit(url)
     secure = where.scheme == "https"
     host, port = where.hostname or "", where.port or (443 if secure else 80)
@@ -103,7 +103,7 @@ def _curl_can(method: str, url: str, headers: Sequence[tuple[str, str]], body: b
 
 
 def _given(body: bytes) -> tuple[str, str]:
-    """Return what curl's input is piped from, or nothing, and what ``--data-binary`` says."""
+    """Return the command whose output is piped to curl, or an empty text, and the value of ``--data-binary``."""
     if _is_plain(body):
         text = body.decode()
         if not {"\n", "\t"} & set(text):

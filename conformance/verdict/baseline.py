@@ -101,13 +101,13 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
 
 
 def stale_entries(verdicts: Iterable[Verdict], baseline: Iterable[Expectation]) -> tuple[str, ...]:
-    """Return the ids of entries that say of a requirement which passes that it always fails."""
+    """Return the ids of baseline entries whose requirement passes although they say that it always fails."""
     passed = {verdict.requirement.id for verdict in verdicts if verdict.value is Value.PASS}
     return tuple(entry.requirement for entry in baseline if entry.requirement in passed and not entry.intermittent)
 
 
 def baseline_text(failed: Iterable[Requirement], old: Iterable[Expectation], today: dt.date) -> str:
-    """Return a baseline file of what fails now; what an older baseline says of it is kept.
+    """Return a baseline file of the present failures; an older baseline's reasons and dates are kept.
 
     Args:
         failed: the requirements that fail.
@@ -128,7 +128,7 @@ def baseline_text(failed: Iterable[Requirement], old: Iterable[Expectation], tod
 
 
 def accepted_until(verdicts: Iterable[Verdict]) -> str:
-    """Return the last day on which all failures accepted by the baseline still are; empty if it accepts none."""
+    """Return the last day on which the baseline accepts all failures; empty if it accepts none."""
     return min((verdict.expected_failure[1] for verdict in verdicts if verdict.expected_failure), default="")
 
 

@@ -42,7 +42,7 @@ class Speed:
 
     @property
     def remark(self) -> str:
-        """What a report says about omitted cases; empty if none were omitted."""
+        """The report's remark on omitted cases; empty if none were omitted."""
         if self.share == 1:
             return ""
         return (
@@ -84,7 +84,7 @@ class Tally:
 
     @property
     def share(self) -> float:
-        """The share of the planned cases for which there was time, 0 to 1."""
+        """The share of planned cases for which time sufficed, 0 to 1."""
         cut = sum(self.cut_short.values())
         return 1 - cut / max(self.planned, cut, 1)
 
@@ -163,7 +163,7 @@ class Effort:
         return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
 
     def draw_first(self, items: Sequence[_Item], others: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
-        """Return what draw() returns of the items; where that are fewer, some of others too."""
+        """Return what draw() returns of the items, filled up with some of the others if these are fewer."""
         chosen = self.draw(items, standard, seed)
         left = self.cases(standard) - len(chosen)
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret

@@ -198,7 +198,7 @@ class Judge:
         self._sent.clear()
 
     def sent(self, attempt: Attempt) -> None:
-        """Record that the check sent a request, and what became of it."""
+        """Record that the check sent a request, and its outcome."""
         self._sent.append(Sent(time.monotonic(), attempt.request))
         after = isinstance(self._newest, Exchange) and self._newest.response.status >= _REFUSED
         self._newest, self._occasions = attempt, (occasion_of(attempt), *(("after a refusal",) if after else ()))
@@ -275,7 +275,7 @@ class Judge:
         return holds
 
     def silent(self, attempt: Attempt | None) -> None:
-        """Record a missing response for the requirement that is about it: by_cause() then tells it by that one.
+        """Record a missing response for the requirement about missing responses, to which by_cause() then assigns it.
 
         A raw request tests a rule of its own.
         """
@@ -388,7 +388,7 @@ class Judge:
         self._say(requirement, reason, lambda evidence: evidence.errors)
 
     def fault(self, what: str, error: Exception, ids: Iterable[str] = ()) -> None:
-        """Record an error of the suite that kept it from judging something, such as one operation."""
+        """Record an error of the suite that kept something from being judged, such as one operation."""
         said = (str(error).splitlines() or [""])[0][:_FAULT]
         name = "" if isinstance(error, PatternError) else f"{type(error).__name__}: "
         met, concerned = self._faults.setdefault(f"{name}{said}", ({}, set()))
@@ -477,7 +477,7 @@ def _occasion(method: str, media_type: str) -> str:
 
 
 def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
-    """Return what two failures without a word of their check have in common if they have one cause.
+    """Return what two failures of the same cause have in common, if the check named no cause.
 
     A server error is known by its method and what its response says: one fault behind many paths is one finding.
     """
@@ -513,13 +513,13 @@ class CheckerListener(Listener):
         self._check(request)
 
     def acted_by_hand(self, *, deletes: bool) -> None:
-        """Tell the checkers that know what was written before."""
+        """Tell a raw request to the checkers that remember earlier writes."""
         for checker in self._checkers:
             if (forget := getattr(checker, "forget", None)) is not None:
                 forget(deletes=deletes)
 
     def _check(self, attempt: Attempt) -> None:
-        """Call each checker; what one cannot judge is no reason not to judge the rest of the run."""
+        """Call each checker; an error in one must not end judging."""
         with self._judge.by_rule() if self._by_rule else nullcontext():
             for checker in self._checkers:
                 try:

@@ -1,4 +1,4 @@
-"""Findings, and their text: what the suite did, what it expected by which rule, and what it got."""
+"""Findings and their text: what the suite did, what it expected by which rule, and what it got."""
 
 import re
 from collections.abc import Sequence
@@ -181,7 +181,7 @@ def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
 
 
 def likeness(exchange: Exchange) -> str:
-    """Return what the responses of one fault have in common: status, media type, text without numbers and path."""
+    """Return what responses of one fault have in common: status, media type, text without numbers and path."""
     response, path = exchange.response, exchange.request.target.partition("?")[0]
     said = response.body[:_SHOWN_BODY].decode("latin-1")
     said = said.replace(path, "#") if len(path) > 1 else said

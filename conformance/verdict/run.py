@@ -1,4 +1,4 @@
-"""The data of one run: the statement, what is judged and allowed, and the evidence so far."""
+"""The data of one run: statement, contract, permissions, and the evidence so far."""
 
 import hashlib
 from collections.abc import Callable
@@ -161,7 +161,7 @@ class Run:
 
     @property
     def beside(self) -> frozenset[str]:
-        """The judged classes that decide no verdict: those beside a description which no claim names."""
+        """The classes that are judged and decide no verdict: those beside a description that no claim names."""
         named = self.statement.claims or ()
         classes = self.contract.classes
         return frozenset(name for name in self.claims if classes[name].beside and name not in named)

@@ -1,4 +1,4 @@
-"""The time that a run may take (``--minutes``), what is sent within it, and what was left out when it was over."""
+"""The time limit of a run (``--minutes``): what is sent within it, and what was left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several people at one device: each reads its state, one of them drives it and stops it by the motion map.
+"""Several operators at one device: all read its state, and one drives it and stops it by the motion map.
 
 What they feel is how late a stop takes effect while the others read. One person alone and all of them take turns, so
 that what else goes on on the machine meets both alike.
@@ -48,7 +48,7 @@ _STILL: Final = 0.1  # of the tolerance: so far from its last position a device 
 
 @dataclass
 class Stops:
-    """What became of the stops beside a number of operators.
+    """The outcomes of the stops beside a number of operators.
 
     Attributes:
         answer_s, rest_s: from the request until its response, and until the device rested.

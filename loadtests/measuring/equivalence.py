@@ -18,7 +18,7 @@ _ODOMETRY = ("frame_id", "child_frame_id", "x", "y", "z", "w", "covariance", "se
 
 
 def request_difference(operation: str, rest: Request, soap: Request) -> str | None:
-    """Return how two requests, read back from their bytes, differ; None where they ask for the same.
+    """Return how two requests, read back from their bytes, differ; None if they are equivalent.
 
     Doubles are compared bit for bit, each read back from its own text.
     """

@@ -41,7 +41,7 @@ _POLLS = 20.0
 
 @dataclass
 class Heard:
-    """What came over one stream, or by polling one operation.
+    """What arrived over one stream, or by polling one operation.
 
     Attributes:
         kind: `sse`, `websocket`, `rosbridge` or `polling`.

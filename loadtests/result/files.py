@@ -62,7 +62,7 @@ def with_operators(result: CommandResult, found: dict[str, Any], code: int) -> C
 
 
 def stops_lines(file: Path | None) -> list[str]:
-    """Return what latency.json says of stops beside other operators, a line for each number of them."""
+    """Return lines on the stops in latency.json, one for each number of operators beside them."""
     found = None if file is None else json.loads(file.read_text(encoding="utf-8")).get("operators")
     if found is None:
         return []
@@ -96,7 +96,7 @@ _PATTERN = "20*.json"
 
 
 class BaselineError(ValueError):
-    """A baseline that cannot be used; the message says what to do."""
+    """Raised for an unusable baseline; the message says what to do."""
 
 
 def folder_of(baselines: Path, name: str) -> Path:

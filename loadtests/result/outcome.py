@@ -33,7 +33,7 @@ class Carried:
 
 @dataclass
 class Outcome:
-    """What became of a run so far.
+    """The outcome of a run so far.
 
     Attributes:
         robots: the one under load, and the one that it is compared with, if any.

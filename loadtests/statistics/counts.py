@@ -1,4 +1,4 @@
-"""What became of the requests: one count, which the terminal, the page and all judgements share."""
+"""The outcomes of the requests: one count, which the terminal, the page and all judgements share."""
 
 from collections import Counter
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Say that a robot got more requests than it answers: what it answered, and what waited; or that it is dead.
+"""Report that a robot got more requests than it answers: what it answered, what waited, or that it is dead.
 
 Two things can be at their end, the robot or the generator. The generator is where it used up its processor, or saw
 late that a request was due; then the run is not valid (`verdict.invalid_because`). Otherwise requests that wait for a

@@ -107,7 +107,7 @@ FailureKey = tuple[int, int, str]
 
 
 class Recorder:
-    """What happened so far.
+    """The records of a run so far.
 
     Args:
         series_of: the series number of each segment (`Plan.series_of`); spans and errors are kept by series.

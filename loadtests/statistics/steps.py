@@ -1,4 +1,4 @@
-"""One rate for a few seconds, and whether the robot met the criterion: what searches for the knee are made of."""
+"""One rate for a few seconds, and whether the robot met the criterion: a step of the search for the knee."""
 
 import math
 from dataclasses import dataclass

@@ -97,7 +97,7 @@ class Outcome:
         return frozenset(id_ for id_, verdict in self.verdicts.items() if verdict == "fail")
 
     def not_passed(self) -> tuple[str, ...]:
-        """Return the requirements that failed or warned, and those whose checks met another requirement's failure."""
+        """Return the requirements that failed or warned, and those blocked by another requirement's failure."""
         return tuple(id_ for id_, verdict in self.verdicts.items() if verdict in {"fail", "warn"} or id_ in self.met)
 
 

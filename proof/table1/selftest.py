@@ -1,4 +1,4 @@
-"""What the self-test needs of this pack: its good robots, its mutants, and what only the contract knows of both."""
+"""The self-test of this pack: its good robots, its mutants, and what only the contract knows of both."""
 
 import contextlib
 import sys
@@ -147,7 +147,7 @@ def _extended(request: Request, forward: Forward) -> Response:
 
 
 class _FullQueue:
-    """Put every twentieth delivery off for a second, over either interface, and take it when it comes again."""
+    """Defer every twentieth delivery for a second, over either interface, and accept it when it is repeated."""
 
     def __init__(self) -> None:
         self._answers = cycle([None] * 19 + [503] + [None] * 19 + [429])

@@ -1,4 +1,4 @@
-"""Remember by which values a run has named what it may have moved: a stop of one drive has to name each of them."""
+"""Remember the values by which a run named what it may have moved: a stop of one drive must name each of them."""
 
 import re
 from collections import defaultdict
@@ -135,7 +135,7 @@ def _path_names(template: str) -> list[tuple[str, str]]:
 
 
 def _places(stop: Operation) -> Iterator[tuple[tuple[str, ...], Any, tuple[str, str]]]:
-    """Yield the names, the schema and the place of each value by which a stop says what it stops."""
+    """Yield name, schema and place of each value by which a stop names what it stops."""
     before = dict(_path_names(stop.template))
     for item in stop.parameters:
         if item.where == "path" or (item.where == "query" and item.required):

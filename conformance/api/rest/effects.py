@@ -45,7 +45,7 @@ def settles_at(api: RestInterface, call: Call) -> str | None:
 
 
 def differs_from(api: RestInterface, call: Call) -> str | None:
-    """Return what GET returns instead of the value of a PUT; empty: that value; None: they cannot be compared."""
+    """Return the value that GET returned if the PUT's differs; empty if equal; None if they cannot be compared."""
     read = reader_of(api, call)
     if read is None or not isinstance(call.value, dict):
         return None

@@ -195,7 +195,7 @@ _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 
 
 def are_data(formats: Sequence[str]) -> bool:
-    """Return whether one value can be written in several of these formats; others may be there for other values."""
+    """Return whether several of these formats hold data, so that one value can be written in each of them."""
     return sum(bool(_DATA.search(name)) for name in formats) > 1
 
 
@@ -234,6 +234,6 @@ def _weight(parameters: list[str]) -> float:
 
 
 def accept_of(headers: tuple[tuple[str, str], ...]) -> str | None:
-    """Return the Accept header of a request, several lines joined; None without one."""
+    """Return the request's Accept header, its lines joined, or None."""
     values = [value for name, value in headers if name.lower() == "accept"]
     return ", ".join(values) if values else None

@@ -44,7 +44,7 @@ class Guard:
         self._began, self._spent_s = time.monotonic(), 0.0
 
     def before_sending(self, *requests: tuple[str, str]) -> None:
-        """Tell how the device is stopped now: before a request that acts, and before the next one after it.
+        """Send the guard process the present stops: before a request that moves the device, and before the next one.
 
         What the device has responded to a move may be a part of its stop, and so may what is moved.
         """
@@ -75,7 +75,7 @@ class Guard:
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> int | None:
-        """Start the process; return the descriptor that other processes which move the device inherit, or None."""
+        """Start the process; return the descriptor for other processes that move the device to inherit, or None."""
         if self._api.driven is not None:
             self._api.driven.moves += 1  # by the processes
         self._before_sending(acts=True)
@@ -103,7 +103,7 @@ class Guard:
         return drafts
 
     def _tell(self, stops: list[dict[str, Any]]) -> None:
-        """Write the stops to the process, which is started if there is none; a run without it goes on."""
+        """Write the stops to the process, and start it if needed; if that fails, the run goes on without it."""
         message = {
             "stops": stops,
             "login": self._renewal(),
@@ -126,7 +126,7 @@ class Guard:
             self._told = []
 
     def _renewal(self) -> dict[str, Any] | None:
-        """Return how the process gets a new token if the device refuses that of the stops; None: there is no login."""
+        """Return how the process gets a new token if the device refuses the stops' token; None without a login."""
         connection, auth = self._api.client.connection, self._api.run.statement.endpoints.auth
         if connection.log_in is None or auth is None:
             return None
@@ -140,7 +140,7 @@ class Guard:
 
 
 def tell(process: subprocess.Popen[bytes] | None, line: bytes) -> bool:
-    """Write a line to a process; return whether it took it. One that does not read is ended, and nobody waits for it.
+    """Write a line to a process; return whether it took the line. A process that does not read is ended.
 
     Raises:
         OSError: the process has ended.

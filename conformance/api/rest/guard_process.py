@@ -44,7 +44,7 @@ _UNAUTHORIZED = 401
 
 @contextlib.contextmanager
 def _sent(request: dict[str, Any], contexts: Contexts, deadline_s: float) -> Iterator[socket.socket]:
-    """Send one request over a new connection, from which its response is read."""
+    """Send one request over a new connection, and return the response."""
     with socket.create_connection((request["host"], request["port"]), deadline_s) as link:
         tls = contexts.get(request["tls"])
         sent = link if tls is None else tls.wrap_socket(link, server_hostname=request["host"])
@@ -81,7 +81,7 @@ def _response(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> tu
 
 
 def _answer(stop: dict[str, Any], head: str) -> bool:
-    """Put the answer to a challenge of digest authentication into a stop; return whether there is one."""
+    """Answer a challenge of digest authentication in a stop's headers; return whether there was one."""
     pair, sys.path[:] = stop["digest"]
     import re  # noqa: PLC0415 - they are seldom needed, and take longer than everything else here
 
@@ -99,7 +99,7 @@ def _answer(stop: dict[str, Any], head: str) -> bool:
 
 
 def _log_in(told: dict[str, Any], contexts: Contexts) -> None:
-    """Log in, and put the new token into the stops in the place of the old one; without one they stay as they are."""
+    """Log in, and replace the token in the stops; if the login gives none, leave the stops as they are."""
     import http.client  # noqa: PLC0415 - it is seldom needed, and takes longer than everything else here
     from urllib.parse import quote  # noqa: PLC0415
 

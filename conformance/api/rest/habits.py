@@ -12,7 +12,7 @@ _SLOW_MS = 1000.0
 
 
 class Habits:
-    """A checker that learns the device's server, what it answers slowly, and which values it refuses.
+    """A checker that learns the device's server field, its slow operations, and the values that it refuses.
 
     Args:
         api: the robot's REST interface.

@@ -27,7 +27,7 @@ _COMMON: Final = frozenset({_OTHER_TYPE, _NOT_ASCII})
 
 
 def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
-    """Yield requests that the description forbids: each breaks one rule of it, clearly also as it is written."""
+    """Yield requests that the description forbids: each breaks one rule of it, in any reading of what is sent."""
     yield from _invalid_parameters(operation, usual)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
         found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))
@@ -85,7 +85,7 @@ def _beside(operation: Operation, inputs: Inputs) -> Iterator[tuple[str, Inputs]
 
 
 def _invalid_parts(usual: Inputs, value: Any, schema: Schema, steps: Steps) -> Iterator[Variation]:
-    """Yield bodies in which one member or item within ``value`` is missing or wrong; optional ones are put in."""
+    """Yield bodies in which one member or item within ``value`` is missing or wrong; optional ones are added first."""
     if isinstance(value, dict):
         yield from _invalid_members(usual, value, schema, steps)
     items = flat(schema).get("items")
@@ -96,7 +96,7 @@ def _invalid_parts(usual: Inputs, value: Any, schema: Schema, steps: Steps) -> I
 
 
 def _invalid_part(usual: Inputs, value: Any, schema: Schema, here: Steps) -> Iterator[Variation]:
-    """Yield bodies with a forbidden value in one place, and with one within the value there."""
+    """Yield bodies with a forbidden value in one place, then with one inside the value in that place."""
     place = place_of(here)
     for wrong, why in _invalid_values(schema):
         body = with_member(usual.body, here, wrong)

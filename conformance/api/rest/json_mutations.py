@@ -108,7 +108,7 @@ def with_options(value: Any, schema: Schema) -> Iterator[tuple[Any, Place]]:
 
 
 def _with_known(value: Any, known: dict[str, str]) -> Any:
-    """Return a value with the example's texts for members of the same name, such as a frame that the robot knows."""
+    """Return a value whose texts are those of the example's members of the same name, such as a known frame."""
     if not isinstance(value, dict):
         return value
     return {

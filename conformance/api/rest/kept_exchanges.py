@@ -1,4 +1,4 @@
-"""Successful exchanges of a run, to compare with what the robot's own description says of them."""
+"""Keep successful exchanges of a run, to compare them with the robot's own description."""
 
 from dataclasses import replace
 from typing import Final
@@ -53,7 +53,7 @@ class KeptExchanges(Listener):
 
 
 def contradiction(api: RestInterface, theirs: Described, context: RequestContext, exchange: Exchange) -> str:
-    """Return what a robot's description says otherwise of a successful exchange, or an empty text.
+    """Return how a successful exchange contradicts the robot's description, or an empty text.
 
     Args:
         api: the robot's REST interface.

@@ -23,7 +23,7 @@ _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 
 
 class LeftBehind:
-    """Follows the exchanges of a run, in their order, and keeps those whose effect lasts.
+    """Follows the exchanges of a run, and keeps those that changed something for good.
 
     Args:
         operations: of the description.
@@ -70,7 +70,7 @@ class LeftBehind:
             self._read[path] = exchange.response.body
 
     def made(self, operation: Operation, path: str, exchange: Exchange) -> str:
-        """Return the path of what a request created; empty if it created nothing that has one."""
+        """Return the path of what a request created; empty if it created nothing with a path."""
         answer = exchange.response
         location = answer.header("location") or ""
         if operation.method == "PUT":

@@ -1,4 +1,4 @@
-"""Lists: what the query parameters of an operation do to its list, by their names, and what a response shows of one."""
+"""Lists: which query parameters of an operation limit, filter, sort and page its list, and what a response shows."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Listing:
 
     @cached_property
     def says(self) -> dict[str, str]:
-        """What the description says of the members around the list, by name."""
+        """Return the description's texts on the members around the list, by name."""
         parts = flat(self.operation.shape or {}).get("properties", {})
         found = {name: flat(one).get("description") for name, one in parts.items() if isinstance(one, dict)}
         return {name: text for name, text in found.items() if isinstance(text, str)}
@@ -144,7 +144,7 @@ class Listing:
         return Sorting(plain_name(suffix[1]), suffix[2].lower() == "desc")
 
     def sent(self, target: str) -> dict[str, str] | None:
-        """Return the texts of a target's query by name; None where one is there twice, invalid, or not declared."""
+        """Return the query's texts by name; None if a parameter occurs twice, is invalid, or is not declared."""
         declared = {one.name: one for one in self.operation.parameter("query")}
         try:
             pairs = [(name, text) for name, text in pairs_of(target.partition("?")[2])]
@@ -157,7 +157,7 @@ class Listing:
         return texts if valid else None
 
     def most(self, sent: Mapping[str, str]) -> int:
-        """Return how many items the parameters allow, by the one sent or its default; 0 where nothing says it."""
+        """Return how many items the parameters allow: the value sent or its default; 0 if neither says so."""
         if self.limit is None:
             return 0
         if self.limit.name in sent:
@@ -197,7 +197,7 @@ def number_of(text: str) -> int:
 
 
 def members_of(item: Any) -> dict[str, Any]:
-    """Return the members of an item by plain name, those below ``attributes`` too; none where it is no object."""
+    """Return the members of an item, and those below ``attributes``, by plain name; none if it is no object."""
     if not isinstance(item, dict):
         return {}
     inner = item.get("attributes")
@@ -212,7 +212,7 @@ def identity_of(item: Any) -> str:
 
 
 def listed(value: Any) -> list[Any] | None:
-    """Return the items of a list: the body, or the list in an envelope; None if there are none or several."""
+    """Return the items of a list: the body, or the only list in an envelope; None if there is no such list."""
     found = _found(value, 0)
     return None if found is None else found[1]
 
@@ -241,7 +241,7 @@ def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
 
 
 def page_of(response: Response, operation: Operation | None = None) -> Page | None:
-    """Return the list in a successful JSON response, or in an XML one by the operation's schema for it, or None."""
+    """Return the list in a successful JSON response, or in an XML response by the operation's schema, or None."""
     value: Any = _value_of(response, operation) if response.ok and response.body and not response.cut else None
     found = _found(value, 0)
     if found is None:
@@ -282,7 +282,7 @@ def _value_of(response: Response, operation: Operation | None) -> Any:
 
 @lru_cache(maxsize=1024)
 def listing_of(operation: Operation) -> Listing | None:
-    """Return what the parameters of a GET do to its list; None where it has no declared list of objects or values."""
+    """Return the roles of a GET's list parameters; None if it declares no list of objects or values."""
     success = [one for status, one in operation.responses.items() if status.startswith("2")]
     in_xml = (schema for content in success for name, schema in content.items() if is_xml(name))
     item = _item_of(operation.shape or next(in_xml, None), 0)
@@ -331,7 +331,7 @@ def _directs(parameter: Parameter) -> bool:
 
 
 def _item_of(schema: Any, depth: int) -> Schema | None:
-    """Return the schema of the items of a list, in an envelope too; None where the schema has none or several."""
+    """Return the schema of a list's items, also in an envelope; None if the schema has no list, or several."""
     given = flat(schema) if isinstance(schema, dict) else {}
     if "array" in kinds_of(given):
         return given["items"] if isinstance(given.get("items"), dict) else {}
@@ -377,7 +377,7 @@ _DAY: Final = re.compile(r"\d{4}-\d\d-\d\d")
 
 
 class Bound(NamedTuple):
-    """One such parameter.
+    """A parameter that is a lower or upper bound of a member.
 
     Attributes:
         parameter: the parameter.
@@ -393,7 +393,7 @@ class Bound(NamedTuple):
 
     @staticmethod
     def rank(text: str) -> float | None:
-        """Return the place of the parameter's text in its order; None if it has none."""
+        """Return the place of the parameter's text in its order; None if it has no order."""
         found = _rank(text)
         return None if found is None else found[1]
 
@@ -406,7 +406,7 @@ class Bound(NamedTuple):
 
 
 def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | None:
-    """Return what a parameter bounds, by its name, its type and its description; None where it is no bound."""
+    """Return the member that a parameter bounds, by its name, type and description; None if it is no bound."""
     words = [one.lower() for one in _WORD.findall(parameter.name)]
     kind = _kind(parameter.schema)
     for index in (0, -1) if words and kind else ():
@@ -426,7 +426,7 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
 
 
 def _kind(schema: Schema) -> str:
-    """Return "number", or the format of a date; empty for what has no order that everybody knows."""
+    """Return "number" or the date format; empty for values without an order that everybody shares."""
     given = flat(schema)
     if kinds_of(schema) - {"null"} and kinds_of(schema) <= {"number", "integer", "null"} and "enum" not in given:
         return "number"
@@ -434,7 +434,7 @@ def _kind(schema: Schema) -> str:
 
 
 def _rank(value: Any) -> tuple[str, float, float] | None:
-    """Return the kind of a value, its place in its order, and how far another one may be from it; None without order.
+    """Return a value's kind, its place in its order, and how exact that place is; None without an order.
 
     A time is shown in whole seconds, whatever a device compares.
     """

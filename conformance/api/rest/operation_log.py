@@ -1,4 +1,4 @@
-"""What a run sent to each operation of a described API, and what came back: the matrix on its page."""
+"""What a run sent to each operation of a described API, and what it got: the operations matrix of the page."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ class OperationLog(Listener):
         return f"no operation could be called{why}"
 
     def concerned(self, request: Request) -> set[str]:
-        """Return the labels of the operations that a request concerns: those of its resource if it has no own one."""
+        """Return the labels of a request's operation, or of all operations of its resource if it has none."""
         if self._services is not None:
             operation = self._operation(request)
             return {operation.label} if operation else set()

@@ -13,7 +13,7 @@ _MISSING: Final = object()
 
 
 class PatchError(ValueError):
-    """Raised for a JSON patch that has to be refused as a whole; the message says which operation fails."""
+    """Raised for a JSON patch that must be refused as a whole; the message names the failing operation."""
 
 
 def merged(document: Any, patch: Any) -> Any:
@@ -42,7 +42,7 @@ def patched(document: Any, operations: Any) -> Any:
 
 
 def partly_patched(document: Any, operations: Any) -> Iterator[Any]:
-    """Yield what a device may make of a document that applies the operations one by one and refuses them later."""
+    """Yield the documents that a device may leave if it applies some operations before it refuses the patch."""
     found = copy.deepcopy(document)
     for operation in operations if isinstance(operations, list) else ():
         try:

@@ -17,7 +17,7 @@ _NOT_IMPLEMENTED: Final = frozenset({HTTPStatus.METHOD_NOT_ALLOWED, HTTPStatus.N
 
 
 def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool = True) -> None:
-    """Judge whether an operation is there: by its own request, or by what OPTIONS returns for its path.
+    """Judge whether an operation exists: by its own request, or by OPTIONS on its path.
 
     The operation's own request is sent where it may be sent and moves nothing; else OPTIONS, which proves something by
     Allow, by 2xx and by 404. Where OPTIONS leaves it open, an operation of the contract gets a request that it has to
@@ -53,7 +53,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
 
 
 def _to_be_refused(call: Call) -> Call | None:
-    """Return a request that reaches an operation and that it has to refuse; None where there is no such."""
+    """Return a request that reaches an operation and must be refused by it; None if there is no such request."""
     operation = call.operation
     if operation.safe:
         return None
@@ -64,7 +64,7 @@ def _to_be_refused(call: Call) -> Call | None:
 
 
 def _by_itself(call: Call, exchange: Exchange) -> bool | None:
-    """Return whether an operation is there by the response to it; None where the resource may only be empty."""
+    """Return whether a response shows that the operation exists; None if the resource may just be empty."""
     status = exchange.response.status
     may_be_empty = call.operation.declared(status) is not None or (
         not call.operation.safe and "{" in call.operation.template
@@ -75,7 +75,7 @@ def _by_itself(call: Call, exchange: Exchange) -> bool | None:
 
 
 def _by_options(call: Call, exchange: Exchange) -> bool | None:
-    """Return whether an operation is there by the response to OPTIONS; None where that leaves it open."""
+    """Return whether the response to OPTIONS shows that an operation exists; None if it leaves that open."""
     allow, status = exchange.response.header("allow"), exchange.response.status
     if status == HTTPStatus.NOT_FOUND:
         return False
@@ -86,7 +86,7 @@ def _by_options(call: Call, exchange: Exchange) -> bool | None:
 
 
 def _absence(exchange: Exchange) -> str:
-    """Return in words what shows that an operation is not there."""
+    """Return a text on what shows that an operation does not exist."""
     allow, status = exchange.response.header("allow"), exchange.response.status
     named = f" with Allow: {allow}" if allow is not None else ""
     return f"status {status}{named} for {exchange.request.method}"

@@ -30,12 +30,12 @@ def members_of(answer: Response) -> dict[str, Any] | None:
 
 
 def detail_of(answer: Response) -> str:
-    """Return the detail of a problem; empty where there is none."""
+    """Return the detail of a problem document, or an empty text."""
     members = members_of(answer) or {}
     detail = members.get("detail")
     return detail if isinstance(detail, str) else ""
 
 
 def names(detail: str, *words: str) -> bool:
-    """Return whether a detail has one of some names of a field as a word, not as a part of another one."""
+    """Return whether a detail contains one of some field names as a whole word."""
     return any(re.search(rf"(?<![A-Za-z0-9_]){re.escape(word)}(?![A-Za-z0-9_])", detail) for word in words)

@@ -50,7 +50,7 @@ class Question:
 
 
 def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Question]:
-    """Send each question alone, and return those with a matching response; other requirements judge the others.
+    """Send each question alone; return those with a matching response. Other requirements judge the others.
 
     One that is answered by a crash now and then has no usual response.
 
@@ -79,7 +79,7 @@ def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
 
 
 def rounds(asked: Sequence[Question], clients: int, count: int) -> list[list[Question]]:
-    """Return so many rounds in which the clients send different questions, each of them every question in time."""
+    """Return rounds in which all clients send different questions, and each client every question over time."""
     step = max(1, len(asked) // clients)
     return [[asked[(turn + client * step) % len(asked)] for client in range(clients)] for turn in range(count)]
 
@@ -110,7 +110,7 @@ def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
 
 
 def _shape_of(call: Call, media_type: str, alone: Response, *, entries: bool) -> Callable[[Response], str]:
-    """Return a test whether a response has the shape of the one that was received alone, and, if asked, its entries."""
+    """Return a test whether a response has the shape of the one received alone and, if asked, its entries."""
     schema, names = call.operation.shape or {}, _names_in(alone)
     listed = _entries(media_type, alone, schema) if entries else None
 

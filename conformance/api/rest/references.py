@@ -1,4 +1,4 @@
-"""References to what a device has: ids, cursors and names of other resources, which a client cannot invent."""
+"""References to things of a device: ids, cursors and names of other resources, which a client cannot invent."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
 
 
 def is_free_text(schema: Schema) -> bool:
-    """Return whether a value may be a text of which the description does not say how to write it."""
+    """Return whether a value may be any text, as the description does not say how to write it."""
     given = flat(schema)
     if given.keys() & {"enum", "const"} or "string" not in (kinds_of(given) or {"string"}):
         return False

@@ -1,4 +1,4 @@
-"""What a request makes applicable: its path below the base URL, its operation, and whether it is an unusual one."""
+"""The facts about a request that decide which requirements apply: path, operation, and whether it is unusual."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
 
 
 def _made(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> Any:
-    """Return a value with room for so many optional members, and so many others."""
+    """Return a value with at most these numbers of optional and of required parts."""
     schema = flat(_not_null(schema))
     named = [schema[key] for key in ("example", "const", "default") if key in schema]
     named += [value for key in ("examples", "enum") if isinstance(schema.get(key), list) for value in schema[key]]
@@ -122,7 +122,7 @@ def _share(room: tuple[int, int], count: int) -> tuple[int, int]:
 
 
 def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
-    """Return the member that says which alternative an object is, if the alternative leaves its value open."""
+    """Return the member whose value names the alternative of an object, if the schema leaves the value open."""
     name, known = discriminator_of(schema)
     return {name: known[0]} if known and name in made and made[name] not in known else {}
 
@@ -155,7 +155,7 @@ def alike_and_apart(schema: Schema) -> tuple[list[Any], list[Any]]:
 
 
 def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
-    """Return an item that is none of the others, as far as one can be made."""
+    """Return an item that differs from the others, if one can be made."""
     number = len(others)
     numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
     candidates = [item, *flat(schema).get("enum", ()), numbered]

@@ -1,4 +1,4 @@
-"""What a robot shows that does not change by itself: what two readings may be compared by."""
+"""The parts of a robot's state that do not change by themselves, so that two readings can be compared."""
 
 import time
 from collections.abc import Iterable

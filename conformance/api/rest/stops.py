@@ -121,7 +121,7 @@ class _Refusals(Listener):
 
 @contextmanager
 def _unheard(client: HttpClient) -> Iterator[_Refusals]:
-    """Send over new connections what nothing judges or counts, and what no hang or slow response before holds back."""
+    """Give the connection the settings of a stop: new, not judged or counted, and not delayed by earlier hangs."""
     connection = client.connection
     deadline_s = max(_DEADLINE_S, _ANSWERS * connection.pace.usual_s)
     changed = {
@@ -153,7 +153,7 @@ def _stop_by_map(api: RestInterface) -> str:
 
 
 def _stop_as_marked(api: RestInterface) -> str:
-    """Send what the description marks as a stop (x-roaas-stop); return what was not accepted, or an empty text."""
+    """Send the operations marked as a stop (x-roaas-stop); return why one was not accepted, or an empty text."""
     if not (api.call_rules.allow or api.run.statement.motion_map):
         return ""
     marked = (operation for operation in operations_of(api.run.contract) if operation.stop)
@@ -167,7 +167,7 @@ def _stop_as_marked(api: RestInterface) -> str:
 
 
 def _is_moving(api: RestInterface) -> bool:
-    """Return whether reads show that the device moves: it says so, or is in two places one after the other."""
+    """Return whether reads show that the device moves: it says so, or its position changes."""
     reads = [one for one in operations_of(api.run.contract) if one.method == "GET" and not one.parameter("path")]
     seen: list[dict[str, Any]] = []
     for turn in range(2):

@@ -85,7 +85,7 @@ def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
 
 
 def is_marked_deleted(value: Any) -> bool:
-    """Return whether a representation says of itself that it is deleted, as one that can be restored does."""
+    """Return whether a representation says that it is deleted, as that of a thing that can be restored does."""
     if not isinstance(value, dict):
         return False
     inner = [one for one in value.values() if isinstance(one, dict)]
@@ -200,7 +200,7 @@ def _snake(name: str) -> str:
 
 
 def is_shared(name: str) -> bool:
-    """Return whether a member may change when another thing is written, as only one thing is the default one."""
+    """Return whether writing another thing may change a member: only one thing can be the default, for example."""
     return bool(_SHARED.search(plain_name(name)))
 
 

@@ -1,4 +1,4 @@
-"""Members of which each thing of a collection has a value of its own, such as a name or a barcode.
+"""Members whose value differs for each thing of a collection, such as a name or a barcode.
 
 A description has no word for them. So they are found by trying: a creation that is refused may be accepted with other
 texts and numbers. Without these, a device refuses nearly all that is created, and little of it is seen.
@@ -106,7 +106,7 @@ class Unique:
 
 
 def numbered(schema: Schema, value: Any, number: int) -> Any:
-    """Return a text or an integer that a schema allows and that differs by a number; the same one if there is none."""
+    """Return a text or integer that the schema allows and that contains a number; the same one if none is allowed."""
     if is_number(value):
         given = flat(schema)
         least, most = given.get("minimum", value), given.get("maximum", _GREATEST)

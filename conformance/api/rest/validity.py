@@ -102,7 +102,7 @@ def validity_by(
 
 
 def require_valid(contract: Contract, method: str, target: str, media_type: str = "", body: bytes = b"") -> None:
-    """Check that a request which the suite sends as a valid one is not invalid by the contract.
+    """Check that the contract does not forbid a request which the suite sends as valid.
 
     Raises:
         HarnessError: the request is invalid; the message says why.
@@ -199,7 +199,7 @@ def _of_form(media_type: str, content_type: str, body: bytes, given: Body) -> _S
 
 
 def json_fault(body: bytes, schema: Schema) -> _Said:
-    """Return what is wrong with a JSON body, and the requirement that asks for its refusal."""
+    """Return the fault of a JSON body, and the requirement that demands its refusal."""
     text = read_json(body)
     for there, requirement in (
         (not body.strip(), "json-empty"),
@@ -229,7 +229,7 @@ def _is_shown(contract: Contract, path: str, schema: Schema, body: bytes) -> boo
 
 
 def _xml_fault(body: bytes, schema: Schema) -> _Said:
-    """Return what is wrong with an XML body; one that looks right may have more in it, and is unclear."""
+    """Return the fault of an XML body; one without a visible fault is unclear, as it may contain more."""
     try:
         root = parse_xml(body)
     except UnreadableError as error:

@@ -82,7 +82,7 @@ class Values:
                 self._learn(item, depth + 1)
 
     def _learn_link(self, text: str) -> None:
-        """Remember what a link carries, such as the cursor of the next page."""
+        """Remember the values in a link, such as the cursor of the next page."""
         for name, value in in_link(text):
             self._remember(self._seen[plain_name(name)], value)
 
@@ -104,7 +104,7 @@ class Values:
         return text in self._accepted[plain] or text in map(text_of, known)
 
     def references(self, operation: Operation, name: str, schema: Schema) -> list[Any]:
-        """Return what a reference of this name may refer to, by what the device has named; the likeliest first."""
+        """Return values that a reference of this name may have, by what the device has named; the likeliest first."""
         items = flat(schema).get("items") if "array" in kinds_of(schema) else None
         schema = items if isinstance(items, dict) else schema
         plain, thing = plain_name(name), thing_of(name)

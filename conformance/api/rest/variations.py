@@ -168,7 +168,7 @@ def _meet(place: str, other: str) -> bool:
 
 
 def _with_part(body: dict[str, Any], part: Variation) -> Any:
-    """Return a body with the member of another one; None if an index is in its place."""
+    """Return a body with one part of another body; None if the part is an item of a list."""
     steps, value, there = part.place.removeprefix("body /").split("/"), part.inputs.body, body
     for depth, step in enumerate(steps, 1):
         if not isinstance(value, dict) or step not in value:
@@ -181,7 +181,7 @@ def _with_part(body: dict[str, Any], part: Variation) -> Any:
 
 
 def _with_new_texts(body: dict[str, Any], schema: Schema, usual: dict[str, Any], turn: int) -> dict[str, Any]:
-    """Return a body with other free texts than the usual ones, since there may be only one thing of a name."""
+    """Return a body with unusual free texts, since there may be only one thing of a name."""
     parts, changed = flat(schema).get("properties", {}), dict(body)
     for name, one in body.items():
         text = f"roaas {turn}"
@@ -191,7 +191,7 @@ def _with_new_texts(body: dict[str, Any], schema: Schema, usual: dict[str, Any],
 
 
 def _knowing(variation: Variation, operation: Operation, values: Values) -> Variation:
-    """Return a variation with an optional member whose references are those that the device has named."""
+    """Return a variation whose optional member refers to things that the device has named."""
     if variation.kind is not Kind.OPTIONAL:
         return variation
     inputs = variation.inputs

@@ -37,7 +37,7 @@ class AttackVerdict:
 
 
 def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
-    """Return the verdict on one attack by its response, or by the lack of one."""
+    """Return the verdict on one attack by its response, or by the missing response."""
     # What a coding hides is over the limit once it is unpacked.
     over = len(attack.body) > LIMIT_OCTETS or any(name.lower() == "content-encoding" for name, _ in attack.headers)
     may_close = over or not attack.must_refuse
@@ -102,7 +102,7 @@ class AttackRunner:
     tempted: float = 0.0
 
     def attack(self, attack: Attack) -> None:
-        """Send one attack and judge what became of it.
+        """Send one attack and judge its outcome.
 
         Raises:
             NoAnswerError: the robot answers nothing any more.
@@ -157,7 +157,7 @@ def judge_calls(judge: Judge, callbacks: CallbackServer, runners: Sequence[Attac
 
 
 def outcome(send: Callable[[], Exchange]) -> Attempt:
-    """Send an attack, and return what became of it; a connection that breaks is an outcome as well.
+    """Send an attack and return its outcome; a broken connection is an outcome as well.
 
     Raises:
         NoAnswerError: no connection could be opened.

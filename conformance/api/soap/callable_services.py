@@ -33,7 +33,7 @@ class SoapServices:
 
     @property
     def there(self) -> dict[Interface, SoapService]:
-        """Those that have an address, the one that acts first."""
+        """The services that have an address, the acting one first."""
         named = {Interface.PUBLISHERS: self.publishers, Interface.SUBSCRIBERS: self.subscribers}
         return {name: service for name, service in named.items() if service is not None}
 
@@ -65,7 +65,7 @@ def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
 
 
 def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> list[tuple[SoapOperation, Node]]:
-    """Return each operation with a message that the robot accepts; where there is none, note it at the requirements.
+    """Return each operation with an accepted message; note at the requirements which operations have none.
 
     Raises:
         NoAnswerError: no HTTP response came.
@@ -80,7 +80,7 @@ def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> li
 def is_gone(
     soap: SoapServices, service: SoapService, accepted: tuple[SoapOperation, Node], answer: SoapResponse
 ) -> bool:
-    """Return whether a refusal says nothing of the request: what the operation reads has ended since it was accepted.
+    """Return whether a refusal only says that the thing which the operation reads has ended meanwhile.
 
     Args:
         soap: the services of the run.

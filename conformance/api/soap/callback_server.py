@@ -1,4 +1,4 @@
-"""A listener of our own that a robot must never call: whatever an attack names as address is one of its URLs."""
+"""A server of ours that a robot must never call: every address in an attack is one of its URLs."""
 
 import contextlib
 import socket
@@ -11,7 +11,7 @@ _REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: 4\r\nCon
 
 
 class CallbackServer:
-    """Listens where the robot would reach it, and remembers what was asked for.
+    """Listens at an address that the robot can reach, and remembers the requested URLs.
 
     Use as a context manager: it listens as long as the block lasts. Host and port are the robot's.
     """

@@ -1,4 +1,4 @@
-"""Calling a service, and what its response comes to: accepted, refused, or neither."""
+"""Call a service, and classify its response: accepted, refused, or neither."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -52,7 +52,7 @@ class SoapResponse:
 
     @property
     def accepted(self) -> bool:
-        """Whether the request was accepted: success, said by a message. A page in its place says nothing."""
+        """Whether a SOAP message says that the request was accepted. An HTML page says nothing."""
         return self.succeeded and self.envelope is not None
 
     @property
@@ -62,12 +62,12 @@ class SoapResponse:
 
     @property
     def first(self) -> etree._Element | None:
-        """The first child of the response's Body; None without one."""
+        """The first child of the response's Body, or None."""
         return self.envelope.first if self.envelope else None
 
     @property
     def payload(self) -> str | None:
-        """The tag of that child; None without one."""
+        """The tag of the first child of the response's Body, or None."""
         return None if self.first is None else str(self.first.tag)
 
     def describe(self) -> str:
@@ -81,7 +81,7 @@ class SoapResponse:
 
 
 def read_exchange(exchange: Exchange) -> SoapResponse:
-    """Return the SOAP message in an exchange, or why there is none."""
+    """Return the SOAP message in an exchange, or the reason why there is none."""
     if not exchange.response.body:
         return SoapResponse(exchange, None, "an empty body")
     try:
@@ -139,7 +139,7 @@ class SoapExpectation(Expectation):
 
 
 def expect_answer(judge: Judge, requirement: str, answer: SoapResponse) -> SoapExpectation:
-    """Return what a requirement expects of one SOAP response, to be judged by one of the methods."""
+    """Return an Expectation for one SOAP response; its methods judge."""
     return SoapExpectation(judge, requirement, answer.exchange, answer.describe(), answer)
 
 
@@ -152,5 +152,5 @@ def judge_answer(
     *,
     cause: str = "",
 ) -> bool:
-    """Judge one case by what a service answered, which a finding then describes; see Judge.check()."""
+    """Judge one case by a service's response, which a finding then describes; see Judge.check()."""
     return expect_answer(judge, requirement, answer).that(holds, expected, cause=cause)

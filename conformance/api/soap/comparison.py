@@ -1,4 +1,4 @@
-"""Two descriptions of one service, compared by what a client sees of them; layout, prefixes and type names are free."""
+"""Compare two descriptions of one service by what a client sees of them; layout, prefixes and type names are free."""
 
 from collections.abc import Iterator
 

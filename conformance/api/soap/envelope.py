@@ -13,7 +13,7 @@ EMPTY: Final = b'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"
 
 
 class NotSoapError(ValueError):
-    """An answer that is no SOAP 1.1 message; the message says what is wrong with it."""
+    """Raised for a response that is no SOAP 1.1 message; the message names the fault."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Envelope:
 
     @property
     def first(self) -> etree._Element | None:
-        """The Body's first child, by which a message is known (BP R2710); None where there is none."""
+        """The Body's first child, which identifies a message (BP R2710), or None."""
         return self.payload[0] if self.payload else None
 
 

@@ -120,6 +120,6 @@ def _is_sequence(element: Element) -> bool:
 
 
 def unknown_in(element: Element, node: Node) -> str:
-    """Return the tag of an element in a message whose type no document declares; empty if there is none."""
+    """Return the tag of an element whose type no document declares; empty if there is none."""
     found = [(element.tag, element)] + [(declared.tag, declared) for _, declared in declarations(element, node)]
     return next((tag for tag, one in found if isinstance(one.type, Complex) and one.type.unknown), "")

@@ -24,7 +24,7 @@ _BEYOND_SCHEMA: Final = frozenset({"body", "non-finite"})
 
 
 def invalid_ones(mutations: Iterable[Mutation[Payload]], types: Types) -> Iterator[Mutation[Payload]]:
-    """Yield those that both validators refuse, with the reason; and those that break a rule beyond the schema."""
+    """Yield mutants that both validators refuse, with the reason, and those that break a rule beyond the schema."""
     for mutation in mutations:
         if mutation.kind in _BEYOND_SCHEMA:
             yield mutation

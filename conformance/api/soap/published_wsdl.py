@@ -15,7 +15,7 @@ _OK = 200
 
 @dataclass(frozen=True)
 class PublishedWsdl:
-    """A WSDL, or why there is none.
+    """A WSDL, or the reason why it could not be read.
 
     Attributes:
         source: URL or file that it comes from, or None where none was named.

@@ -1,4 +1,4 @@
-"""What the operations of a WSDL are to each other, by their names and messages: which one reads what another writes."""
+"""Roles of a WSDL's operations, by names and messages: which one reads what another one writes."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class Act:
 
     @property
     def makes(self) -> dict[str, Simple]:
-        """The values in its response by which a device may know what it has made."""
+        """The values in the response by which a device may identify what it has made."""
         is_one = self.role is not Role.READS and self.role not in LAST
         return {name: one for name, one in self.told.items() if is_one and name not in self.needs and _is_id(name, one)}
 
     def keys(self, name: str, simple: Simple) -> list[str | Simple]:
-        """Return by what other messages may know a value: its name, a bare id with the noun, and its type."""
+        """Return the keys by which other messages may know a value: its name, a bare id with the noun, and its type."""
         named = [f"{self.noun}{name}", *([] if REFERS.fullmatch(name) else [name])]
         return [*named, *([simple] if simple.patterns and simple.builtin in TEXTS else [])]
 
@@ -99,7 +99,7 @@ class Act:
         )
 
     def lists(self, creator: Act) -> bool:
-        """Return whether this operation lists what another one creates: GetPresets, what AddPreset does."""
+        """Return whether this operation lists what another one creates, as GetPresets lists the result of AddPreset."""
         own, made = self.noun.removesuffix("s"), creator.noun.removesuffix("s")
         return self.role is Role.READS and not self.needs and bool(made) and own.startswith(made)
 
@@ -136,7 +136,7 @@ def _is_id(name: str, simple: Simple) -> bool:
 
 
 def in_order(acts: Iterable[Act], asks: Callable[[SoapOperation], int]) -> list[Act]:
-    """Return operations as they can be called: what makes a thing before what needs it, and what ends things last."""
+    """Return operations in an order in which they can be called: creation before use, and endings last."""
     found, makers, ranks = list(acts), defaultdict[str | Simple, list[str]](list), defaultdict[str, int](int)
     for act in found:
         for key in [key for name, simple in act.makes.items() for key in act.keys(name, simple)]:
@@ -167,7 +167,7 @@ def _values(declared: Element, depth: int = 0, *, needed: bool = True) -> Iterat
 
 
 def payload_of(octets: bytes) -> etree._Element | None:
-    """Return the first element in the Body of a message; None if it is none, or a long one."""
+    """Return the first element in a message's Body; None if it is no message, or too long."""
     if not 0 < len(octets) <= _LONGEST:
         return None
     try:

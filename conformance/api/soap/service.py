@@ -1,4 +1,4 @@
-"""A robot's SOAP service: where it is, how messages are sent to it, and what it and the contract say of it."""
+"""A robot's SOAP service: its address, how messages are sent, and the robot's and the contract's descriptions."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class SoapService:
 
     @cached_property
     def contract(self) -> Wsdl:
-        """What the contract says of the service.
+        """The contract's description of the service.
 
         Raises:
             WsdlError: the contract's files cannot be used, or it has no such service.
@@ -106,12 +106,12 @@ class SoapService:
 
     @property
     def own(self) -> Wsdl | None:
-        """What the robot says of the service; None where it says nothing that could be read (see own_problem)."""
+        """The robot's own description of the service; None if it could not be read (see own_problem)."""
         return self._interpreted[0]
 
     @property
     def own_problem(self) -> str:
-        """Why there is no description of the robot's own; empty where there is one."""
+        """Why the robot's own description is missing; empty if there is one."""
         return self._interpreted[1]
 
     @cached_property
@@ -142,7 +142,7 @@ def open_service(
     contract_wsdl_path: Path | None,
     known_messages: KnownMessages = lambda _service, _operation: (),
 ) -> SoapService:
-    """Find out where a service is. Whatever the robot answers, there is a service to send to afterwards.
+    """Find a service's address. Whatever the robot responds, the service that is returned can be called.
 
     An endpoint that is given wins. Else it is what the WSDL's soap:address says, if that is on a server that the user
     named and answers; else the WSDL's URL without its query.
@@ -178,7 +178,7 @@ def open_service(
 
 
 def _located(published: PublishedWsdl, connection: Connection) -> str | None:
-    """Return the address of a service by its WSDL; None where a file does not name one."""
+    """Return the address in a service's WSDL; None if a file names none."""
     try:
         address = describe(published.document or b"", published.source or "", unread).soap_address
     except WsdlError:

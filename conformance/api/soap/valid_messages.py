@@ -21,7 +21,7 @@ _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
 
 
 def require_valid_message(service: SoapService, message: Node) -> Node:
-    """Check that a message which the suite sends as a valid one is valid by the contract, and return it.
+    """Check that the contract allows a message which the suite sends as valid, and return it.
 
     Raises:
         HarnessError: it is not; the message says why.
@@ -34,7 +34,7 @@ def require_valid_message(service: SoapService, message: Node) -> Node:
 
 
 def require_valid_document(service: SoapService, document: bytes | str) -> bytes:
-    """Check that octets which the suite sends as a valid message are one by the contract, and return them.
+    """Check that the contract allows bytes which the suite sends as a valid message, and return them.
 
     Raises:
         HarnessError: they are not; the message says why.
@@ -119,7 +119,7 @@ def candidates(service: SoapService, operation: SoapOperation, declared: Element
 
 
 def quiet_example(service: SoapService) -> tuple[SoapOperation, Node] | None:
-    """Return the first operation with a message that the robot accepts; None where there is none.
+    """Return the first operation with an accepted message, or None.
 
     Raises:
         NoAnswerError: no HTTP response came.

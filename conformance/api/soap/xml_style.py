@@ -1,4 +1,4 @@
-"""One message in many styles: what XML and its namespaces let a writer choose, and a reader must not care about."""
+"""One message in many styles: XML and its namespaces let a writer choose, and a reader must accept each choice."""
 
 from dataclasses import dataclass, field, replace
 from typing import Final
@@ -55,7 +55,7 @@ class XmlStyle:
 
 
 def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
-    """Return styles that differ from the plain one in one choice each, with a name for the choice."""
+    """Return styles that differ from the plain one in one choice, each with the choice's name."""
     return (
         ("plain", XmlStyle()),
         ("other prefixes", XmlStyle(envelope_prefix="S", payload_prefix="a")),
@@ -76,7 +76,7 @@ def single_changes() -> tuple[tuple[str, XmlStyle], ...]:
 
 
 def value_styles() -> tuple[XmlStyle, ...]:
-    """Return the styles, those first by which a reader may mistake a value."""
+    """Return the styles, first those in which a reader may misread a value."""
     styles = [style for _, style in single_changes()]
     return tuple(sorted(styles, key=lambda style: style.text == "plain"))
 
@@ -106,7 +106,7 @@ class _Writer:
     prefixes: dict[str, str] = field(default_factory=dict)
 
     def prefix(self, space: str) -> str:
-        """Return the prefix of a namespace; the same one wherever it is asked for."""
+        """Return the prefix of a namespace, always the same one."""
         if space not in self.prefixes:
             given = self.style.envelope_prefix if space == ENVELOPE else self.style.payload_prefix
             number = sum(1 for other in self.prefixes if other != ENVELOPE)
@@ -114,7 +114,7 @@ class _Writer:
         return self.prefixes[space]
 
     def element(self, node: Node, bound: dict[str, str], depth: int, *, root: bool = False) -> str:
-        """Write an element; ``bound`` is what each prefix stands for here, the default namespace under an empty one."""
+        """Write an element; ``bound`` maps each prefix in scope to its namespace, the empty prefix to the default."""
         scope = dict(bound)
         space = namespace(node.tag)
         attributes = self._bindings(node, scope, root=root)
@@ -157,7 +157,7 @@ class _Writer:
         return made
 
     def _attribute(self, key: str, scope: dict[str, str], made: list[str]) -> str:
-        """Return the name of an attribute; a qualified one needs a prefix, whatever the default namespace is."""
+        """Return the name of an attribute; a qualified attribute needs a prefix, even in the default namespace."""
         space = namespace(key)
         if not space:
             return key

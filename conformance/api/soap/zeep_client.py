@@ -59,7 +59,7 @@ class _Transport(Transport):
 
 
 class ZeepCaller:
-    """A zeep client of one service, made from the robot's description, or from the contract's where it has none.
+    """A zeep client of one service, made from the robot's description or else from the contract's.
 
     Raises:
         Exception: zeep cannot make a client from the description; of any kind, with zeep's message.

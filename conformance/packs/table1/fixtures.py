@@ -86,7 +86,7 @@ def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
 
 @pytest.fixture
 def read_deliveries(_lists_read: list[Callable[..., None]]) -> Callable[..., None]:
-    """Return what reads the list of deliveries until none is awaited there.
+    """Return a function that reads the list of deliveries until no delivery is awaited there.
 
     Raises:
         NotPossibleError: there is no REST interface to read their list at.

@@ -1,4 +1,4 @@
-"""What a robot can do, and how exactly: what its statement declares, and what it is judged by.
+"""A robot's abilities and accuracy: what its statement declares, and the figures for judging it.
 
 A figure is declared when the statement names it, whatever its value. What is not declared has a figure to drive the
 robot by all the same (contract.md, the statement): the reference robot's limits halved, so that a slower one can
@@ -57,7 +57,7 @@ class Noise(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True):
-    """What judging uses, as in DeclaredLimits; each default is the figure for what is not declared.
+    """The figures for judging, as in DeclaredLimits; defaults replace undeclared ones.
 
     Attributes:
         linear_least_m_s: least linear.x, m/s, if it is not ``-linear_m_s``; linear_greatest_m_s, angular_least_rad_s,
@@ -164,7 +164,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the robot can do and how exactly, as its vendor declares it; None: not declared.
+    """A robot's abilities and accuracy as its vendor declares them; None means not declared.
 
     The bounds are the contract's (contract.md#statement): by a wider tolerance a robot would be judged by nothing.
 

@@ -127,7 +127,7 @@ class Device(device.Device):
         return abs(shown - wanted) <= room + limits.tolerance * abs(wanted)
 
     def messages(self, service: device.Soap, operation: SoapOperation) -> Iterator[Node]:
-        """Yield SOAP messages that the robot takes, likeliest first; none where the obvious one will do."""
+        """Yield SOAP messages that the robot accepts, likeliest first; empty if the default message suffices."""
         from conformance.packs.table1.robot.soap_services import known_messages  # noqa: PLC0415 - see the class
 
         return known_messages(service, operation)

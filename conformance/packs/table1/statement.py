@@ -1,4 +1,4 @@
-"""What a vendor says of the paper's robot: its limits, where it may be driven, its ROS side."""
+"""The statement's tables on the paper's robot: its limits, where it may be driven, its ROS side."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Statement(RobotStatement, frozen=True):
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
-        """What result.json tells: the declared figures, and the limits and tolerances that the robot is judged by."""
+        """The figures in result.json: the declared ones, and the limits and tolerances for judging."""
         motion = self.motion
         shape = {"min_radius_m": motion.min_radius_m, "wheel_separation_m": motion.wheel_separation_m}
         declared = self.declared.figures | {name: figure for name, figure in shape.items() if figure is not None}
@@ -118,7 +118,7 @@ class StatementFile(generic.StatementFile, frozen=True, forbid_unknown_fields=Tr
 
 
 def said_of(run: Run) -> Statement:
-    """Return what the vendor says of the robot of a run.
+    """Return the run's statement with the paper robot's tables.
 
     Raises:
         TypeError: the run judges another kind of device.

@@ -38,7 +38,7 @@ def _document(rest: HttpClient) -> tuple[Any, Exchange, str]:
 
 @lru_cache(maxsize=2)
 def _read(body: bytes) -> tuple[Any, str]:
-    """Parse a description and return it with what is wrong with it; cached, as three checks read the same one."""
+    """Parse a description and return it with its faults; cached, as three checks read the same one."""
     text = read_json(body)
     return text.value, text.problem or openapi_fault(text.value)
 

@@ -122,7 +122,7 @@ def test_address(soap: SoapServices, judge: Judge) -> None:
 
 
 def _answers(service: SoapService, location: str) -> tuple[Attempt | None, str]:
-    """Send a message with an empty Body, which does nothing, to an address; return the exchange and what is wrong.
+    """Send a message with an empty Body, which has no effect, to an address; return the exchange and its fault.
 
     Without permission to move the robot, GET is sent instead to what is not known to only read, and any response will
     do: a service need not have GET.

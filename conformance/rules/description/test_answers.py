@@ -92,7 +92,7 @@ def _is_unreadable(probe: Probe) -> bool:
 
 
 def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, str], object]) -> Iterator[NotSeen]:
-    """Yield the operations whose success the device's state did not allow, if a success declares what is judged."""
+    """Yield the operations whose success the device's state prevented, if a success declares what is judged."""
     held = [
         operation.label
         for operation in operations_of(run.contract)
@@ -198,7 +198,7 @@ def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema,
 
 
 def _with_fault(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response], str]]:
-    """Yield what `_with_schema` yields with what is wrong by the schema, or empty."""
+    """Yield what `_with_schema` yields, with the fault by the schema, or an empty text."""
     for probe, (schema, answer) in _with_schema(trace, run):
         try:
             yield probe, (schema, answer), _wrong(schema, answer)

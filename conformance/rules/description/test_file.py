@@ -14,7 +14,7 @@ _SHOWN = 8
 
 
 def _tell(judge: Judge, requirement: str, found: list[str], expected: str) -> None:
-    """Record whether a description has no fault of one kind; several are one finding with a list."""
+    """Record whether a description has no fault of one kind; several faults are one finding with a list."""
     more = f", and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
     observed = "; ".join(found[:_SHOWN]) + more
     judge.check(requirement, not found, None, expected, found=observed, subject="the description")

@@ -1,4 +1,4 @@
-"""What an API creates or writes can be read, whatever is done to others, and is gone when it was deleted.
+"""Life cycles: what an API creates or writes can be read, stays while other things change, and ends when deleted.
 
 RFC 9110 15.3.2, 9.3.4, 9.3.5, 15.5.
 """
@@ -34,7 +34,7 @@ def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
 
 @rule("description/created-is-there", on=(lifecycles,))
 def created_is_there(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether what was created is found under its identifier, with this identifier, and stays there."""
+    """Judge whether a created thing is found under its identifier, with this identifier, and stays there."""
     for life in (life for life in trace if life.create):
         there = life.found.response.status not in {HTTPStatus.NOT_FOUND, HTTPStatus.GONE}
         expected = f"the thing that {life.create} has created with status {life.created.response.status}"
@@ -75,7 +75,7 @@ def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 
 @rule("description/deleted-is-gone", on=(used_things,))
 def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outcome]:
-    """Judge whether a thing that another one refers to was deleted, so that the reference leads nowhere."""
+    """Judge whether a thing was deleted although another one refers to it, so that the reference is broken."""
     for one in trace:
         shown = one.deleted if one.fault else one.user
         expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
@@ -103,7 +103,7 @@ def same_rows(trace: tuple[Table, ...]) -> Iterable[Outcome]:
 
 @rule("description/idempotency-key", on=(repeated_keys,))
 def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
-    """Judge whether a key stands for one request: it is performed once, and no other one gets its response."""
+    """Judge whether a key stands for one request: it is performed once, and no other request gets its response."""
     for one in trace:
         yield Case(not one.fault, one.shown, one.expected, one.fault, cause=f"{one.operation} {one.way}")
 
@@ -117,7 +117,7 @@ def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
 
 @pytest.fixture(scope="session")
 def begun() -> list[Ended]:
-    """Return the list of what was begun and ended, which is looked at again at the end."""
+    """Return the list of things that were begun and ended, which is read again at the end."""
     return []
 
 
@@ -133,7 +133,7 @@ def test_what_goes_on(api: RestInterface, values: Values, begun: list[Ended]) ->
 @pytest.mark.needs("rest")
 @pytest.mark.requirement("description/states", "description/refused-keeps")
 def test_what_has_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
-    """Read what was begun again, and cancel what is done."""
+    """Read again the things that were begun, and cancel those that are done."""
     look_at_ended(api, values, begun)
 
 
@@ -141,5 +141,5 @@ def test_what_has_ended(api: RestInterface, values: Values, begun: list[Ended]) 
 @pytest.mark.needs("rest")
 @pytest.mark.requirement("description/own-identifier")
 def test_items_of_lists(api: RestInterface, values: Values) -> None:
-    """Read some items of each list, one after another and the first one again; a checker judges all reads of a run."""
+    """Read some items of each list in a row, and the first one again; a checker judges all reads of a run."""
     read_items(Writer(api, values))

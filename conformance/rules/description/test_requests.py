@@ -77,7 +77,7 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
 
 
 def _deletes_the_absent(trace: Survey) -> set[str]:
-    """Return the DELETE operations that succeed for what is not there, as an idempotent one may (RFC 9110 9.2.2)."""
+    """Return the DELETE operations that succeed for absent things, as idempotent ones may (RFC 9110 9.2.2)."""
     deleted = [one for one in trace.probes if one.ok and one.exchange and one.operation.startswith("DELETE ")]
     sent = Counter(one.exchange.request.url for one in deleted if one.exchange and one.validity == VALID)
     return {one.operation for one in deleted if one.exchange and (one.invents or sent[one.exchange.request.url] > 1)}
@@ -145,7 +145,7 @@ def optional(trace: Survey) -> Iterable[Outcome]:
 
 @rule("description/enums", on=(survey,))
 def enums(trace: Survey) -> Iterable[Outcome]:
-    """Judge whether each value of an enumeration is accepted, where another one of it is."""
+    """Judge whether each value of an enumeration is accepted, if another one is."""
     yield from _accepted(trace, (Kind.ENUM,), "each declared value of the enumeration accepted")
 
 
@@ -192,7 +192,7 @@ def _asked(probe: Probe) -> tuple[str, str, str]:
 
 
 def _named(trace: Survey, run: Run) -> Iterator[Probe]:
-    """Yield the probes but those whose path has a free text that the device accepted nowhere: such as a wrong id."""
+    """Yield the probes without those whose path has a free text that was never accepted, such as a wrong id."""
     free = {
         item.label
         for item in operations_of(run.contract)
@@ -242,7 +242,7 @@ def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: 
 
 
 def _refusal(exchange: Exchange | None) -> str:
-    """Return a refusal with the beginning of what the device says about it."""
+    """Return a refusal with the beginning of its text."""
     if exchange is None:
         return "no response"
     said = " ".join(exchange.response.body[:200].decode("utf-8", "replace").split())

@@ -97,7 +97,7 @@ def _shown(api: RestInterface, call: Call) -> int:
 
 
 def _asking(api: RestInterface, call: Call) -> frozenset[int]:
-    """Return the statuses in place of which 401 should ask for the credentials of HTTP (RFC 9110 11.4).
+    """Return the statuses that should have been 401 for HTTP's own credentials (RFC 9110 11.4).
 
     Unless its contract demands 401, a device may hide a resource (404, RFC 9110 15.5.4), may refuse as it declares, and
     refuses other credentials than those of HTTP, such as an API key, by whatever status fits.

@@ -25,12 +25,12 @@ _SERVED = 2
 
 @pytest.fixture(scope="session")
 def asked() -> list[Question]:
-    """Return the list of distinguishable requests, which the first check fills and the others share."""
+    """Return the list of distinguishable requests, which the first check fills for all."""
     return []
 
 
 def _questions(api: RestInterface, known: list[Question]) -> list[Question]:
-    """Return requests whose responses can be told apart; skip the check where the robot has none."""
+    """Return requests with distinguishable responses; skip the check if the robot has none."""
     if not known:
         known += questions(api, api.device.questions(api))
     if not known:

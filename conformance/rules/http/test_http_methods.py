@@ -1,4 +1,4 @@
-"""Methods: those that a resource has, those that it lacks, and the Allow field (RFC 9110 9, 10.2.1, 15.5.6)."""
+"""Methods: declared ones, undeclared ones, and the Allow field (RFC 9110 9, 10.2.1, 15.5.6)."""
 
 from typing import cast
 

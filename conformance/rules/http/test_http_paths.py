@@ -28,7 +28,7 @@ _LONG_FIELD = 128 * 1024
 
 
 def _unknown_paths(api: RestInterface) -> list[str]:
-    """Return paths that are near to those of the contract, and match none of them."""
+    """Return paths that are similar to the contract's, and match none of them."""
     literal = [item.template for item in resources_of(api.run.contract) if "{" not in item.template]
     near = [f"/{_STRANGE}", f"/{_STRANGE}/"]
     near += [path.rstrip("/") + f"/{_STRANGE}/" for path in literal[:4]]

@@ -1,4 +1,4 @@
-"""Many reads, one after another on one connection: each is answered, whatever its number, and judged by the checkers.
+"""Many reads in a row on one connection: each gets a response, and the checkers judge each.
 
 One series serves several requirements. Servers used to allow a hundred requests on one connection, and a failure in
 fifty is noticed in twice as many.
@@ -41,7 +41,7 @@ _LONGEST_WAIT_S = 10.0
 
 @dataclass
 class _Reads:
-    """What became of reads at one rate, in order.
+    """The outcomes of reads at one rate, in order.
 
     Attributes:
         rate: the rate, in words.
@@ -66,7 +66,7 @@ class _Reads:
 
     @property
     def put_off(self) -> list[Attempt]:
-        """Those of them that the robot put off, and said for how long."""
+        """The lost reads that the robot deferred with a Retry-After."""
         return [one for one in self.lost if put_off_s(one) is not None]
 
     @property
@@ -83,7 +83,7 @@ class _Reads:
 
 @pytest.fixture(scope="session")
 def series() -> _Reads:
-    """Return the reads on one connection, which the first check sends."""
+    """Return the reads on one connection, which the first check that needs them sends."""
     return _Reads("as fast as the robot answers")
 
 
@@ -147,7 +147,7 @@ def _send(api: RestInterface, series: _Reads) -> None:
 
 
 def _turns(api: RestInterface, calls: Sequence[Call]) -> list[Call]:
-    """Return the reads in their order: all in turn, beginning with another one each time.
+    """Return the reads in rounds of all operations; each round begins with another operation.
 
     So a robot that fails with every n-th response does not always fail with the same operation.
     """

@@ -55,7 +55,7 @@ def _named(kind: tuple[int, str]) -> str:
 
 
 def _telling_read(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | None:
-    """Return a GET, an Accept that changes its response, and that response's kind; None where none does."""
+    """Return a GET, an Accept that changes its response, and that response's kind; None if there is no such GET."""
     for call in answered(api)[:1]:
         usual = _usual_kind(api, call.path)
         for media_type in (*call.operation.formats, _NOTHING):

@@ -93,7 +93,7 @@ def _send(api: RestInterface, path: str, *fields: str, body: bytes = b"") -> _Pa
 
 
 def _send_once(api: RestInterface, path: str, *fields: str, body: bytes = b"") -> _Pair:
-    """Send a GET with headers and body as given, and a valid one behind it, after which the server closes."""
+    """Send a GET with headers and body as given, and a valid one behind it, and close the connection."""
     first = raw.head(api.client, "GET", path, *fields) + body
     octets = first + raw.head(api.client, "GET", path, "Connection: close")
     longest = api.client.connection.timeout_s
@@ -115,7 +115,7 @@ def _judge(judge: Judge, requirement: str, pair: _Pair, what: str) -> None:
 
 
 def _path(api: RestInterface, *ids: str) -> str:
-    """Return a path for GET that is answered 2xx; empty, with a note at the requirements, if there is none."""
+    """Return a path for GET that returns 2xx; empty, with a note at the requirements, if there is none."""
     for call in reads(api):
         if call.send(api).response.ok:
             return call.path

@@ -1,4 +1,4 @@
-"""Whether attempts at rest move a device, and whether what it tells of its position is fresh (motion map)."""
+"""Rules on attempts at rest, which must not move a device, and on whether its position is up to date (motion map)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Out
 
 
 def _moves_anyway(trace: Quiet, motion: MotionMap) -> bool:
-    """Return whether the device also moved without any attempt, as one whose position or velocity drifts or lags."""
+    """Return whether the device also moved without an attempt, because its position or velocity drifts or lags."""
     return trace.idle is not None and bool(_moved(trace.idle, motion))
 
 
@@ -66,7 +66,7 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
 
 
 def _refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
-    """Judge whether attempts are refused, with one of some statuses if there are any; SOAP has a fault for all."""
+    """Judge whether attempts are refused, with one of the statuses if any are given; over SOAP by a fault."""
     for one in tried:
         soap = one.exchange is not None and is_soap(one.exchange)
         expected = "a fault" if soap else " or ".join(map(str, statuses)) or "4xx"

@@ -1,4 +1,4 @@
-"""Whether what a device tells of its moves and its position agrees, and whether its switches switch (motion map)."""
+"""Rules on whether a device's move states and positions agree, and whether its switches work (motion map)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NO_ACTION = NotClaimed("the map has no [motion.action]")
 
 @rule("motion/agrees", on=(agreement,))
 def agrees(trace: tuple[Told, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether all operations tell the same position and velocity: one of several readings in a row is enough."""
+    """Judge whether all operations show the same position and velocity, in one of several readings in a row."""
     own = motion.state.read
     for index in range(0, len(trace) - SEVERAL + 1, SEVERAL):
         rounds = [told for told in trace[index : index + SEVERAL] if told.values[own]]
@@ -42,7 +42,7 @@ def _apart(values: dict[str, float], own: dict[str, float], motion: MotionMap) -
 
 @rule("motion/action-succeeds", on=(targets,))
 def action_succeeds(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a move says that it succeeded once it is there, and not before."""
+    """Judge whether a move reports success once it has arrived, and not before."""
     action = motion.action
     if action is None or not action.succeeded:
         yield _NO_ACTION

@@ -31,7 +31,7 @@ def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
-    """Return what still moves in some readings; empty if nothing does, None if they do not show it."""
+    """Return the axes that still move in some readings; empty if none does, None if they do not show it."""
     seen = tuple(one for one in readings if one.values)
     if len(seen) < 2 * SEVERAL:
         return None

@@ -107,7 +107,7 @@ def _alone(api: RestInterface, call: Call) -> list[Preferred]:
 
 
 def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:
-    """Judge requests with preferences: one finding for each format that came in place of the preferred one."""
+    """Judge requests with preferences: one finding for each format that was sent instead of the preferred one."""
     failed = defaultdict(list)
     for one in preferred:
         if not one.holds:

@@ -71,7 +71,7 @@ def _refused(operation: Operation, values: Values, number: int) -> list[Outgoing
 
 
 def _behind(api: RestInterface, request: Outgoing, call: Call) -> Attempt | None:
-    """Send a request and a read behind it; return what came for the read, None where nothing has to."""
+    """Send a request and a read behind it; return the outcome of the read, None if it may stay unanswered."""
     fields = [f"{name}: {value}" for name, value in request.headers]
     fields.append(f"Content-Length: {len(request.body)}")
     first = raw.head(api.client, request.method, request.target, *fields) + request.body

@@ -1,1 +1,1 @@
-"""Class ros-gateway: what the web says and what ROS says are the same."""
+"""Class ros-gateway: the web shows and does the same as ROS."""

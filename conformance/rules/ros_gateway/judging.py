@@ -38,7 +38,7 @@ def mapped(message: dict[str, object], body: Body) -> dict[str, object]:
 
 
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:
-    """Return whether a response reports a failure: by a declared status, any if none is, or as the map says in 2xx."""
+    """Return whether a response reports a failure: by a declared status, else any, or in a 2xx as the map says."""
     response = exchange.response
     return not succeeded(exchange, body) and (response.ok or not declared or response.status in declared)
 

@@ -1,4 +1,4 @@
-"""Whether a gateway sends and cancels goals as it is told, and says what becomes of them."""
+"""Rules on goals of a gateway: it sends and cancels them as requested, and reports their state."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _is_late(look: Look, number: int, given: list[float], end: float | None) -> 
 
 
 def _number_of(look: Look, one: Goal, trace: Goals, ros: RosMap) -> int | None:
-    """Return which of the server's feedback a reading shows; None: none of it."""
+    """Return which of the server's feedback a reading shows, or None."""
     definition = trace.definitions[f"{one.operation}#Feedback"]
     pointer = one.body.feedback or ""
     for number, value in enumerate(one.feedback):

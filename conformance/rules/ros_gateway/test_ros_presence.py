@@ -1,4 +1,4 @@
-"""Whether a gateway says what is not there, finds what comes, and lists what is on the graph."""
+"""Rules on what a gateway reports missing, what it discovers, and how it lists the graph."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ALL: Final = "all topics at once"
 
 @rule("ros-gateway/absent", on=(topics_at_first,))
 def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
-    """Judge whether an operation says that there was no message yet."""
+    """Judge whether an operation reports that there was no message yet."""
     for one in trace:
         if not one.body.absent and one.body.failure is None:
             yield NotClaimed("the map does not say what a topic without a message returns: `absent`")

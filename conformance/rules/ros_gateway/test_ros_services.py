@@ -1,4 +1,4 @@
-"""Whether a gateway calls services as it is told, and says what became of each call."""
+"""Rules on service calls of a gateway: it calls as requested, and reports each outcome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether what a gateway says of topics is what ROS says of them (statement, table ``[ros]``)."""
+"""Rules on topics of a gateway: the web shows what ROS shows (statement, table ``[ros]``)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def reads_of(ros: RosMap, call: str) -> Reads:
 
 
 def rows(found: list[Difference]) -> tuple[str, str]:
-    """Return what ROS says and what the web says, field by field."""
+    """Return ROS's value and the web's value, field by field."""
     more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
     own = "; ".join(f"{one.at} = {one.ros} ({one.declared})" for one in found[:_ROWS])
     web = "; ".join(f"{one.at} = {one.web}" for one in found[:_ROWS])
@@ -162,7 +162,7 @@ def _mapped(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, obj
 
 @rule("ros-gateway/once", on=(topic_writes, topic_bursts))
 def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether each accepted request is exactly one message. Messages that no request had are others'."""
+    """Judge whether each accepted request is exactly one message. Messages without a request are other publishers'."""
     for number, burst in enumerate(trace):
         same_operation = [one for one in trace if one.operation == burst.operation]
         sent = [one for each in same_operation for one in each.sent]

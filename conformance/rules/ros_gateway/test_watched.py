@@ -1,4 +1,4 @@
-"""Whether what a gateway returns of a real robot's topics is what the suite hears of them."""
+"""Rules on topics of a real robot: the gateway returns what the suite hears of them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def watched_exact(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
 
 @rule("ros-gateway/read-fresh", on=(topic_watches,))
 def watched_fresh(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether a message is returned no later than declared after the next one came."""
+    """Judge whether a message is returned no longer than declared after the next one arrived."""
     for one in trace:
         reads = reads_of(ros, one.operation)
         within_s = (reads.max_age_s or reads.within_s) + SLACK_S

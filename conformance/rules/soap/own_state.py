@@ -1,4 +1,4 @@
-"""Which faults the state of the device explains: what was acknowledged once, started, used up, removed, or ended."""
+"""Faults that the device's state explains: a thing was acknowledged, started, used up, removed, or ended before."""
 
 from __future__ import annotations
 

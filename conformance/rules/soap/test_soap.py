@@ -41,7 +41,7 @@ Trace = tuple[SoapProbe, ...]
 def _told(
     trace: Iterable[SoapProbe], expected: str, wrong: Callable[[SoapProbe], str | None], *, by_kind: bool = False
 ) -> Iterator[Outcome]:
-    """Yield a case for each probe of which ``wrong`` returns what is wrong, or an empty text; not where it is None.
+    """Yield a case for each probe: ``wrong`` returns its fault, an empty text, or None to skip it.
 
     One cause is one finding, whatever operations it has. It shows a valid message if one fails: a message that has
     another fault as well would show two things.
@@ -268,7 +268,7 @@ def doctype_refused(trace: Trace) -> Iterator[Outcome]:
 
 @rule("soap/no-bare-error", on=_ON)
 def no_bare_error(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a server error is told by a fault: a bare 500 says that the service itself failed."""
+    """Judge whether a server error comes as a fault: a bare 500 says that the service itself failed."""
 
     def wrong(probe: SoapProbe) -> str | None:
         status = probe.exchange.response.status if probe.exchange else 0

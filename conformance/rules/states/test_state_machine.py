@@ -1,4 +1,4 @@
-"""Whether a device takes and refuses operations by its states, and goes from one to the other (state map)."""
+"""Rules on states: the device accepts and refuses operations by its state, and changes it as the state map says."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def taken(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
 
 
 def _unseen(trace: Walk) -> Iterator[Outcome]:
-    """Say what the walk did not show, and where it ended."""
+    """Note which pairs the walk did not show, and where it ended."""
     seen = {(step.operation, step.state) for step in trace.steps}
     lacking = [state for state in trace.states if not any((name, state) in seen for name in trace.operations)]
     if lacking:

@@ -45,7 +45,7 @@ def attempts_at_rest(mapped: MappedDevice) -> Quiet:
 
 
 def _settle(mapped: MappedDevice) -> None:
-    """Bring the device home, and to rest there: one that has arrived may still turn."""
+    """Bring the device home and to rest: one that has arrived may still turn."""
     mapped.bring_home()
     velocity = mapped.motion.velocity
     if velocity is not None:

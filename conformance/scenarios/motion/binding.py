@@ -43,7 +43,7 @@ class Binding(Protocol):
     def made(
         self, call: str, body: Any, media_type: str = JSON, root: str = "", *, authorized: bool = True
     ) -> Outgoing:
-        """Return the request of a call with a body; None: it has none, or the usual one.
+        """Return the request of a call with this body; None: without one, or with the usual one.
 
         Args:
             call: the operation.
@@ -54,7 +54,7 @@ class Binding(Protocol):
         """
 
     def content(self, octets: bytes) -> Any:
-        """Return what the body of a response says; None: nothing that can be read."""
+        """Return the value in a response's body, or None if it cannot be read."""
 
     def forbids(self, call: str, body: Any) -> bool:
         """Return whether the device's description forbids a call."""
@@ -153,7 +153,7 @@ def _whole(value: Any, schema: Schema) -> Any:
 
 
 class SoapBinding:
-    """SOAP by a WSDL; what the map does not say of a message is taken from [values], or is usual."""
+    """SOAP by a WSDL; parts of a message that the map does not name come from [values], or are usual values."""
 
     syntax = "XML"
 

@@ -64,7 +64,7 @@ def with_room(
 
 
 def _learn(mapped: MappedDevice, name: str) -> None:
-    """Drive slowly for a moment at a velocity of which the map does not say which axes it changes, and note these."""
+    """Drive slowly for a moment at a velocity whose axes the map does not name, and note which ones it changes."""
     drives, room = mapped.drives, mapped.room
     room.unknown.discard(name)
     speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}

@@ -123,7 +123,7 @@ class MappedDevice:
         return self.moves.seconds if "seconds" in names_in([self.moves.send, self.moves.body]) else 0.0
 
     def read(self) -> Reading:
-        """Read the state, and what the last accepted move says of itself.
+        """Read the state, and the state of the last accepted move.
 
         Raises:
             NoAnswerError: there is no response.
@@ -151,7 +151,7 @@ class MappedDevice:
         )
 
     def get(self, call: str) -> tuple[Exchange, Any]:
-        """Send a reading operation of the map; return the exchange and what it says, None if nothing.
+        """Send a reading operation of the map; return the exchange and its value, or None.
 
         Raises:
             NoAnswerError: there is no response.
@@ -280,7 +280,7 @@ class MappedDevice:
         self._answer = self.binding.content(exchange.response.body) or self._answer
 
     def stop(self) -> Command | None:
-        """Send the stop, or velocity 0; return None if the map has neither, or it names what is not known yet.
+        """Send the stop, or velocity 0; return None if the map has neither, or names an unknown value.
 
         Raises:
             NoAnswerError: there is no response.
@@ -295,7 +295,7 @@ class MappedDevice:
         return self._sent(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
     def halt(self) -> Command | None:
-        """Send the stop, and velocity 0 as well where that is refused: one that names a move is, if none goes on.
+        """Send the stop, and velocity 0 as well if it is refused: a stop that names a move is refused if none goes on.
 
         Returns:
             The stop; None: there is none that can be sent.
@@ -345,7 +345,7 @@ class MappedDevice:
         return {name: middle_of(seen, name) for name in self.motion.state.axes}
 
     def follow(self, command: Command, others: Sequence[Position] = ()) -> list[Reading]:
-        """Watch until the target of a command, or one of others, is reached and kept, or the command's time is over."""
+        """Watch until the target of a command, or another one, is reached and kept, or the command's time is over."""
         seen, targets = list[Reading](), [command.targets, *others]
 
         def among(ends: Sequence[Position], readings: list[Reading]) -> list[Position]:
@@ -377,7 +377,7 @@ class MappedDevice:
         return Leg(what, start, (command,), tuple(self.follow(command)) if command.accepted else (), self.due(command))
 
     def bring_home(self) -> None:
-        """Stop what goes on, and bring the device home; one that takes no positions stays where it comes to rest.
+        """Stop any motion, and bring the device home; one without positions stays where it comes to rest.
 
         Raises:
             NotPossibleError: it does not get there.

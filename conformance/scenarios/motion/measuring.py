@@ -1,4 +1,4 @@
-"""Measure velocities by several readings, of which no single one decides anything."""
+"""Measure velocities by several readings, so that no single reading decides."""
 
 from __future__ import annotations
 

@@ -123,13 +123,13 @@ class _Way:
 
 
 def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
-    """Return the axes that are moved one by one: at quick only the first."""
+    """Return the axes that are moved one by one: at quick effort only the first."""
     axes = list(mapped.motion.state.axes)
     return axes[:1] if effort.name == "quick" else axes
 
 
 def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
-    """Set out to the farther end of an axis, from the other one if need be; return when a share of the move is done."""
+    """Move to the farther end of an axis, first to the other end if needed; return once a share of the move is done."""
     if not mapped.rests:
         mapped.saw_rest(mapped.watch(mapped.clock.now() + STAYS_S))
     axes = mapped.motion.state.axes
@@ -206,7 +206,7 @@ def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 
 def need_positions(mapped: MappedDevice) -> None:
-    """Check that a move names its end: where moves are relative, nobody knows where several of them end.
+    """Check that a move names its end: the end of several relative moves is unknown.
 
     Raises:
         NotDeclaredError: it does not.

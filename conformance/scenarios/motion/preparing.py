@@ -1,4 +1,4 @@
-"""What a device wants before it moves, and after: a lease that is kept, and commands such as enable and home."""
+"""What a device needs before and after motion: a lease that is renewed, and commands such as enable and home."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Preparation:
         self._is_silent = False
 
     def lost(self, exchange: Exchange) -> bool:
-        """Return whether a response says that the lease is no more, which a silent client cannot have renewed."""
+        """Return whether a response shows that the lease has ended, so that a silent client cannot have renewed it."""
         lease = self._motion.lease
         wants = exchange.response.status in WANTS_LEASE and not self._busy
         if not (lease and wants and self._clock.now() > self._kept_s + lease.every_s):
@@ -93,7 +93,7 @@ class Preparation:
         return Outgoing(made.method, made.target, (*others, (lease.header, self.lease)), made.body)
 
     def end(self) -> None:
-        """Send what comes last, and release the lease.
+        """Send the last commands, and release the lease.
 
         Raises:
             NotPossibleError: the device refuses it.
@@ -114,7 +114,7 @@ class Preparation:
             self._is_ready = not self._motion.before
 
     def _draft_end(self) -> None:
-        """Draft what ends the use of the device, for whoever sends it if this process is killed."""
+        """Draft the requests that end the use of the device, for the guard process to send if this one is killed."""
         lease = self._motion.lease
         if not lease or self.lease:
             for step in self._motion.after:

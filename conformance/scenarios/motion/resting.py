@@ -32,7 +32,7 @@ def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
 
 
 def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
-    """Return a measured velocity that is not zero in some readings in a row; empty if there is none."""
+    """Return a measured velocity that is not zero in several readings in a row; empty if there is none."""
     seen = [one.speeds for one in readings if one.speeds]
     for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
         for name in window[0]:

@@ -113,7 +113,7 @@ class Room:
         return 0.0 if share < 1 and slow else share
 
     def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
-        """Learn from the readings of a drive how fast one velocity changes each axis; of several nobody knows."""
+        """Learn from a drive how fast one velocity changes each axis; several velocities cannot be told apart."""
         driven = [(name, speed) for name, speed in speeds.items() if speed]
         if len(driven) != 1:
             return
@@ -129,7 +129,7 @@ class Room:
                     self._rates[name][axis] = min(least, rate), max(greatest, rate)
 
     def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
-        """Learn from readings at a steady velocity which way it takes the device until another one is commanded."""
+        """Learn from readings at a steady velocity which way it takes the device until the next command."""
         driven = {name: speed for name, speed in speeds.items() if speed}
         seen = [one for one in readings if one.values]
         lapse_s = seen[-1].sent - seen[0].sent if seen else 0.0

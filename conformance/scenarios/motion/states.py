@@ -1,4 +1,4 @@
-"""Scenarios on what a device tells by other operations, and on what has states in place of positions."""
+"""Scenarios on what a device shows by other operations, and on switches with states in place of positions."""
 
 from __future__ import annotations
 

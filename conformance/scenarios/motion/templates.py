@@ -16,7 +16,7 @@ _ABOUT: Final[dict[Angle, str]] = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 class NoValueError(LookupError):
-    """Raised when a template names something that is not known; the message says what."""
+    """Raised when a template names an unknown value; the message says which."""
 
 
 def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:

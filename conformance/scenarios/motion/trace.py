@@ -1,4 +1,4 @@
-"""What was recorded of a device that moves by its map: readings, commands and what was attempted at rest.
+"""Records of a device that moves by its map: readings, commands and attempts at rest.
 
 Times are s of the run's monotonic clock; positions are in the units of the map's axes.
 """
@@ -122,7 +122,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Drive:
-    """A velocity, commanded again and again, and what came after it.
+    """A velocity that is commanded repeatedly, and the readings after it.
 
     Attributes:
         what: as a noun phrase.
@@ -175,7 +175,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Told:
-    """What several operations tell of one position, or of one velocity.
+    """What several operations show of one position, or of one velocity.
 
     Attributes:
         when: at rest, or what it drives at.

@@ -84,7 +84,7 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
 
 
 def _by(way: Way, speeds: Position) -> _By:
-    """Return the ways in which velocities are commanded in turn, so that the last commands at least a part of them."""
+    """Return the ways of commanding velocities, ordered so that the last one commands at least a part of them."""
     return (way,) if {name for name, speed in speeds.items() if speed} <= way.axes else (None, way)
 
 
@@ -222,7 +222,7 @@ def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]
 
 
 def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) -> Iterator[float]:
-    """Yield the velocities other than 0, first the one that leads away from the nearer end of the axis."""
+    """Yield the velocities other than 0, first the one away from the nearer end of the axis."""
     least, greatest = limits
     ahead = True
     if of:
@@ -251,7 +251,7 @@ class _Part:
 
 
 def _in_a_row(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[Drive]:
-    """Drive at velocities one after the other, and end the last by velocity 0; try again what a slow link spoilt."""
+    """Drive at velocities one after the other, and end the last by velocity 0; repeat what a slow link spoilt."""
     left = list(parts)
     for _ in range(TRIES):
         again: list[_Part] = []
@@ -266,7 +266,7 @@ def _in_a_row(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[Drive]:
 
 
 def _at_each(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[tuple[_Part, Drive, bool]]:
-    """Yield each part with its drive, and whether there was room for the whole of it.
+    """Yield each part with its drive, and whether the room sufficed for all of it.
 
     A velocity turns into the next one while the limits leave room for both.
     """
@@ -466,7 +466,7 @@ def _kept_up(
 
 
 def _ended(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
-    """End a drive by velocity 0; return it with what came after."""
+    """End a drive by velocity 0; return it with the readings after that."""
     end = mapped.drive({}, way=by[0] if by else None, integers=True)
     return _watched(mapped, replace(drive, end=end), [], end.answered + mapped.drives.settle_s)
 
@@ -474,7 +474,7 @@ def _ended(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
 def _watched(
     mapped: MappedDevice, drive: Drive, after: list[Reading], rests_at: float, *, brief_from: float | None = None
 ) -> Drive:
-    """Watch a device that must rest from some time on, s of the clock; return the drive with what came after.
+    """Watch a device that must rest from a time on, s of the clock; return the drive with the readings after it.
 
     Args:
         mapped: the device.

@@ -73,7 +73,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal, and what came of it at both ends.
+    """A goal, and its course at both ends.
 
     Attributes:
         operation: the operation.

@@ -115,7 +115,7 @@ def value_at(message: Any, pointer: str, missing: Any = None) -> Any:
 
 
 def put_at(message: Any, pointer: str, value: Any) -> Any:
-    """Return a message with a value at a JSON pointer; objects that lead there are made, and arrays filled up."""
+    """Return a message with a value at a JSON pointer; missing objects are made, and arrays filled up."""
     step, _, rest = pointer[1:].partition("/")
     if not pointer:
         return value

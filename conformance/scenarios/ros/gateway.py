@@ -78,7 +78,7 @@ class Gateway:
         return self._robot
 
     def _await_others(self, robot: Robot) -> None:
-        """Wait until the node finds another one; without any, a gateway would be blamed for what it never got."""
+        """Wait until the node finds another one; otherwise a gateway would be blamed for messages that never left."""
         until = WALL_CLOCK.now() + _DISCOVERY_S
         while not robot.tell("graph")["nodes"]:
             if WALL_CLOCK.now() > until:

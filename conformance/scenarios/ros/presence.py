@@ -1,4 +1,4 @@
-"""Scenarios on what comes and goes: publishers that are not there, fall silent, are killed and come back; the graph.
+"""Scenarios on publishers that are absent, fall silent, are killed and come back; and on the graph.
 
 Times are s of the monotonic clock, which all processes of a machine share.
 """
@@ -35,7 +35,7 @@ _READS: Final = {"quick": 20, "standard": 40, "deep": 200}
 
 @dataclass(frozen=True)
 class Absence:
-    """What an operation returned when there was no message, or none that is young enough.
+    """An operation's response without a message, or with none that is young enough.
 
     Attributes:
         body: its map.
@@ -69,7 +69,7 @@ class Presence:
 
 @dataclass(frozen=True)
 class Publishers:
-    """What was read while publishers fell silent, were killed and came back."""
+    """The reads while publishers fell silent, were killed and came back."""
 
     absences: tuple[Absence, ...]
     presences: tuple[Presence, ...]
@@ -101,7 +101,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
 # Late, as a killed publisher is on the graph until its lease is over, and a gateway may count it.
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def publishers_end(gateway: Gateway) -> Publishers:
-    """Publish on all topics at once, fall silent, publish again, leave, come back, and be killed, and begin anew."""
+    """Publish on all topics at once, fall silent, publish again, leave, come back, be killed, and begin anew."""
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
@@ -211,7 +211,7 @@ class _Topics:
 
 @dataclass(frozen=True)
 class Listed:
-    """What a list said of one name.
+    """A list's entry for one name.
 
     Attributes:
         body: its map.

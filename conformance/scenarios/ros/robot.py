@@ -1,4 +1,4 @@
-"""The robot's end of a gateway: a ROS node in a process of its own, which does as told (ros_probe/player.py)."""
+"""The robot's end of a gateway: a ROS node in a process of its own, which follows commands (ros_probe/player.py)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NS: Final = 1_000_000_000
 
 @dataclass(frozen=True)
 class Heard:
-    """What came to the robot.
+    """What the robot received.
 
     Attributes:
         at: when, s of the monotonic clock.
@@ -38,7 +38,7 @@ class Heard:
 
 @dataclass(frozen=True)
 class Published:
-    """What came of publishing.
+    """The outcome of publishing.
 
     Attributes:
         at: when the first message was handed to ROS, s of the monotonic clock.
@@ -85,7 +85,7 @@ class Robot(RosProcess):
         return Published(sent[0] / _NS if sent else time.monotonic(), not said["best_effort"])
 
     def heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
-        """Return what came to a topic, service or action since the last call; wait until so much has come.
+        """Return what a topic, service or action received since the last call; wait until there is enough.
 
         Raises:
             ProbeError: see tell().

@@ -102,11 +102,11 @@ class Maker:
         yield self.usual()
 
     def usual(self) -> Sample:
-        """Return a message of usual values, which is another one each time."""
+        """Return a message of usual values, a different one each time."""
         return Sample("a usual message", Kind.USUAL, self._message(None))
 
     def gentle(self) -> Sample:
-        """Return a message of small values, by which a real robot hardly moves; another one each time."""
+        """Return a message of small values, by which a real robot hardly moves; a different one each time."""
         share = next(self._gentle) % _GENTLY + 1
 
         def small(shape: Shape, _: int | None) -> Any:
@@ -144,7 +144,7 @@ class Maker:
         return wanted if shape.most is None else min(shape.most, 64 if full else wanted)
 
     def _value(self, shape: Shape, turn: int | None) -> Any:
-        """Return a value for what is no array: in each turn, and for each field, another one of the extreme ones."""
+        """Return a value that is no array: for each turn and field a different extreme value."""
         if shape.is_text:
             return self._text(turn, shape.longest)
         if turn is None:
@@ -209,7 +209,7 @@ class Maker:
         return self._with_one(dict.fromkeys((*FLOATS, *INTEGERS, "boolean"), 0)) is not None
 
     def _with_one(self, values: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Return a message of usual values, but for the first of some types; None: it has none of them."""
+        """Return a message of usual values with an extreme one in the first field of some types, or None."""
         seen: list[str] = []
 
         def leaf(shape: Shape, turn: int | None) -> Any:

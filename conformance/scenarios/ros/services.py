@@ -1,4 +1,4 @@
-"""Scenarios on services: what a gateway makes of servers that respond, respond late or never, go and come back.
+"""Scenarios on services: a gateway whose servers respond, respond late or never, leave and come back.
 
 Times are s of the monotonic clock, which all processes of a machine share.
 """
@@ -77,7 +77,7 @@ class Beside:
 
 @dataclass(frozen=True)
 class Called:
-    """A call of a service, and what came of it at both ends.
+    """A call of a service, and its course at both ends.
 
     Attributes:
         operation: the operation.

@@ -49,7 +49,7 @@ _SAMPLES: Final = {"quick": 8, "standard": 16, "deep": 40}
 
 @dataclass(frozen=True)
 class Shown:
-    """A message on a topic, and what an operation returned of it.
+    """A message on a topic, and an operation's response to it.
 
     Attributes:
         operation: the operation.
@@ -201,7 +201,7 @@ class Sent:
 
 @dataclass(frozen=True)
 class Burst:
-    """Messages that an operation was sent one after another or at once, and all that came of them.
+    """Messages that an operation was sent in a row or at once, and all messages that arrived.
 
     Attributes:
         operation: the operation.
@@ -220,13 +220,13 @@ class Burst:
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
 def topic_writes(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
-    """Send messages of extreme values to the gateway one at a time, and hear what it publishes."""
+    """Send messages of extreme values to the gateway one at a time, and receive what it publishes."""
     return tuple(_bursts(gateway, lambda writer: writer.one_by_one(effort)))
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
 def topic_bursts(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
-    """Send messages in a row from one client, and at once from several, and hear what the gateway publishes."""
+    """Send messages in a row from one client, and at once from several, and receive what the gateway publishes."""
     times = {"quick": 1, "standard": 3}.get(effort.name, 8)
     many = gateway.plays and effort.name != "quick"
     return tuple(_bursts(gateway, lambda writer: writer.in_bursts(times, many=many)))
@@ -283,11 +283,11 @@ class _Writer:
             robot.tell("forget", name=topic)
 
     def usual(self) -> Sample:
-        """Return a message that differs from all others; a real robot hardly moves by it."""
+        """Return a message that differs from all others, by which a real robot hardly moves."""
         return self.maker.usual() if self.gateway.plays else self.maker.gentle()
 
     def end(self) -> None:
-        """Leave a real robot with the message of defaults, by which one that is driven rests."""
+        """Leave a real robot with the message of default values, which stops one that is driven."""
         if not self.gateway.plays:
             self.send(Sample("the message with its defaults", Kind.DEFAULT, {}))
 
@@ -308,12 +308,12 @@ class _Writer:
         return self.sent_as(what, value, self.gateway.send(made, self.body.response_s))
 
     def sent_as(self, what: str, value: str, exchange: Exchange, client: int = 0) -> Sent:
-        """Return a request that was sent, with what came of it."""
+        """Return a sent request with its outcome."""
         accepted = succeeded(exchange, self.body)
         return Sent(self.call, self.body.publishes, what, value, exchange, accepted, client)
 
     def hear(self, count: int) -> tuple[Heard, ...]:
-        """Return what comes of so many accepted requests, and a moment after that."""
+        """Return the messages of this many accepted requests, and those of a moment after."""
         robot, topic = self.gateway.robot, self.body.publishes
         heard = robot.heard(topic, count, self.body.within_s)
         while len(heard) < count and (more := robot.heard(topic, 1, self.body.within_s)):
@@ -321,7 +321,7 @@ class _Writer:
         return (*heard, *robot.heard(topic, 1, _MORE_S))
 
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
-        """Yield each message with what came of it."""
+        """Yield each message with its outcome."""
         if self.gateway.plays:
             samples = list(self.maker.samples(_SAMPLES[effort.name], large=effort.name != "quick"))
         else:
@@ -337,7 +337,7 @@ class _Writer:
         yield Burst(self.call, "nothing more", (), tuple(late), self.reliable)
 
     def hear_of(self, one: Sent) -> Iterator[Heard]:
-        """Yield what comes until the message of a request, or until it surely comes no more."""
+        """Yield the messages until that of a request, or until it surely comes no more."""
         if not one.accepted:
             return
         wanted, clock = json.loads(one.value), WALL_CLOCK
@@ -360,7 +360,7 @@ class _Writer:
             yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
 
     def burst(self, clients: int, each: int, how: str) -> Burst:
-        """Return what came of messages of clients that send at the same moment, each one after another."""
+        """Return the outcome of messages of clients that send at the same moment, each one after another."""
         samples = [[self.usual() for _ in range(each)] for _ in range(clients)]
         made = [[(one, json.dumps(self.value(one)), self.request(one)) for one in own] for own in samples]
         requests = [[request for _, _, request in own] for own in made]
@@ -374,7 +374,7 @@ class _Writer:
         return Burst(self.call, how, sent, heard, self.reliable)
 
     def malformed(self) -> Iterator[Burst]:
-        """Yield requests that a gateway is likely to refuse, and what came of them."""
+        """Yield requests that a gateway is likely to refuse, with their outcome."""
         right = self.request(self.usual())
         wrong = {"no body": b""}
         is_wrong = {"half of the body": right.body[: len(right.body) // 2]}
@@ -390,7 +390,7 @@ class _Writer:
             yield from self.malformed_as(what, replace(right, body=body), is_wrong=what in is_wrong)
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
-        """Yield a request that is none, and what came of it; what the gateway publishes by itself, does not."""
+        """Yield an invalid request with its outcome, apart from what the gateway publishes by itself."""
         for _ in range(2):
             one = replace(self.sent(what, "", made), is_wrong=is_wrong)
             heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)

@@ -1,4 +1,4 @@
-"""Scenarios beside a real robot: what a gateway returns of topics that the suite hears as well."""
+"""Scenarios beside a real robot: compare a gateway's responses on topics with what the suite hears."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _COMES_S: Final = 0.5
 
 @dataclass(frozen=True)
 class Look:
-    """One read: when it was requested, and what came."""
+    """One read: when it was requested, and what it returned."""
 
     sent: float
     exchange: Exchange
@@ -73,7 +73,7 @@ def topic_watches(gateway: Gateway, effort: Effort) -> tuple[Watched, ...]:
 
 
 def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched | None:
-    """Return what is read and heard of a topic; None: nothing comes on it."""
+    """Return the reads and messages of a topic, or None if it is silent."""
     robot, clock = gateway.robot, WALL_CLOCK
     definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.within_s
     best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]

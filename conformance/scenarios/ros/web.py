@@ -50,7 +50,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Document:
-    """What a body says.
+    """The value in a body.
 
     Attributes:
         value: JSON with its numbers as they are written, or the first element in a SOAP Body; None: it is neither.
@@ -62,7 +62,7 @@ class Document:
 
 
 def succeeded(attempt: Attempt, body: Body) -> bool:
-    """Return whether a request was answered 2xx, and not by what the map says is a failure."""
+    """Return whether a response is 2xx, and reports no failure by the map."""
     if not isinstance(attempt, Exchange) or not attempt.response.ok:
         return False
     failure = body.failure
@@ -70,13 +70,13 @@ def succeeded(attempt: Attempt, body: Body) -> bool:
 
 
 def gave_up(attempt: Attempt | None, body: Body) -> bool:
-    """Return whether a request failed after a while, as one does whose deadline passes on a busy machine."""
+    """Return whether a request failed after a while, because its deadline passed on a busy machine."""
     is_late = isinstance(attempt, Exchange) and attempt.response.elapsed_ms > _SOON_MS
     return attempt is not None and is_late and not succeeded(attempt, body)
 
 
 def document_of(octets: bytes) -> Document:
-    """Return what a body says. Never raises."""
+    """Return the value in a body. Never raises."""
     if octets.lstrip()[:1] == b"<":
         try:
             root = parse(octets)
@@ -102,7 +102,7 @@ def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosM
 
 
 def _merged(one: Any, other: Any) -> Any:
-    """Return an object with the members of two, those of the second first; of what is no object the second."""
+    """Return an object with the members of two, where the second has precedence; the second if one is no object."""
     if isinstance(one, dict) and isinstance(other, dict) and one:
         return {name: _merged(one.get(name), other.get(name, one.get(name))) for name in (*one, *other)}
     return other
@@ -249,7 +249,7 @@ def _same(one: float, other: float) -> bool:
 
 
 def equal(own: Any, other: Any) -> bool:
-    """Return whether a ROS message has all values of another one, which may lack fields; NaN is NaN."""
+    """Return whether a ROS message has all values of another one, which may lack fields; NaN equals NaN."""
     if isinstance(other, dict):
         return isinstance(own, dict) and all(name in own and equal(own[name], one) for name, one in other.items())
     if isinstance(other, list):
@@ -260,7 +260,7 @@ def equal(own: Any, other: Any) -> bool:
 
 
 def changed(own: Any, other: Any, at: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield where a ROS message is not another one: the field, its value here and there."""
+    """Yield the differences between two ROS messages: field, own value, other value."""
     if isinstance(other, dict) and isinstance(own, dict) and "b64" not in other:
         for name, one in other.items():
             yield from changed(own.get(name), one, f"{at}/{name}")

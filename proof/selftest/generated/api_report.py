@@ -14,7 +14,7 @@ _ALARMS = 5
 def tools(
     results: Iterable[GeneratedResult], blamed: Mapping[str, str], compared: Iterable[Comparison]
 ) -> list[tuple[str, Rate, list[str]]]:
-    """Return for each tool its name, its kill rate on the same mutants, and what it says of the unchanged device.
+    """Return each tool's name, its kill rate on the same mutants, and its findings on the unchanged device.
 
     Args:
         results: ours of each mutant; those that altered nothing do not count.

@@ -53,7 +53,7 @@ def _no_constant(name: str) -> Any:
 
 
 def undeclared_status(operation: Operation, answer: Response) -> bool:
-    """Return whether a description that declares statuses does not declare this one, which is no server's own."""
+    """Return whether the description declares statuses but not this one, which no web server sends by itself."""
     return (
         bool(operation.responses) and operation.response_key(answer.status) is None and answer.status not in ANY_SERVER
     )
@@ -78,7 +78,7 @@ def schema_of(operation: Operation, answer: Response) -> Schema | None:
 
 
 def broken_body(operation: Operation, answer: Response) -> bool:
-    """Return whether a body that says it is JSON is none (RFC 8259 2, 8.1), or is invalid by its declared schema."""
+    """Return whether a body that claims to be JSON is malformed (RFC 8259 2, 8.1), or invalid by its schema."""
     if answer.method == "HEAD" or not is_json(answer.media_type):
         return False
     is_read, value = _json(answer.body)

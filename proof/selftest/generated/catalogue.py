@@ -133,7 +133,7 @@ def open_places(contract: Contract) -> tuple[OpenPlace, ...]:
 
 
 def open_place(contract: Contract, change: GeneratedMutant) -> OpenPlace | None:
-    """Return the pattern that says why a change breaks no clause; None for a change that breaks one."""
+    """Return the pattern that says why a change breaks no client; None if it breaks one."""
     exchange = change.exchange
     covering = (one for one in open_places(contract) if one.covers(change.name, exchange.side, exchange.method))
     return next(covering, None)

@@ -129,7 +129,7 @@ def _field_alter(operator: Any, place: Place, schema: Any, code: int) -> Alter:
 
 
 def _kinds(operation: Operation) -> dict[str, range]:
-    """Return the kinds of responses: what has no input, and declares no error, has none to alter."""
+    """Return the kinds of responses; an operation without inputs and declared errors has no errors to alter."""
     errs = operation.parameters or operation.bodies or any(status.startswith("4") for status in operation.responses)
     return _KINDS if errs else {"answer": _SUCCESS}
 
@@ -167,7 +167,7 @@ def _of_types(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMut
 
 
 def _of_bodies(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants whose body as a whole is no JSON, or none that is declared."""
+    """Yield mutants whose whole body is no JSON, or an undeclared value."""
     for kind, within in _kinds(operation).items():
         for name, edit in {**BODIES, **_MORE}.items():
 

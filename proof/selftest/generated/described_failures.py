@@ -101,7 +101,7 @@ def showing_insides(exchange: Exchange) -> Callable[[Tally], Change]:
 
 
 def edited(where: Callable[[Request], bool], edit: Edit) -> Callable[[Tally], Change]:
-    """Return a change that edits responses to some requests; ``edit`` returns None for one that it leaves."""
+    """Return a change that edits responses to some requests; ``edit`` returns None to leave one as it is."""
 
     def make(tally: Tally) -> Change:
         def change(request: Request, forward: Forward) -> Response:

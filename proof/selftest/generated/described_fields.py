@@ -27,7 +27,7 @@ class FieldOperator:
 
 
 def _put(value_of: Callable[[Schema, Any], Any]) -> Callable[[Place, Schema], Edit]:
-    """Return an edit that puts a value made from the schema and the value that is there; None alters nothing."""
+    """Return an edit that puts in a value made from the schema and the present value, or None to alter nothing."""
 
     def make(_place: Place, schema: Schema) -> Edit:
         flatter = flat(schema)

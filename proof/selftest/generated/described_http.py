@@ -246,7 +246,7 @@ def _allows(method: str) -> dict[str, tuple[str, Callable[[Response], object]]]:
 
 
 def of_resource(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants whose resource says one thing by one request, and another by the next."""
+    """Yield mutants whose resource shows one thing in one response, and another in the next."""
 
     def at(*methods: str) -> Callable[[Request], bool]:
         return lambda request: re.fullmatch(exchange.path, request.path) is not None and request.method in methods

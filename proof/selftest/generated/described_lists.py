@@ -22,7 +22,7 @@ _Differs = Callable[[Page, Page], bool]
 
 
 def of_lists(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants of an operation's list, which break what its parameters and totals say."""
+    """Yield mutants of an operation's list that ignore its parameters or miscount its totals."""
     listing = listing_of(operation)
     if listing is None:
         return

@@ -222,7 +222,7 @@ def _with_current(request: Request, forward: Forward) -> Request:
 
 
 def _knowing(status: int, *, is_told: bool = False) -> _Act:
-    """Return an act that performs what is refused with a status; ``is_told``: and says so."""
+    """Return an act that performs a request which is refused with a status; ``is_told``: and responds with success."""
 
     def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
         response = forward(request)
@@ -252,7 +252,7 @@ def _stale_copy(request: Request, forward: Forward, past: _Past) -> tuple[Respon
 
 
 def _resent(status: int, name: str, value: str, *, is_told: bool = False) -> _Act:
-    """Return an act that performs what is refused with a status by another header field; ``is_told``: and says so."""
+    """Return an act that performs a request refused for a header field; ``is_told``: and responds with success."""
 
     def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
         response, altered = forward(request), request.copy()

@@ -39,7 +39,7 @@ _LOOSE: dict[str, tuple[str, ...]] = {
 
 
 def lenient(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants that do not look at one rule of an input: what breaks that rule alone is taken."""
+    """Yield mutants that ignore one rule of an input: values that break only that rule are accepted."""
     for item in inputs_of(operation):
         good = sample(item.schema)
         for operator, keys in _LOOSE.items():
@@ -134,7 +134,7 @@ def _refusal(operation: Operation) -> Answer:
 
 
 def _instead(status: int, media_type: str, body: bytes) -> Answer:
-    """Return what replaces status and body of a response, and keeps its other fields, which are right."""
+    """Return an edit that replaces status and body of a response, and keeps its other fields."""
 
     def answer(response: Response) -> Response:
         altered = response.copy()
@@ -198,7 +198,7 @@ def _answering(
 
 
 def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants that fail with 500 at a kind of value in one input, or at what is missing."""
+    """Yield mutants that fail with 500 for a kind of value in one input, or for a missing one."""
     kinds: dict[str, Callable[[Any], bool]] = {
         "crash-empty": lambda value: value == "",
         "crash-letters": lambda value: isinstance(value, str) and not value.isascii(),

@@ -1,4 +1,4 @@
-"""Mutants of the items of a described device: a request to one reaches another, and a refused one is carried out."""
+"""Mutants of items of a described device: a request to one item reaches another, or a refused one is performed."""
 
 import re
 from collections.abc import Callable, Iterator

@@ -141,7 +141,7 @@ class _GoalOfTwo:
 
 
 class _OneServed:
-    """A change that serves one read at a time; others meanwhile are refused as too many."""
+    """A change that serves one read at a time; others meanwhile get 429."""
 
     def __init__(self) -> None:
         self._serving = threading.Lock()

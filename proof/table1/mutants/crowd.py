@@ -23,7 +23,7 @@ class Crowd:
 
     @contextlib.contextmanager
     def joined(self) -> Iterator[Callable[[], bool]]:
-        """Count the caller's request; yield a function that returns whether another one was there meanwhile."""
+        """Count the caller's request; yield a function that returns whether another one ran concurrently."""
         met = threading.Event()
         with self._lock:
             for other in self._inside:

@@ -61,7 +61,7 @@ def _written(pattern: str) -> Callable[[Request], bool]:
 
 
 class OnlyOnce:
-    """A change that answers a delivery itself that came before; if ``keyed``, only one with an Idempotency-Key."""
+    """A change that answers a repeated delivery itself; if ``keyed``, only one with an Idempotency-Key."""
 
     def __init__(self, response: Callable[[Request], Response], *, keyed: bool = False) -> None:
         self._answer, self._keyed = response, keyed

@@ -22,7 +22,7 @@ _SILENT_S, _LOOK_S = 0.12, 0.04
 
 
 class Remembering:
-    """A change that remembers the last accepted velocity, counts commands, and knows when the last request came."""
+    """A change that remembers the last accepted velocity, the number of commands, and the last request's time."""
 
     def __init__(self) -> None:
         self.last: Any = None

@@ -100,7 +100,7 @@ def _in_chunks(response: Response) -> None:
 
 
 def _and_rubbish(response: Response) -> None:
-    """Answer what follows, read from the wrong place, as a request that is none."""
+    """Answer the bytes that follow, read from the wrong place, as an invalid request."""
     response.raw = response.octets() + b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n"
 
 

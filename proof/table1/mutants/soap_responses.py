@@ -1,4 +1,4 @@
-"""SOAP messages that mutants respond with, and mutants whose SOAP operations are wrong or not there."""
+"""SOAP responses of mutants, and mutants whose SOAP operations are wrong or missing."""
 
 import re
 from collections.abc import Callable

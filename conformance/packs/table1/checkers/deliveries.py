@@ -47,7 +47,7 @@ class _Accepted:
 
     @property
     def entry(self) -> tuple[Delivery, str]:
-        """Return what an entry of the list shows of it."""
+        """Return the facts in an entry of the list."""
         return self.delivery, self.interface
 
     def age_s(self, now_s: float) -> float:
@@ -146,7 +146,7 @@ class Deliveries:
                 yield from self._judge(one, there=False)
 
     def _judge_kept(self, exchange: Exchange, entries: Sequence[str], requirement: str) -> Case:
-        """Judge whether a list has each entry of the one before, unchanged; a full one may lack the oldest."""
+        """Judge whether a list still has every entry of the one before, unchanged; a full list may drop the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
         before = next((one for at, one in reversed(self._lists) if at < asked_s), ())
@@ -166,7 +166,7 @@ class Deliveries:
         return case(requirement, not wrong, exchange, expected, found=found and f"none with {found}", cause="changed")
 
     def _take(self, one: _Accepted, there: Counter[tuple[Delivery, str]]) -> bool:
-        """Return whether there is an entry for a delivery that is no other's; it is then this one's."""
+        """Return whether a free entry matches a delivery, and assign it to that delivery."""
         if there[one.entry] < 1:
             return False
         self._new[one.entry] -= 1
@@ -187,7 +187,7 @@ class Deliveries:
 
 @lru_cache(maxsize=8)
 def _listed(media_type: str, body: bytes) -> tuple[Any, tuple[str, ...]]:
-    """Return a list, numbers as doubles, and its entries as text; None where it is none, which others judge."""
+    """Return a list with numbers as doubles, and its entries as text; None if it is no list, which others judge."""
     try:
         value = read(media_type, body, LIST.schema)
     except UnreadableError:

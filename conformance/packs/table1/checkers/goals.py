@@ -47,7 +47,7 @@ class Goals:
         self._living: set[str] = set()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
-        """Take one exchange of the run; only those about the goal count."""
+        """Process one exchange of the run, if it is about the goal."""
         if not isinstance(attempt, Exchange) or attempt.request.url != self._url:
             return
         exchange = attempt

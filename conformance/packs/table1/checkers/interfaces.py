@@ -29,7 +29,7 @@ _HEAD: Final = "http/head"
 
 @dataclass
 class _State:
-    """What was read of one state.
+    """The readings of one state so far.
 
     Attributes:
         name: of the state.
@@ -50,7 +50,7 @@ class _State:
 
 
 class AcrossInterfaces:
-    """Compares what the interfaces and formats show of one state, in all exchanges of one run.
+    """Compares one state over interfaces and formats, in all exchanges of a run.
 
     Args:
         url: returns the URL of a path.
@@ -107,7 +107,7 @@ class AcrossInterfaces:
             yield from self._read(state, exchange)
 
     def forget(self, *, deletes: bool) -> None:  # noqa: ARG002 - see CheckerListener
-        """Forget what was read before a request that was written by hand: what it did is not known."""
+        """Forget readings before a raw request, whose effect is unknown."""
         self._acted_by_hand = True
 
     def _forget(self, at_s: float) -> None:

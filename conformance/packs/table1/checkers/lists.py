@@ -27,7 +27,7 @@ _MOST: Final = 20
 
 @dataclass
 class _Seen:
-    """What was read of one list.
+    """The readings of one list so far.
 
     Attributes:
         path, shape, full, requirement: as above.
@@ -64,7 +64,7 @@ class Lists:
         self._by_url = {url(seen.path): seen for seen in self._seen.values()}
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
-        """Take one exchange of the run; only those with a list count."""
+        """Process one exchange of the run, if it contains a list."""
         if not isinstance(attempt, Exchange):
             return
         request, response = attempt.request, attempt.response

@@ -212,7 +212,7 @@ def _asked_over_soap(body: bytes) -> dict[str, str]:
 
 
 def _once(named: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return parameters by name; none where one is there twice, as nobody knows which counts."""
+    """Return parameters by name; empty if one occurs twice, as it is unclear which one counts."""
     pairs = list(named)
     found = dict(pairs)
     return found if len(found) == len(pairs) else {}

@@ -61,7 +61,7 @@ class OneSample:
         self._told: deque[tuple[dict[str, float], Exchange]] = deque(maxlen=_TOLD)
 
     def odometry(self, stamp: Stamp, message: Any, exchange: Exchange) -> Iterator[Case]:
-        """Judge one reading; readings come in the order of their requests."""
+        """Judge one reading; call it in the order of the requests."""
         if stamp != self._stamp:
             self._stamp = stamp
             self._told.clear()
@@ -211,6 +211,6 @@ class BesideOdometry(Generic[_Value]):
 
 
 def _between(value: Velocity | Place, around: Sequence[Velocity | Place]) -> Velocity | Place:
-    """Return the value nearest to the given one whose components lie within the range of the others."""
+    """Return the value nearest to the given one whose components lie in the range of the others."""
     ranges = [(min(some), max(some)) for some in zip(*around, strict=True)]
     return type(value)(*(max(low, min(one, high)) for one, (low, high) in zip(value, ranges, strict=True)))

@@ -112,7 +112,7 @@ class State:
         yield from self._within_limits(self._fast[path], value, exchange)
 
     def _single(self, path: str, value: Any, exchange: Exchange) -> Iterator[Case]:
-        """Compare single readings that came one after another; skip those read by several clients at once."""
+        """Compare successive single readings; skip those of concurrent clients."""
         received = exchange.response.received_s
         if received - exchange.response.elapsed_ms / 1000 < self._read_until:
             self._sample, self._beside = OneSample(self._limits), BesideOdometry(self._limits, self._beside.out)

@@ -1,4 +1,4 @@
-"""What a robot can drive, by its statement: which components, how fast, and how narrow a circle."""
+"""Velocities that a robot can drive, by its statement: components, speeds, and the narrowest circle."""
 
 import math
 from collections.abc import Sequence
@@ -62,7 +62,7 @@ def handiest(motion: Motion) -> int:
 
 
 def _within(limits: Limits, motion: Motion, component: int, value: float) -> float:
-    """Return a component within its range; in the other direction where the robot has only that one."""
+    """Return a component clipped to its range, or in the other direction if the robot has only that one."""
     if not actuated(motion, component):
         return 0.0
     least, greatest = limits.range_of(component)

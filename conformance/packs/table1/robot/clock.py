@@ -59,7 +59,7 @@ class Clock:
 
     @property
     def rate(self) -> float | None:
-        """Return robot seconds per local second; None while there are too few readings.
+        """Return robot seconds per local second; None with too few readings.
 
         The rate is the median over all pairs of readings at least half of the span apart (Theil-Sen estimator), so that
         neither a slow response nor one correction of the robot's clock changes it.
@@ -70,7 +70,7 @@ class Clock:
 
     @property
     def fine_rate(self) -> float | None:
-        """Return the clock's rate within a second; None where there are too few readings.
+        """Return the clock's rate within a second; None with too few readings.
 
         The rate is the median over pairs of near readings. Pairs with the same stamp do not count: odometry may be
         published slowly. A robot that writes milliseconds into the nanoseconds field has the right rate over many

@@ -1,4 +1,4 @@
-"""Records of what several clients PUT at the same moment and of what the robot then showed, for rules to judge."""
+"""Records of concurrent PUTs by several clients and of the robot's state afterwards, for rules to judge."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class ConcurrentVelocities:
         return read if any(is_near(limits, read.velocity, one.velocity, _NEAR) for one in self.accepted) else None
 
     def missed(self, limits: Limits) -> Turn | None:
-        """Return the last GET that shows a wrong velocity while the robot had to drive an accepted one, or None.
+        """Return the last GET with a wrong velocity while an accepted one had to be driven, or None.
 
         A mixture (one client's linear part with another's angular part) counts at once. Any other velocity counts only
         on the last try, since the robot may have been delayed.

@@ -1,4 +1,4 @@
-"""What shows the deliveries that arrived: a ROS probe beside the robot, or the robot's own list."""
+"""Observers of arriving deliveries: a ROS probe beside the robot, or the robot's own list."""
 
 from typing import Any, Final, Protocol
 
@@ -31,7 +31,7 @@ class DeliveryObserver(Protocol):
     exact: bool
 
     def mark(self) -> None:
-        """Forget what was seen so far."""
+        """Forget the deliveries seen so far."""
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """Return what was seen since the mark or the last call, oldest first.
@@ -41,7 +41,7 @@ class DeliveryObserver(Protocol):
 
 
 class NoObserverError(Exception):
-    """Nothing shows which deliveries arrive; the message says why."""
+    """Raised when nothing can show arriving deliveries; the message says why."""
 
 
 class ListObserver:
@@ -78,7 +78,7 @@ class ListObserver:
         return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
 
     def _new(self, listed: list[Any]) -> list[Any]:
-        """Return the entries that the list had not before, newest first: those before the first old one."""
+        """Return the new entries of the list, newest first: those before the first old one."""
         now, old = [_identity(entry) for entry in listed], [_identity(entry) for entry in self._before]
         for count in range(len(now)):
             rest = now[count:]
@@ -115,7 +115,7 @@ class ProbeObserver:
         self._probe, self._connection, self._clock = probe, connection, clock
 
     def mark(self) -> None:
-        """Forget the messages that came so far."""
+        """Forget the messages received so far."""
         # A message of a request since the last collect() may still be on its way.
         if self._connection.acted_at > self._probe.heard_at:
             self._clock.sleep(self._connection.acted_at + QUIET_S - self._clock.now())

@@ -64,7 +64,7 @@ class DeliverySender:
         self.observer.mark()
 
     def trace(self) -> Deliveries:
-        """Return the record so far, of which the batches since the last call are to be judged."""
+        """Return the record so far; the batches since the last call are to be judged."""
         first, self._judged = self._judged, len(self.batches)
         return Deliveries(tuple(self.batches), self.observer.exact, first)
 
@@ -93,7 +93,7 @@ class DeliverySender:
         )
 
     def watch(self, seconds: float) -> None:
-        """Record the deliveries that arrive until so many seconds after the last batch; 0: that arrived so far."""
+        """Record arriving deliveries until this many seconds after the last batch; 0: those that have arrived."""
         left_s = self._collected + seconds - WALL_CLOCK.now()
         self.batches.append(Batch((), tuple(self.observer.collect(0, max(0.0, left_s)))))
 

@@ -120,7 +120,7 @@ class Drive:
         return hold_s is not None and self.look_s > _LOOK_SHARE * hold_s
 
     def hold(self, velocity: Velocity) -> Callable[[], bool]:
-        """Command a velocity; return what says whether it certainly has not ended since.
+        """Command a velocity; return a function that says whether it certainly still holds.
 
         If it has, the robot may have slowed down and sped up again between two reads.
         """
@@ -264,7 +264,7 @@ class Drive:
             self.look()
 
     def saw(self, shows: str, expected: str, observed: str = "", cause: str = "", *, holds: bool | None) -> None:
-        """Record what the last look shows about a requirement, as in Case; None: it came too late to tell."""
+        """Record the last look's evidence on a requirement, as in Case; None if it came too late to decide."""
         if holds is not None:
             self._saw(shows, Case(holds, self.trace.turns[-1].velocity_exchange, expected, observed, cause))
 

@@ -36,7 +36,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Turn:
-    """One look: a GET of each resource that shows the velocity, one after another, or of the velocity alone.
+    """One round of reads: a GET of each resource with the velocity, or of the velocity alone.
 
     Attributes:
         odometry: the odometry, read first; None where it cannot be read.

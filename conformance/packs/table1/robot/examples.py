@@ -79,7 +79,7 @@ class Examples:
         return {**value, "goal": {"target_pose": target}}
 
     def _near(self, api: RestInterface) -> Pose | None:
-        """Return a pose near the robot to which it has a plan; None where it has none."""
+        """Return a pose near the robot to which it has a plan, or None."""
         robot = Robot(api)
         here = robot.map_pose()
         for distance in _FAR_M if here is not None else ():

@@ -101,7 +101,7 @@ def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
 
 
 def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
-    """GET the active goal until it is one of those that were PUT, for at most the time the robot has to apply commands.
+    """GET the active goal until it is one of those that were PUT, at most for the settle time.
 
     Returns:
         The goal (None: the robot shows no goal), where it differs from those PUT, and the last exchange.
@@ -116,7 +116,7 @@ def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
 
 
 def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
-    """GET the active goal until there is none, for ``seconds`` or the time the robot has to apply commands."""
+    """GET the active goal until there is none, for ``seconds`` or the settle time."""
     patience = robot.patience(robot.settle_s if seconds is None else seconds)
     for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
         exchange = robot.get(GOAL_PATH)

@@ -82,7 +82,7 @@ class LetGo:
         }[self.by]
 
     def holds_by(self, limits: Limits, count: int) -> bool | None:
-        """Return whether the first ``count`` readings end with the velocity; None where they are too few to tell."""
+        """Return whether the first ``count`` readings end with the velocity; None if they are too few."""
         begin = max(0, count - _LOOKED_AT)
         if self.resumed is not None and count > self.resumed:
             # Samples from before the silence say nothing of what is behind it.
@@ -120,7 +120,7 @@ class LetGo:
         return first
 
     def stale_pose(self, limits: Limits) -> Turn | None:
-        """Return the first reading after a long pause if its pose is not the one that comes next."""
+        """Return the first reading after a long pause if its pose does not follow from the motion."""
         first, later = self._rested(limits) or (None, None)
         if first is None or later is None or first.odometry is None or later.odometry is None:
             return None

@@ -46,7 +46,7 @@ _SKIPPED_S: Final = 0.15
 
 
 class _Sum(NamedTuple):
-    """The integral of the velocity by one clock, up to one reading.
+    """The velocity's integral by one clock, up to one reading.
 
     Attributes:
         x, y: integrated position in the odometry frame, m; turn: integrated change of heading, rad.
@@ -177,7 +177,7 @@ def _longest_lapse(trace: Sequence[Odometry]) -> float:
 def way_and_turn(
     trace: Sequence[Odometry], measured: Sequence[Velocity], noise: Noise
 ) -> tuple[Case | None, Case | None]:
-    """Judge whether position and heading moved as the integrated velocity says, one case for each.
+    """Judge whether position and heading moved by the integral of the velocity, in one case each.
 
     Return None in place of a case where the robot did not drive, or turn, far enough to judge.
 

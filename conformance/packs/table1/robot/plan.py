@@ -99,7 +99,7 @@ def ask(
 
 
 def ask_over_soap(robot: Robot, subscribers: SoapService, goal: Pose) -> tuple[Plan | None, Exchange]:
-    """Request a plan from where the robot is over SOAP; return None where the response has none."""
+    """Request a plan from the robot's place over SOAP; return None if the response has none."""
     frame = robot.statement.motion.frame
     named = {} if frame == "map" else {"frame_id": frame}
     exchange = soap_services.ask(subscribers, "GetPlan", x=goal.x, y=goal.y, **named)

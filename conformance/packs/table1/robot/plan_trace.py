@@ -37,7 +37,7 @@ class PlansFromRobot:
 
 @dataclass(frozen=True)
 class DefaultPlan:
-    """A plan whose request says the same as another one: it leaves out the defaults, or writes numbers otherwise.
+    """A plan whose request equals another one's: it leaves out defaults, or writes numbers in another form.
 
     Attributes:
         goal: where the plan must end.

@@ -104,7 +104,7 @@ def is_refused(exchange: Exchange) -> bool:
 
 
 class RefusedRequests(Listener):
-    """Listens to all exchanges of one run, and keeps those requests that are refused, by operation and kind of fault.
+    """Listens to all exchanges of one run, and keeps the refused requests by operation and kind of fault.
 
     Args:
         api: the robot's REST interface.
@@ -165,7 +165,7 @@ class RefusedRequests(Listener):
 
 
 def send_known(robot: Robot, soap: SoapServices, refused: RefusedRequests) -> None:
-    """Send once what every robot refuses, so that there is something of each kind in a run of few checks, too."""
+    """Send requests that every robot refuses, so that a run of few checks has one of each kind, too."""
     if refused.has_known:
         return
     refused.has_known = True
@@ -182,7 +182,7 @@ def send_known(robot: Robot, soap: SoapServices, refused: RefusedRequests) -> No
 
 
 def _rank(rest: HttpClient, endpoint: str) -> int:
-    """Return the rank of an operation: those that move the robot or order something come first."""
+    """Return the rank of an operation: moving and ordering ones come first."""
     method, _, url = endpoint.partition(" ")
     moves = any(url.startswith(rest.url(path.rstrip("/"))) for path in (VELOCITY, LINEAR, GOAL_PATH, DELIVERIES))
     if method in SAFE_METHODS:
@@ -211,6 +211,6 @@ def _is_plain(request: Request) -> bool:
 
 
 def _kind_of(response: Response) -> str:
-    """Return the beginning of what a refusal says, without its values."""
+    """Return the beginning of a refusal's text, without values."""
     text = response.body[:_LONGEST].decode("utf-8", "replace")
     return _VALUES.sub("*", _DETAIL.split(text, maxsplit=1)[-1])[:_KIND]

@@ -223,7 +223,7 @@ class Robot:
         return self.put(LINEAR, velocity.linear)
 
     def goal(self) -> tuple[Any, Exchange]:
-        """GET the active goal as JSON; None where there is none."""
+        """GET the active goal as JSON, or None."""
         exchange = self.get(GOAL_PATH)
         return read_as(exchange.response, GOAL)[0], exchange
 
@@ -258,16 +258,16 @@ class Robot:
         return self.drivable(Velocity(linear_x=self.share(AHEAD, linear), angular_z=self.share(ABOUT, angular)))
 
     def share(self, component: int, share: float) -> float:
-        """Return a share of the limit of a component; of the other one where it has none in that direction."""
+        """Return a share of a component's limit, or of the opposite limit if the robot has none in that direction."""
         least, greatest = self.limits.range_of(component)
         return share * ((greatest or -least) if share > 0 else (-least or greatest))
 
     def drivable(self, velocity: Velocity) -> Velocity:
-        """Return a velocity that the robot can drive by its statement, like this one or instead of it."""
+        """Return this velocity, or the most similar one that the statement lets the robot drive."""
         return Velocity(*abilities.drivable(self.limits, self.statement.motion, velocity))
 
     def only(self, component: int, value: float) -> Velocity:
-        """Return a velocity in one component, m/s or rad/s, with what the robot needs beside it to drive it."""
+        """Return a velocity in one component, m/s or rad/s, plus what the robot needs to drive it."""
         return self.drivable(Velocity(*(value if index == component else 0.0 for index in range(6))))
 
     def limit_declared(self, component: int) -> bool:

@@ -58,13 +58,13 @@ def ask(subscribers: SoapService, operation: str, **parameters: float | str) -> 
 
 
 def text_at(element: etree._Element, *names: str) -> str | None:
-    """Return the text at a path of local names, which may be below elements of other names, or None."""
+    """Return the text at a path of local names, which may be nested in other elements, or None."""
     found = element.findtext(".//" + "/".join(f"{{*}}{name}" for name in names))
     return None if found is None else found.strip()
 
 
 def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
-    """Return the ``return`` elements of a response, and what is wrong with a response that has none."""
+    """Return the ``return`` elements of a response, and the fault of a response without any."""
     answer = read_exchange(exchange)
     if not answer.accepted or answer.first is None:
         return [], f"no SOAP response: {exchange.came}"
@@ -72,7 +72,7 @@ def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
 
 
 def position(subscribers: SoapService) -> tuple[float, float] | None:
-    """Call GetPose and return the position in the odometry frame, m; None where the response has none.
+    """Call GetPose and return the position in the odometry frame, m, or None.
 
     Raises:
         NoAnswerError: no HTTP response came.

@@ -136,7 +136,7 @@ class Standstill:
         return rest("", drive.trace.turns[-1].velocity_exchange, "")
 
     def _look(self, drive: Drive) -> Case | None:
-        """Return readings that show motion or a goal; None if there is neither."""
+        """Return readings that show motion or a goal, or None."""
         seen = read_rest(drive, "", goal=any(one.goal for one in self._waiting))
         return None if seen.holds else seen
 

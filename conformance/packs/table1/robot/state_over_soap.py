@@ -54,7 +54,7 @@ class StateRead:
 
 
 def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
-    """Return the value that a SOAP response returns, and what is wrong where it returns none."""
+    """Return the value in a SOAP response, and the fault of a response without one."""
     found, problem = returned(exchange)
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
@@ -103,7 +103,7 @@ def read_state(
 
 
 def counted(read: StateRead, *, lasted: bool) -> StateRead | None:
-    """Return what counts of a reading: no difference where the state has not ``lasted`` meanwhile; None: nothing."""
+    """Return a reading that counts, without its difference if the state changed meanwhile; None if none is left."""
     if lasted or not read.differs:
         return read
     return replace(read, differs="") if read.broken else None
@@ -142,7 +142,7 @@ def compare(
     *,
     first: Callable[[], object] = _nothing,
 ) -> list[StateRead]:
-    """Read a state over both interfaces, again where one may lag an odometry message behind the other.
+    """Compare a state over both interfaces, repeatedly, as one may lag behind by an odometry message.
 
     Args:
         robot: the robot over REST.
@@ -162,7 +162,7 @@ def compare(
 
 
 def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
-    """Return the first try without a difference, or else the last one, and what is wrong for good in those before."""
+    """Return the first try without a difference, or the last one, with the differences that time cannot explain."""
     reads: list[StateRead] = []
     for read in tries:
         reads = for_good(reads)
@@ -173,5 +173,5 @@ def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
 
 
 def for_good(reads: Iterable[StateRead]) -> list[StateRead]:
-    """Return what would not be right a moment later either, of readings that are repeated."""
+    """Return the readings that are broken by themselves, without the differences that time may explain."""
     return [replace(one, differs="") for one in reads if one.broken]

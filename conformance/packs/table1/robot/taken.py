@@ -86,7 +86,7 @@ def _beside(api: RestInterface, act: Act, usual: Act) -> bool | None:
 
 
 def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
-    """PUT a velocity repeatedly; return whether the robot moves, or None where that cannot be told."""
+    """PUT a velocity repeatedly; return whether the robot moves, or None if undecided."""
     limits = robot.limits
     hold_s = certain_s(limits.hold_s)
     since = last_sent = math.inf  # from when on it holds without a gap; when it was put last

@@ -1,4 +1,4 @@
-"""Which velocities a robot is left with, not renewed, and what commands them last."""
+"""Choose the velocities that are not renewed, and how each is commanded last."""
 
 import math
 import random
@@ -47,7 +47,7 @@ def unrenewed(
 
 
 def slow(robot: Robot, seed: int) -> list[Velocity]:
-    """Return a slow drive and a slow turn that can be told from rest, each in the direction that the seed says."""
+    """Return a slow drive and a slow turn that differ from rest, in directions that the seed chooses."""
     limits, chance = robot.limits, random.Random(f"{seed}/slow")  # noqa: S311 - no secret
     found: list[Velocity] = []
     for component in (AHEAD, ABOUT):

@@ -49,12 +49,12 @@ def handy(robot: Robot, share: float) -> Velocity:
 
 
 def both(robot: Robot) -> Velocity:
-    """Return the fastest turn to the left beside the fastest drive, as far as the statement says how they depend."""
+    """Return the fastest turn to the left beside the fastest drive, if the statement says how they depend."""
     return robot.drivable(Velocity(linear_x=fastest(robot, AHEAD, direction(robot)), angular_z=fastest(robot, ABOUT)))
 
 
 def along_arc(robot: Robot, turning: Velocity, share: float) -> tuple[Velocity, Velocity]:
-    """Return a turn along an arc, and another linear part beside which the robot can turn as fast.
+    """Return a turn along an arc, and a second linear part that allows the same turn.
 
     The robot drives back and then ahead, unless it hardly drives back: then it drives ahead at two speeds. ``share``:
     of the limit, how fast it drives.

@@ -68,7 +68,7 @@ class Walk:
             before()
 
     def command(self, act: Callable[[], bool]) -> None:
-        """Make one step that commands a velocity and waits for it; there are so many of them as time is planned for."""
+        """Make one step that commands a velocity and waits for it; the planned time decides how many there are."""
         if not self.ended and self._commands_left == 0:
             self.ended = _ENOUGH
         self._commands_left -= not self.ended

@@ -18,7 +18,7 @@ def put_as_xml(
     accept: str = JSON,
     before: Callable[[], object] = lambda: None,
 ) -> Exchange | None:
-    """PUT a value as XML; return None where the robot sends no XML from there.
+    """PUT a value as XML; return None if the robot sends no XML for that resource.
 
     Args:
         robot: the robot.

@@ -1,1 +1,1 @@
-"""What is done with the paper's robot: scenarios, which record traces and judge nothing."""
+"""Scenarios with the paper's robot: they record traces and judge nothing."""

@@ -69,7 +69,7 @@ def _after_cancel(robot: Robot, body: dict[str, Any], *, longer: bool) -> tuple[
 
 @scenario(needs={Need.REST, Need.MOTION})
 def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
-    """PUT different goals from several clients at the same moment, and read which one is active; repeat."""
+    """PUT different goals from several clients at the same moment, and read which one is active; repeat that."""
     poses = choose_goals(robot, 1.5, _CLIENTS)
     reads: list[GoalRead] = []
     for turn in range(effort.cases(20)):

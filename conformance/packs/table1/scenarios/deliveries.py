@@ -88,7 +88,7 @@ def deliveries_last(senders: list[DeliverySender]) -> Deliveries:
 
 
 def _watched(senders: list[DeliverySender], seconds: float) -> Deliveries:
-    """Return what arrives after the batches of the run's sender, if the run has one."""
+    """Return the deliveries that arrive after the batches of the run's sender, if the run has one."""
     for sender in senders:
         try:
             sender.watch(seconds)

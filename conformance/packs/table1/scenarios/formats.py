@@ -180,7 +180,7 @@ def _compared(api: RestInterface, call: Call, renew: Callable[[], object]) -> li
 
 
 def _first(api: RestInterface, changes: Iterator[Call]) -> tuple[FormatsRead, ...]:
-    """Return the differences that the first reading after each change but the first shows, or that there is none."""
+    """Return the differences in the first reading after each change but the first, or that there is none."""
     left: Found | None = None
     for number, call in enumerate(changes):
         found, exchange = one_turn(api, call, _others(call))

@@ -145,7 +145,7 @@ class _Player:
         return True
 
     def _velocity_meanwhile(self, body: dict[str, Any], there: Pose) -> None:
-        """Command velocities while a goal is active: one that is invalid, one of both parts, and a linear one."""
+        """Command velocities while a goal is active: an invalid one, one of both parts, and a linear one."""
         robot, drive = self.robot, Drive(self.robot)
         self._keeps(robot.rest.send("PUT", VELOCITY, headers=JSON_BODY, body=b"{}"), body, there)
         slow, sent = slow_turn(robot), robot.clock.now()
@@ -185,7 +185,7 @@ class _Player:
         self.life = replace(self.life, second=second, renamed=renamed, now_s=now_s, took_s=took_s)
 
     def _cancel(self, pose: Pose) -> bool:
-        """Cancel the active goal; return whether there was one, as it may have ended at its ``pose``.
+        """Cancel the active goal; return whether there was one, which may have ended at its ``pose``.
 
         A response that is late counts as none: a stop of the network looks like a late stop of the robot.
         """

@@ -65,7 +65,7 @@ class _Goals(RuleBasedStateMachine):
         walk.step(self._clear)
 
     def teardown(self) -> None:
-        """Cancel the goal, if there is one."""
+        """Cancel the active goal, if any."""
         self._walk.step(self._cancel if self._active is not None else self._clear)
 
     @rule()
@@ -87,7 +87,7 @@ class _Goals(RuleBasedStateMachine):
 
     @rule()
     def cancel(self) -> None:
-        """DELETE the goal, whether there is one or not."""
+        """DELETE the goal, whether one is active or not."""
         self._walk.step(self._cancel)
 
     @property

@@ -104,13 +104,13 @@ def _nothing() -> None:
 
 
 def _compare_goals(robot: Robot, subscribers: SoapService, first: Callable[[], object] = _nothing) -> list[StateRead]:
-    """Read the goal over both interfaces until they agree, as one may learn of a change after the other."""
+    """Read the goal over both interfaces until they agree, as one may learn of a change later."""
     patience = robot.patience(robot.settle_s)
     return agreed(_read_goal(robot, subscribers, first) for _ in poll(robot.clock, 0.05, lambda: patience.over))
 
 
 def _mixed(before: Any, goal: Any, after: Any) -> str:
-    """Return how a goal differs from REST's goals with its id: one goal, whenever SOAP learns of it.
+    """Return how a goal differs from both of REST's goals with its id, whenever SOAP learned of a change.
 
     Its status changes by itself.
     """

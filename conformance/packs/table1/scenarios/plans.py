@@ -123,7 +123,7 @@ def plans_in_frames(robot: Robot) -> tuple[FramePlan, ...]:
 
 
 def _in_frame(robot: Robot, frame: str, begin: Pose, *, known: bool) -> FramePlan:
-    """Request a plan in a frame, to a pose 0.3 m beside ``begin``; ``known`` says that the robot knows the frame."""
+    """Request a plan in a frame to a pose 0.3 m beside ``begin``; ``known``: the robot knows the frame."""
     exchange = robot.get(query(x=begin.x + 0.3, y=begin.y, frame_id=frame))
     message, problem = read_as(exchange.response, GET_PLAN)
     plan, moved_m = None if problem else plan_of(message), None

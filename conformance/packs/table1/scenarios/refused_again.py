@@ -186,7 +186,7 @@ class _Player:
             self.robot.rest.send(method, path, headers=(("Content-Type", JSON),), body=body, fresh=True)
 
     def rest(self) -> None:
-        """Send the requests at rest, and read the robot; if it moves or has a goal, send them one by one."""
+        """Send the requests at rest, and read the robot; if it moves or gets a goal, send them one by one."""
         chosen = self._chosen()
         rests: tuple[Case, ...] = (self._rest(chosen),) if chosen else ()
         if not all(rest.holds for rest in rests):
@@ -214,7 +214,7 @@ class _Player:
                     yield replace(seen, exchange=exchange, cause=one.what)
 
     def observer(self, probe: RosProbe, senders: list[DeliverySender]) -> DeliveryObserver | None:
-        """Return what shows deliveries from now on, or None."""
+        """Return an observer of deliveries from now on, or None."""
         try:
             for sender in senders:
                 sender.watch(0.0)  # what arrived so far is the batches' own
@@ -249,7 +249,7 @@ class _Player:
     def _arrived(
         self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange, left_s: float
     ) -> tuple[Delivery, ...]:
-        """Record what has arrived after the last refused request; return what nobody ordered."""
+        """Record the deliveries after the last refused request; return those that nobody ordered."""
         accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
         try:
             seen = tuple(one.delivery for one in observer.collect(len(accepted), left_s))
@@ -267,7 +267,7 @@ class _Player:
         return ordered.unknown
 
     def _orders(self, first: int, chosen: list[Refused]) -> Iterator[tuple[Delivery, Exchange]]:
-        """Send deliveries over each interface, each directly after a refused request on it and on the other one."""
+        """Send deliveries over each interface, each directly after a refused request on either interface."""
         here = [one for one in chosen if one.client is self.robot.rest] or chosen
         there = [one for one in chosen if one.client is not self.robot.rest] or chosen
         delivery = _of(COURIER, -first)
@@ -359,7 +359,7 @@ class _Player:
         return None
 
     def _send_during(self, sent: list[Refused], active: dict[str, Any], pose: Pose) -> Exchange | None:
-        """Send a request during a goal after others, and read the goal; return None if it ended by itself, or was lost.
+        """Send requests during a goal, and read the goal; return None if the goal ended by itself or was lost.
 
         Args:
             sent: those others, and at last the request.

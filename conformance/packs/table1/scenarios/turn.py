@@ -75,7 +75,7 @@ def turn(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -
 
 @scenario(needs={Need.REST, Need.MOTION})
 def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
-    """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
+    """Drive along each axis that a robot on two wheels does not have; do nothing if there is none."""
     further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
     driving = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
@@ -163,7 +163,7 @@ class _Turning:
             self._ahead_from_rest(renewed=run.effort.name != "quick")
 
     def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, Way]]:
-        """Return what unrenewed() returns; without a declared hold time one velocity is enough."""
+        """Return what unrenewed() returns; one velocity suffices without a declared hold time."""
         robot = self.robot
         if robot.limits.hold_s is None:
             return [(bent, "velocity")]
@@ -172,7 +172,7 @@ class _Turning:
         return unrenewed(bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed)
 
     def along(self, component: int) -> None:
-        """Drive along one more axis, slowly and as fast as the robot can, there and back, and let it go."""
+        """Drive along one more axis, slowly and at full speed, there and back, and let it go."""
         robot, drive = self.robot, self.drive
         ends = [robot.only(component, fastest(robot, component, sign)) for sign in (1, -1)]
         for velocity in (slowest_along(robot, component), *ends):

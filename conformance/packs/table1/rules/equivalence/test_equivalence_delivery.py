@@ -115,7 +115,7 @@ def _wrong_interfaces(trace: Deliveries, batch: Batch, one: Sent) -> str:
 def _others(
     trace: Deliveries, batch: Batch, before: tuple[Batch, ...]
 ) -> tuple[list[Sent], list[Sent], list[Delivery]]:
-    """Return what arrived beside the batch's accepted deliveries.
+    """Return the arrived deliveries that the batch did not order.
 
     Returns:
         The deliveries of earlier batches that arrived again, those that were not accepted, and those never sent.

@@ -53,7 +53,7 @@ _AHEAD: Final = 0.3
 
 
 def _event(robot: Robot, turn: int) -> None:
-    """Send, in some turns, a request whose effect on the next one shows a robot that mixes requests up."""
+    """Send, in some turns, a request that a robot which mixes requests up applies to the next one."""
     if turn % _TURNS == 0:
         robot.rest.send("GET", POSE, headers=_NOT_ACCEPTABLE)
     elif turn % _TURNS == 1 and robot.may_move:

@@ -1,4 +1,4 @@
-"""Rules on deliveries with an Idempotency-Key: one key may give one message; two keys give two."""
+"""Rules on deliveries with an Idempotency-Key: one key gives at most one message; two keys give two."""
 
 from collections.abc import Iterator
 from http import HTTPStatus
@@ -10,7 +10,7 @@ from conformance.verdict.evidence import Case
 
 @rule("equivalence/idempotency-key", on=(counted_deliveries,))
 def one_key(trace: CountedDeliveries) -> Iterator[Outcome]:
-    """Judge that two requests with one key make one message and have the same status."""
+    """Judge that two requests with one key cause one message and have the same status."""
     keyed = _keyed(trace)
     if isinstance(keyed, NotTested):
         yield keyed

@@ -77,7 +77,7 @@ def test_every_accepted_delivery_is_listed(read_deliveries: Callable[[], None]) 
 
 
 class Listed(NamedTuple):
-    """The list after deliveries of which the robot took some; those of other clients may stand between them.
+    """The list after several accepted deliveries; those of other clients may stand between them.
 
     Attributes:
         entries: of the list, newest first.

@@ -1,4 +1,4 @@
-"""Rules on plans: whether there is one, where the robot's own begin, and what changes none of them."""
+"""Rules on plans: whether there is one, where the robot's own begin, and what must not change them."""
 
 from collections.abc import Iterator
 from http import HTTPStatus

@@ -64,7 +64,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
 @pytest.mark.phase("late")
 @pytest.mark.requirement(_SAMPLE, _BESIDE)
 def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
-    """Read odometry and velocity in turn, unless the rest of the run has; the checkers judge each by those around."""
+    """Read odometry and velocity alternately, unless the run has done so; the checkers judge each by its neighbours."""
     unread, before, wanted = 0, judge.cases(_BESIDE), effort.cases(_TURNS)
     for turn in range(_READ * wanted):
         judged = judge.cases(_BESIDE)

@@ -68,7 +68,7 @@ def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller |
 
 
 def _plan(service: SoapService) -> dict[str, float]:
-    """Return arguments of GetPlan for which the robot has a plan; empty where it has none."""
+    """Return arguments of GetPlan for which the robot has a plan, or empty ones."""
     operation = next((item for item in service.contract.operations if item.name == "GetPlan"), None)
     message = example(service, operation) if operation is not None else None
     return (

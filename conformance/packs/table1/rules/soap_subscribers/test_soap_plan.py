@@ -89,7 +89,7 @@ def _told(answer: SoapResponse) -> tuple[tuple[Pose, ...], str]:
 
 
 def _after_refusals(subscribers: SoapService, judge: Judge, request: Node) -> None:
-    """Judge that a valid request right after a rejected one gets a path, where it gets one otherwise."""
+    """Judge that a valid request right after a rejected one gets a path, if it does otherwise."""
     none = 0
     for _ in range(_REFUSALS):
         call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))

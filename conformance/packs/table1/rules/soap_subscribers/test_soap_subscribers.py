@@ -103,6 +103,6 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
 
 
 def _strings(exchange: Exchange, operation: str) -> dict[str, str]:
-    """Return the strings of a state, such as the names of its frames; empty where the response has none."""
+    """Return the strings of a state, such as the names of its frames."""
     value, problem = answered(exchange, _STATES[operation])
     return {} if problem else {place: one for place, one in flattened(value).items() if isinstance(one, str)}

@@ -96,6 +96,6 @@ def _shown(trace: CountedDeliveries) -> bool:
 
 
 def _resembles(delivery: Delivery) -> bool:
-    """Return whether a delivery may come from an invalid request, in which one value was wrong."""
+    """Return whether a delivery may come from an invalid request with one wrong value."""
     same = sum(value == float(sent) for value, sent in zip(delivery[1:], CORRECT[1:], strict=True))
     return same >= len(CORRECT) // 2

@@ -86,7 +86,7 @@ def conflict(trace: RefusedAgain) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-outcome", on=(refused_again,))
 def outcome(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that the 404 after a cancelled goal tells of that goal, and not of the one that it replaced."""
+    """Judge that the 404 after a cancelled goal describes that goal, and not the one that it replaced."""
     if trace.cancelled is not None:
         read, id_ = trace.cancelled
         fault = outcome_fault(read, CANCELED, id_) if read.response.status == HTTPStatus.NOT_FOUND else read.came
