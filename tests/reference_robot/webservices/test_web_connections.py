@@ -1,7 +1,6 @@
 """Clients that send half a request, vanish, or come in hundreds."""
 
 import contextlib
-import re
 import select
 import socket
 import threading
@@ -48,11 +47,6 @@ def is_readable(connection: socket.socket) -> bool:
     return bool(select.select([connection], [], [], 0)[0])
 
 
-def test_a_broken_chunk_is_400(served):
-    head = b"PUT /robot/velocity/ HTTP/1.1\r\nHost: robot\r\nContent-Type: application/json\r\n"
-    assert served.raw(head + b"Transfer-Encoding: chunked\r\n\r\nxyz\r\n{}\r\n").startswith(b"HTTP/1.1 400 ")
-
-
 def test_clients_that_vanish_leave_nothing_behind(served, foreign):
     for half in HALVES.values():
         for _ in range(5):
@@ -65,24 +59,6 @@ def test_clients_that_vanish_leave_nothing_behind(served, foreign):
         foreign.next("delivery")
     assert served.call("PUT", "/robot/velocity/", json=twist()).status_code == 200
     foreign.next("velocity")
-
-
-def test_pipelined_requests_are_answered_in_order(served):
-    two = (
-        b"GET /robot/pose HTTP/1.1\r\nHost: a\r\n\r\nGET /robot/pose/ HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
-    )
-    assert re.findall(rb"HTTP/1\.1 (\d+)", served.raw(two)) == [b"404", b"200"]
-
-
-def test_a_client_that_expects_100_is_told_to_continue(served, foreign):
-    body = delivery_envelope().encode()
-    head = b"POST /turtlesim_publisher_ws HTTP/1.1\r\nHost: a\r\nContent-Type: text/xml\r\nConnection: close\r\n"
-    with served.connection(soap=True) as connection:
-        connection.sendall(head + b"Expect: 100-continue\r\nContent-Length: %d\r\n\r\n" % len(body))
-        assert connection.recv(100).startswith(b"HTTP/1.1 100 ")
-        connection.sendall(body)
-        assert connection.recv(1000).startswith(b"HTTP/1.1 200 ")
-    foreign.next("delivery")
 
 
 def test_an_offer_of_http_2_is_ignored_and_the_content_read(served, foreign):

@@ -140,3 +140,12 @@ def test_a_name_without_end_is_not_learnt():
 def test_what_only_looks_like_names_is_malformed(text):
     with pytest.raises(Problem):
         parsed(text)
+
+
+@pytest.mark.parametrize(
+    ("body", "charset", "said"),
+    [(b"\xef\xbb\xbf{}", b"utf-8", "byte order mark"), (b"{}", b"utf-16", "charset 'utf-16'")],
+)
+def test_json_is_utf_8_without_a_byte_order_mark(body, charset, said):
+    with pytest.raises(Problem, match=said):
+        read(body, b"application/json; charset=" + charset, shape_of(Twist))

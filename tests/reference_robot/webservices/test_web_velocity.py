@@ -22,56 +22,6 @@ def test_put_is_published_once_and_answered_with_what_was_accepted(served, forei
     assert foreign.heard_nothing()
 
 
-def test_put_takes_xml_as_it_is_sent(served, foreign):
-    xml = (
-        b"<Twist><linear><x> 1e-1 </x><y>0</y><z>0</z></linear><!-- turn -->"
-        b"<angular><x>0</x><y>0</y><z>0.<!-- -->5</z></angular></Twist>"
-    )
-    fields = {"Content-Type": "application/xml", "Accept": "application/xml"}
-    answer = served.call("PUT", VELOCITY, content=xml, headers=fields)
-    assert answer.status_code == 200
-    assert foreign.next("velocity") == {"type": "Twist", "x": 0.1, "z": 0.5}
-    assert served.call("PUT", VELOCITY, content=answer.content, headers=fields).status_code == 200
-    assert foreign.next("velocity") == {"type": "Twist", "x": 0.1, "z": 0.5}
-
-
-def test_put_linear_leaves_the_angular_part_that_is_in_force(served, foreign):
-    served.call("PUT", VELOCITY, json=twist(x=0.5, z=1.0))
-    foreign.next("velocity")
-    answer = served.call("PUT", LINEAR, json={"x": 0.25, "y": 0.0, "z": 0.0})
-    assert answer.json() == {"x": 0.25, "y": 0.0, "z": 0.0}
-    assert foreign.next("velocity") == {"type": "Twist", "x": 0.25, "z": 1.0}
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "names"),
-    [
-        (VELOCITY, twist(x=0.71), ("linear.x", "0.71")),
-        (VELOCITY, twist(x=-0.8), ("linear.x", "-0.8")),
-        (VELOCITY, twist(z=2.6), ("angular.z", "2.6")),
-        (VELOCITY, twist() | {"linear": {"x": 0.1, "y": 0.01, "z": 0.0}}, ("linear.y", "0.01")),
-        (VELOCITY, twist() | {"angular": {"x": 1e-9, "y": 0.0, "z": 0.0}}, ("angular.x", "1e-09")),
-        (LINEAR, {"x": 5.0, "y": 0.0, "z": 0.0}, ("linear.x", "5.0")),
-        (LINEAR, {"x": 0.0, "y": 0.0, "z": 1.0}, ("linear.z", "1.0")),
-    ],
-)
-def test_beyond_the_limits_is_refused_not_clamped(served, foreign, path, value, names):
-    told = problem(served.call("PUT", path, json=value), 422)
-    assert all(name in told for name in names)
-    assert foreign.heard_nothing()
-
-
-def test_while_a_goal_is_active_velocity_is_refused(served, foreign):
-    assert served.call("PUT", GOAL, json=goal()).status_code == 201
-    foreign.next("goal")
-    assert served.call("PUT", VELOCITY, json=twist()).status_code == 409
-    assert foreign.heard_nothing()
-    assert served.call("DELETE", GOAL).status_code == 204
-    foreign.next("cancel")
-    assert served.call("PUT", VELOCITY, json=twist()).status_code == 200
-    foreign.next("velocity")
-
-
 def test_what_another_body_cannot_drive_is_refused(domain_id, tmp_path):
     config = tmp_path / "robot.toml"
     config.write_text("[web]\nmax_reverse = 0\nmax_lateral = 0.3\nmin_radius = 0.5\nlag = 0.01\n")
