@@ -309,7 +309,7 @@ def test_a_name_in_another_normal_form_is_another_name(vendor):
     assert (done.exit_code, "REFUSED by your policy: robot" in done.output) == (1, True), done.output
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_any_change_of_the_envelope_is_refused(honest, data):
     """Unless it is the same JSON: between its members, an envelope may have other white space."""
@@ -333,7 +333,7 @@ def test_any_change_of_the_envelope_is_refused(honest, data):
     assert json.loads(octets) == json.loads(honest.envelope.read_bytes())
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_any_change_of_the_result_is_refused(honest, data):
     path = honest.folder / "result.json"
@@ -362,7 +362,7 @@ ALTERATIONS = {
 }
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(alteration=st.sampled_from(sorted(ALTERATIONS)), place=st.integers(0, COUNT - 1))
 def test_any_alteration_of_a_requirement_is_refused(honest, tmp_path_factory, alteration, place):
     result = conformant()
@@ -395,7 +395,7 @@ def alteration(kind, level, verdict, place):
     return alter
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(
     kind=st.sampled_from(["remove", "double", "rename", "level", "Pass", "fail"]),
     level=st.sampled_from(["MUST", "SHOULD"]),

@@ -109,8 +109,13 @@ def _tree(folder):
     return {path for path in folder.rglob("*") if not path.is_relative_to(folder / "sent")}
 
 
-@pytest.mark.parametrize("what", [*CONTENTS, *SPECIAL], ids=lambda one: getattr(one, "__name__", one))
-@pytest.mark.parametrize("place", READERS)
+def _wrong_files():
+    """Return what stands in which place: each special file in each, and each content in a third of them by turns."""
+    turns = enumerate((place, what) for what in CONTENTS for place in READERS)
+    return [(place, what) for place in READERS for what in SPECIAL] + [one for turn, one in turns if turn % 3 == 0]
+
+
+@pytest.mark.parametrize(("place", "what"), _wrong_files(), ids=lambda one: getattr(one, "__name__", one))
 def test_a_file_that_is_none(well_made, tmp_path, place, what):
     sent = well_made.sent(tmp_path / "sent")
     (sent / place).unlink(missing_ok=True)
@@ -169,9 +174,7 @@ def test_a_file_that_unpacks_to_more_than_any_run_writes(well_made, bomb, tmp_pa
     check(run(command, sent), 0, 1, 2)
 
 
-@pytest.mark.parametrize(
-    "name", ["..", "../pack", ".", "pack", "{}/pack", "os", "roaas.packs", "\x1b[2J", "table1/../../pack", ""]
-)
+@pytest.mark.parametrize("name", ["..", "pack", "{}/pack", "os", "\x1b[2J", "table1/../../pack", ""])
 def test_a_pack_that_a_result_names_is_no_path(well_made, tmp_path, monkeypatch, name):
     sent, marker = well_made.sent(tmp_path / "sent"), tmp_path / "executed"
     code = f"open({str(marker)!r}, 'w').close()\n"

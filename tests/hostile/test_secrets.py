@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from echoing_device import ENCODINGS, EchoingService, echoing_device, leaks
-from processes import ended, shown_of
+from processes import ended
 from small_device import certified
 from soap_devices import serving
 
@@ -104,17 +104,6 @@ def test_certify_of_a_soap_service(tmp_path, kept):
         done = certified(f"{url}/scale.wsdl", tmp_path / "out", *credentials, "--api-key-file", kept / "cookie")
     assert "$ROAAS_BASIC" in json.dumps(done.result["requirements"])
     assert leaks(tmp_path / "out", [_BASIC, _WSSE, _COOKIE], done.text) == []
-
-
-def test_load_and_its_processes(tmp_path, kept, device):
-    plan = ["--operation", "GET /tiring", "--rate", "60", "--duration", "1", "--warmup", "0.1", "--processes", "2"]
-    words = ["load", f"{device}/openapi.json", *_options(kept), *plan, "--out", tmp_path / "o"]
-    command = [sys.executable, "-m", "roaas", *map(str, words)]
-    said, seen = shown_of(command)
-    assert len(seen) >= 4, "the command, the master, two workers"
-    errors = json.loads((tmp_path / "o" / "latency.json").read_text(encoding="utf-8"))["errors"]
-    assert any("$ROAAS_QUERY_KEY" in one["message"] for one in errors), said
-    assert leaks(tmp_path / "o", [_TOKEN, _QUERY, _SESSION], said, *seen.values()) == []
 
 
 def test_what_is_too_short_to_mask_is_said(tmp_path, kept, device):

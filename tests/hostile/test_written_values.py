@@ -13,13 +13,10 @@ _GONE, _OWN = "description/deleted-is-gone", "description/own-identifier"
 _FAULTS = {
     "built_at by PUT": _READ_ONLY,
     "built_at by PATCH": _READ_ONLY,
-    "maker by POST": _READ_ONLY,
     "maker by PUT": _READ_ONLY,
     "default of loud by POST": _DEFAULTS,
     "default of loud by PUT": _DEFAULTS,
-    "default of lane by PUT": _DEFAULTS,
     "null keeps": _PATCH,
-    "null keeps note": _PATCH,
     "null keeps loud": _PATCH,
     "objects replaced": _PATCH,
     "others reset": _READ,
@@ -30,7 +27,6 @@ _FAULTS = {
     "refused in part": _KEPT,
     "refused and the first": _KEPT,
     "refused and speed": _KEPT,
-    "refused and lane": _KEPT,
     "test ignored": _KEPT,
     "last test ignored": _KEPT,
     "applied in part": _KEPT,
@@ -41,7 +37,6 @@ _FAULTS = {
     "code twice by PATCH": _OWN,
     "lists the deleted": _GONE,
     "lists the deleted by kind": _GONE,
-    "lists the deleted by loud": _GONE,
 }
 
 

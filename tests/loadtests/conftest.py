@@ -11,9 +11,12 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from click.testing import CliRunner
 from processes import free_port
 
+from conformance.commandline.exit_codes import ExitCode
 from conformance.papers_robot.statement import CONTRACT_DIR
+from loadtests.cli import load as load_cli
 from reports.latency.page import latency_markdown
 from reports.pages.untrusted import plain
 
@@ -141,6 +144,19 @@ def load(tmp_path):
         return process, finish
 
     run.begin = begin
+    return run
+
+
+@pytest.fixture(scope="session")
+def usage_error():
+    """Run `roaas load` in this process, up to an error before its first request; returns the error."""
+
+    def run(*options):
+        words = [word for option in options for word in shlex.split(str(option))]
+        done = CliRunner().invoke(load_cli, words)
+        assert done.exit_code == ExitCode.USAGE, done.output
+        return " ".join(done.output.split())
+
     return run
 
 

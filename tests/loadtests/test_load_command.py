@@ -240,10 +240,9 @@ def test_the_closed_model(toy, load):
         ("--stages 1,x", "not a list of stages"),
     ],
 )
-def test_usage_errors_touch_no_robot(load, options, message):
-    run = load("--rest http://127.0.0.1:9", options)
-    assert (run.code, message in run.err) == (2, True), run.err
-    assert not (run.folder / "latency.json").exists()
+def test_usage_errors_touch_no_robot(usage_error, options, message, tmp_path):
+    assert message in usage_error("--rest http://127.0.0.1:9 --out", tmp_path, options)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_knee_is_searched_over_each_interface_and_both(toy, load):

@@ -154,18 +154,6 @@ def test_https_with_its_own_authority_and_a_login(started, load, certificate, tm
     assert (refused.code, "[auth] login = 'POST /login': the device responded 403" in refused.err) == (2, True)
 
 
-def test_the_knee_of_a_device_that_answers_one_request_after_the_other(device, load, tmp_path):
-    url, statement = device("--serial", "--slow", "0.004"), tmp_path / "robot.toml"  # at most 250 a second
-    statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n[slo]\n"GET /state" = {{ p50_ms = 400 }}\n')
-    run = load(str(statement), "--rate 40 --duration 1 --warmup 0.1", "--knee --knee-searches 2 --step-duration 1")
-    (search,) = run.result["knee_search"]
-    assert search["criterion"].startswith("p50 response time below 400 ms")
-    assert search["interface"] == "rest"
-    assert all(met is None or met < 270 for met, _ in search["brackets"]), "no more than it can answer"
-    assert all(missed is not None and missed <= 400 for _, missed in search["brackets"])
-    assert "Where it breaks" in latency_html(run.result)
-
-
 MAP = """
 [values]
 speed = [0.5]

@@ -1,11 +1,13 @@
 """`roaas load --scenario`: users of a Locust file, measured as any others."""
 
 import json
+import sys
 import urllib.request
 from collections import Counter
 from pathlib import Path
 
 import pytest
+from processes import ended
 
 from reports.latency.page import latency_html
 
@@ -177,21 +179,6 @@ def test_a_scenario_that_fails_ends_the_run(device, load, scenario, line, told):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("1 / 0", "cannot be used: ZeroDivisionError: division by zero (scenario.py, line 1)"),
-        ("def", "cannot be used: SyntaxError"),
-        ("import locust", "has no class of users"),
-        ("import locust\nclass A(locust.HttpUser):\n    pass", "A is not measured: derive it from"),
-        ("from loadtests.scenario import RobotUser\nclass A(RobotUser):\n    pass", "A has no task"),
-    ],
-)
-def test_a_file_that_is_no_scenario_is_refused(device, load, scenario, text, told):
-    run = load(f"{device()}/openapi.json --scenario {scenario(text=text)}")
-    assert (run.code, told in run.err) == (2, True), run.err
-
-
-@pytest.mark.parametrize(
     ("options", "told"),
     [
         ("--operation 'GET /state'", "--operation does not go with --scenario"),
@@ -200,9 +187,39 @@ def test_a_file_that_is_no_scenario_is_refused(device, load, scenario, text, tol
         ("--against http://127.0.0.1:1", "--against does not go with --scenario"),
     ],
 )
-def test_what_the_users_decide_is_no_option(device, load, scenario, options, told):
-    run = load(f"{device()}/openapi.json --scenario {scenario('pass')} {options}")
-    assert (run.code, told in run.err) == (2, True), run.err
+def test_what_the_users_decide_is_no_option(device, usage_error, scenario, options, told):
+    assert told in usage_error(f"{device()}/openapi.json --scenario {scenario('pass')} {options}")
+
+
+_NO_SCENARIOS = {
+    "1 / 0": "cannot be used: ZeroDivisionError: division by zero (scenario.py, line 1)",
+    "def": "cannot be used: SyntaxError",
+    "import locust": "has no class of users",
+    "import locust\nclass A(locust.HttpUser):\n    pass": "A is not measured: derive it from",
+    "from loadtests.scenario import RobotUser\nclass A(RobotUser):\n    pass": "A has no task",
+}
+# Locust changes the process that imports it.
+_READ = """
+import hashlib, sys
+from loadtests.measuring.scenario import read
+from loadtests.measuring.errors import GeneratorError
+from loadtests.settings.settings import Scenario
+for text in sys.argv[2:]:
+    open(sys.argv[1], "w").write(text)
+    try:
+        read(Scenario(sys.argv[1], hashlib.sha256(text.encode()).hexdigest()))
+    except GeneratorError as error:
+        print(error)
+"""
+
+
+def test_a_file_that_is_no_scenario_is_refused(device, load, scenario, tmp_path):
+    run = load(f"{device()}/openapi.json --scenario {scenario(text='1 / 0')}")
+    assert (run.code, _NO_SCENARIOS["1 / 0"] in run.err) == (2, True), run.err
+    done = ended(sys.executable, "-c", _READ, tmp_path / "scenario.py", *_NO_SCENARIOS)
+    assert len(done.stdout.splitlines()) == len(_NO_SCENARIOS), done.stderr
+    for line, told in zip(done.stdout.splitlines(), _NO_SCENARIOS.values(), strict=True):
+        assert told in line
 
 
 def test_a_robot_that_is_not_there_is_not_measured(device, load, scenario, free_port):

@@ -173,30 +173,29 @@ def test_workers_outlive_no_master_and_leave_what_they_recorded(worker, begin, w
         assert left["requests"] >= sum(entry["count"] + entry["errors"] for entry in left["series"]) > 20
 
 
-def test_any_number_of_workers_measures_a_described_device_alike(network, device, worker, begin, tmp_path):
+def test_four_workers_measure_a_described_device_together(network, device, worker, begin, tmp_path):
     token = tmp_path / "token"
     token.write_text("t0ken-of-robot")
-    for number in (1, 4):
-        _, finish, join = begin(
-            "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 30 --duration 3 --warmup 0",
-            f"--processes 0 --expect-workers {number}",
-            target=[device("--auth", "bearer", "--slow", "0.15")],
-            shared=f"--token-file {token} --trust-host {network.address('middle')}",
-        )
-        join(*(worker(own_clock=place % 2 == 1) for place in range(number)))
-        run = finish()
-        told = run.result["counts"]
-        requests = [entry["requests"] for entry in run.result["workers"]]
-        missing = told["not_sent"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
-        assert (len(requests), sum(requests)) == (number, told["sent"])
-        assert told["asked"] == told["sent"] + missing, run.err
-        assert max(requests) - min(requests) <= 4 + missing, "each has its share"
-        assert (told["asked_rate"], told["failed"]) == (pytest.approx(30, rel=0.03), {})
-        # A machine that is busy with other work delays responses by as much as requests.
-        median = run.series("GET /state", "rest")["service_ms"]["p50"]
-        assert 150 <= median < 300 + 3 * run.result["generator"]["lag_ms"]["max"], run.err
-        state, item = (run.series(name, "rest")["count"] for name in ("GET /state", "GET /items/{item_id}"))
-        assert state == pytest.approx(2 * item, abs=4 + missing)
+    _, finish, join = begin(
+        "--operation 'GET /state=2' --operation 'GET /items/{item_id}' --rate 30 --duration 3 --warmup 0",
+        "--processes 0 --expect-workers 4",
+        target=[device("--auth", "bearer", "--slow", "0.15")],
+        shared=f"--token-file {token} --trust-host {network.address('middle')}",
+    )
+    join(*(worker(own_clock=place % 2 == 1) for place in range(4)))
+    run = finish()
+    told = run.result["counts"]
+    requests = [entry["requests"] for entry in run.result["workers"]]
+    missing = told["not_sent"] + sum(entry["arrivals_lost"] for entry in run.result["workers"])
+    assert (len(requests), sum(requests)) == (4, told["sent"])
+    assert told["asked"] == told["sent"] + missing, run.err
+    assert max(requests) - min(requests) <= 4 + missing, "each has its share"
+    assert (told["asked_rate"], told["failed"]) == (pytest.approx(30, rel=0.03), {})
+    # A machine that is busy with other work delays responses by as much as requests.
+    median = run.series("GET /state", "rest")["service_ms"]["p50"]
+    assert 150 <= median < 300 + 3 * run.result["generator"]["lag_ms"]["max"], run.err
+    state, item = (run.series(name, "rest")["count"] for name in ("GET /state", "GET /items/{item_id}"))
+    assert state == pytest.approx(2 * item, abs=4 + missing)
 
 
 SCENARIO = """

@@ -11,10 +11,8 @@ import json
 import re
 import ssl
 import sys
-import threading
 import time
 from collections import Counter
-from contextlib import nullcontext
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import SimpleNamespace
 from typing import ClassVar
@@ -52,7 +50,6 @@ class Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
     calls: ClassVar = Counter()
     nonces = 0
-    one_at_a_time = threading.Lock()
     body = SimpleNamespace(x=0.0, speed=0.0, since=0.0, until=0.0)
 
     def setup(self):
@@ -125,8 +122,7 @@ class Handler(BaseHTTPRequestHandler):
         if path in {"/drive", "/halt", "/where"}:
             return self.send(200, self.moved(path, content))
         if path == "/state":
-            with self.one_at_a_time if options.serial else nullcontext():
-                time.sleep(options.slow)
+            time.sleep(options.slow)
             failing = options.fail_every and not self.calls["GET /state"] % options.fail_every
             now = time.time() + options.ahead
             return self.send(503 if failing else 200, {"stamp": now - options.age, "now": now})
@@ -178,7 +174,6 @@ if __name__ == "__main__":
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--ahead", type=float, default=0.0, help="how far its clock is ahead, s")
     parser.add_argument("--age", type=float, default=0.0, help="how old its state is, s")
-    parser.add_argument("--serial", action="store_true", help="answer GET /state one after the other")
     parser.add_argument("--coast", type=float, default=0.0, help="move on for so long after a halt, s")
     parser.add_argument("--tls", nargs=2, metavar=("CERT", "KEY"))
     server = ThreadingHTTPServer((parser.parse_known_args()[0].host, 0), Handler)

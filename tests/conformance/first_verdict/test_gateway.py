@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
 
-import pytest
 from small_device import certified
 from test_lost_device import arm, only_failure
 
@@ -73,19 +72,17 @@ def judged(how, status, folder, *, restart=False, absent=range(0)):
         return certified(f"{url}/openapi.json", folder / "out", "--timeout", 3 * patience_s, *more, *classes)
 
 
-@pytest.mark.parametrize("absent", [range(0), range(20, 21)])
-def test_a_healthy_device_behind_a_gateway_is_not_blamed(tmp_path, absent):
-    outcome = judged("well", 503, tmp_path, absent=absent)
+def test_a_healthy_device_that_a_gateway_misses_once_is_not_blamed(tmp_path):
+    outcome = judged("well", 503, tmp_path, absent=range(20, 21))
     assert "robustness/no-crash" not in outcome.blamed, outcome.text
 
 
-@pytest.mark.parametrize(("how", "status", "requirement"), [("exit", 502, "no-crash"), ("hang", 504, "no-hang")])
-def test_a_device_that_stays_lost_fails_by_the_request_that_did_it(tmp_path, how, status, requirement):
-    outcome = judged(how, status, tmp_path)
+def test_a_device_that_stays_lost_fails_by_the_request_that_did_it(tmp_path):
+    outcome = judged("hang", 504, tmp_path)
     assert outcome.exit_code == 1
-    failure = only_failure(outcome, f"robustness/{requirement}")
+    failure = only_failure(outcome, "robustness/no-hang")
     assert "/pose?z=" in failure["request"]["url"]
-    assert f"a gateway responded {status} in the device's place" in failure["message"]
+    assert "a gateway responded 504 in the device's place" in failure["message"]
 
 
 def test_a_request_that_does_it_again_is_the_devices_fault(tmp_path):
@@ -96,8 +93,7 @@ def test_a_request_that_does_it_again_is_the_devices_fault(tmp_path):
     assert "did it again" in failure["message"]
 
 
-@pytest.mark.parametrize("status", [502, 503, 504])
-def test_a_device_that_is_away_for_a_moment_is_inconclusive(tmp_path, status):
-    outcome = judged("well", status, tmp_path, absent=range(30, 36))
+def test_a_device_that_is_away_for_a_moment_is_inconclusive(tmp_path):
+    outcome = judged("well", 502, tmp_path, absent=range(30, 36))
     assert (outcome.exit_code, outcome.blamed) == (4, {}), outcome.text
-    assert f"cannot tell: a gateway responded {status}" in outcome.text
+    assert "cannot tell: a gateway responded 502" in outcome.text

@@ -52,7 +52,7 @@ def test_a_healthy_arm_is_not_blamed(tmp_path):
 
 @pytest.mark.parametrize(("how", "requirement"), [("exit", "no-crash"), ("hang", "no-hang"), ("deaf", "no-hang")])
 def test_a_device_that_stays_lost_fails_with_the_request_and_those_before_it(tmp_path, how, requirement):
-    outcome = judged(how, tmp_path)
+    outcome = judged(how, tmp_path, "--class", "description", "--class", "robustness")
     failure = only_failure(outcome, f"robustness/{requirement}")
     assert outcome.exit_code == 1
     assert "/pose?z=" in failure["request"]["url"]
@@ -73,7 +73,7 @@ def test_a_device_that_hangs_is_restarted_once_and_judged_to_the_end(tmp_path):
 
 
 def test_a_crash_that_needs_two_requests_is_shown_by_the_two(tmp_path):
-    outcome = judged("sequence", tmp_path, restart=True)
+    outcome = judged("sequence", tmp_path, "--class", "robustness", restart=True)
     failure = only_failure(outcome, "robustness/no-crash")
     assert "did it again when these requests were repeated" in failure["message"]
     first, second = failure["sequence"]
@@ -88,7 +88,7 @@ def test_a_loss_counts_whatever_class_is_judged(tmp_path):
 
 
 def test_a_device_that_answers_500_ever_after_fails_and_is_not_called_lost(tmp_path):
-    outcome = judged("poison", tmp_path)
+    outcome = judged("poison", tmp_path, "--class", "robustness")
     assert outcome.exit_code == 1
     assert outcome.requirement("robustness/no-server-error")["verdict"] == "fail"
     assert outcome.requirement("robustness/no-crash")["verdict"] == "pass"

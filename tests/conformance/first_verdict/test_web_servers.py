@@ -13,9 +13,7 @@ from conformance.explaining.advice import topic_of
 _NOT_MET = {
     "uvicorn, h11": {"host-invalid", "absolute-form", "length-and-chunks-closed"},
     "uvicorn, httptools": {"host-invalid", "host-missing"},
-    "hypercorn": {"host-invalid", "absolute-form", "length-and-chunks-closed"},
     "gunicorn, sync": {"host-invalid", "host-missing", "target-length"},
-    "gunicorn, gthread": {"host-invalid", "host-missing", "target-length"},
     "Werkzeug": {
         "host-invalid",
         "host-missing",
