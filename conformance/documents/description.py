@@ -152,9 +152,9 @@ def _refers(value: Any, broken: frozenset[str]) -> bool:
     return _is_reference(value) and value["$ref"] in broken
 
 
-def is_url(source: str) -> bool:
-    """Return whether a source is an HTTP URL rather than a file."""
-    return source.lower().startswith(("http://", "https://"))
+def is_url(source: str, *, bridge: bool = False) -> bool:
+    """Return whether a source is an HTTP URL, or with ``bridge`` that of a WebSocket, rather than a file."""
+    return source.lower().startswith(("http://", "https://", *(("ws://", "wss://") if bridge else ())))
 
 
 def _parsed(source: str, load: Load) -> Schema:

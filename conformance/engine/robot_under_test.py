@@ -29,8 +29,10 @@ from conformance.engine.resending import SentListener
 from conformance.engine.ros_ends import RosEnds
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.motion_map import MotionMap
+from conformance.statement.ros_map import Publishes
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
+from conformance.transport.rosbridge import BridgeClient
 from conformance.verdict.run import Run
 
 # How long a robot that stopped responding has to come back before the rest of the run is called off, s.
@@ -128,7 +130,12 @@ class RobotUnderTest:
         where = self.run.statement.endpoints
         if not where.rest:
             return
-        self.rest = RestInterface(self.run, HttpClient(where.rest, self.connection), self.alive)
+        ros = self.run.statement.ros_map
+        client = HttpClient(where.rest, self.connection)
+        if ros is not None and ros.rosbridge:
+            published = {one.publishes: one.type for one in ros.operations.values() if isinstance(one, Publishes)}
+            client = BridgeClient(where.rest, self.connection, published)
+        self.rest = RestInterface(self.run, client, self.alive)
         if self.run.statement.motion_map is not None and self.run.allow_motion:
             self.rest.stop_device = partial(_stop_by_map, self.rest, self.run.statement.motion_map)
         if self.run.allow_motion or self.run.statement.calls.allow:

@@ -44,14 +44,15 @@ class RosEnds:
 
     def _calls(self, request: Request) -> list[str]:
         """Return the map's operations that a request concerns; of several with one template, the one that it names."""
-        labels = list(self._concerned(request))
+        path = request.target.partition("?")[0]
+        labels = [*self._concerned(request), f"{request.method} {path}"]
         found: dict[str, str] = {}
         for call, one in self._ros.operations.items():
             more = (one.state.read if one.state else "", one.cancel) if isinstance(one, Acts) else ()
             found |= {each: call for each in (call, *more) if any(names_operation(each, label) for label in labels)}
-        path = request.target.partition("?")[0]
+        exact = [call for call in found if call == f"{request.method} {request.target}"]
         named = [found[each] for each in found if not NAME.search(each) and path.endswith(each.partition(" ")[2])]
-        return list(dict.fromkeys(named or found.values()))
+        return list(dict.fromkeys(exact or named or found.values()))
 
     def document(self, findings: Iterable[Finding]) -> list[dict[str, Any]]:
         """Return a row for each operation: its end on ROS, how many cases were judged, and the first finding."""

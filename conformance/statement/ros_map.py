@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
@@ -77,7 +78,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An operation that returns the last message of a topic.
+    """An operation that returns the last message of a topic, or streams its messages.
 
     Attributes:
         topic: its full name.
@@ -85,12 +86,16 @@ class Reads(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
         absent: the statuses without a message: the topic has no publisher or no message, or the last is too old. Empty:
             not judged.
         max_age_s: how old a message may be that the operation returns, s; None: as old as it gets.
+        stream: how it sends each message of the topic, once and in order; empty: it does not, it returns the last one.
+        throttle_s: the least time between two messages of a stream, which leaves out those between, s; 0: it sends all.
     """
 
     topic: Topic
     type: MessageType
     absent: tuple[Status, ...] = ()
     max_age_s: Positive | None = None
+    stream: Literal["sse", "websocket", "rosbridge", ""] = ""
+    throttle_s: Annotated[float, Meta(ge=0)] = 0.0
 
 
 class Publishes(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -199,6 +204,7 @@ class RosMap(msgspec.Struct, frozen=True):
         domain_id: the robot's ROS domain; None: that of the environment.
         non_finite: how NaN and infinities are written: as null, as the strings "NaN", "Infinity" and "-Infinity", as a
             bare NaN or Infinity, or not at all but refused with an error status; None: not judged.
+        rosbridge: URL of the rosbridge that has these operations; empty: they are a web API's.
         integers: how integers of 64 bits are written; None: either, but exactly.
         bytes: how uint8[] and byte[] are written; None: either.
     """
@@ -208,6 +214,7 @@ class RosMap(msgspec.Struct, frozen=True):
     non_finite: Literal["null", "string", "refused", "literal"] | None = None
     integers: Literal["number", "string"] | None = None
     bytes: Literal["base64", "array"] | None = None
+    rosbridge: str = ""
 
     @property
     def domain(self) -> int:
@@ -223,15 +230,59 @@ class RosMap(msgspec.Struct, frozen=True):
         return (*self.operations, *states, *(one.cancel for one in actions if one.cancel))
 
     @property
+    def described(self) -> tuple[str, ...]:
+        """Those of them that a description has: without their queries. OpenAPI has no WebSocket."""
+        found = self.operations.items()
+        sockets = {call for call, one in found if isinstance(one, Reads) and one.stream == "websocket"}
+        return tuple(call.partition("?")[0] for call in self.calls if call not in sockets)
+
+    @property
     def acts(self) -> tuple[str, ...]:
         """The operations that send something to the robot."""
         return tuple(call for call, one in self.operations.items() if isinstance(one, Publishes | Calls | Acts))
 
 
+class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The table ``[ros.rosbridge]``: the types of what is used over it, by name."""
+
+    url: Annotated[str, Meta(pattern=r"^wss?://\S+$")]
+    subscribe: dict[Topic, MessageType] = {}
+    publish: dict[Topic, MessageType] = {}
+    call: dict[Topic, ServiceType] = {}
+    act: dict[Topic, ActionType] = {}
+    timeout_s: Positive | None = None
+
+    def operations(self) -> Iterator[tuple[str, Operation]]:
+        """Yield the operations, as if each had a path of its own (ROSBRIDGE_PROTOCOL.md, 3.3 to 3.4)."""
+        words: dict[str, tuple[str, ...]] = {
+            "running": ("running",), "succeeded": ("4",), "canceled": ("5",), "aborted": ("6",), "rejected": ("0",)
+        }  # fmt: skip
+        goal: dict[str, Any] = {
+            "id": "/id",
+            "feedback": "/feedback",
+            "result": "/result",
+            "cancel": "POST /cancel/{id}",
+        }
+        goal |= {"state": State("GET /goal/{id}", "/status", **words)}
+        fails = {"result": "/values", "failure": Failure("/result", (False,))}
+        for kind, key, call, at, said, types, more in (
+            (Reads, "topic", "GET /subscribe", "/msg", {"op": "subscribe"}, self.subscribe, {"stream": "rosbridge"}),
+            (Publishes, "publishes", "POST /publish", "/msg", {"op": "publish"}, self.publish, {}),
+            (Calls, "service", "POST /call", "/args", {"op": "call_service"}, self.call, fails),
+            (Acts, "action", "POST /act", "/args", {"op": "send_action_goal", "feedback": True}, self.act, goal),
+        ):
+            for name, type_ in types.items():
+                body = {**said, key.replace("publishes", "topic"): name}
+                body |= {"action_type": type_} if kind is Acts else {"type": type_} if kind is Reads else {}
+                named: dict[str, Any] = {key: name, "type": type_, "at": at, "body": body, "timeout_s": self.timeout_s}
+                yield f"{call}{name}", kind(**named, **more)
+
+
 class _Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The table ``[ros]`` as it is written; its operations are of several kinds."""
 
-    operations: Annotated[dict[str, dict[str, Any]], Meta(min_length=1)]
+    operations: dict[str, dict[str, Any]] = {}
+    rosbridge: _Rosbridge | None = None
     domain_id: Annotated[int, Meta(ge=0, le=_MOST_DOMAINS)] | None = None
     non_finite: Literal["null", "string", "refused", "literal"] | None = None
     integers: Literal["number", "string"] | None = None
@@ -255,6 +306,11 @@ def read_ros_map(table: Any, where: str, error: type[TomlFileError]) -> RosMap:
     """
     found = fit({"ros": table}, _File, where, error).ros
     given = {name: getattr(found, name) for name in ("domain_id", "non_finite", "integers", "bytes")}
+    bridge = found.rosbridge
+    if bool(found.operations) == bool(bridge):
+        raise error(f"{where}: [ros] needs one of [ros.operations] and [ros.rosbridge], each in a statement of its own")
+    if bridge:
+        return RosMap(dict(bridge.operations()), rosbridge=bridge.url, **given)
     return RosMap({call: _operation(call, one, where, error) for call, one in found.operations.items()}, **given)
 
 

@@ -273,6 +273,17 @@ def maps_in(path: Path) -> tuple[str, ...]:
     return tuple(name for name in ("motion", "ros", "states") if getattr(found, name) is not None)
 
 
+def bridge_in(path: Path) -> RosMap | None:
+    """Return the ROS map of a statement on a rosbridge; None: it is on another device.
+
+    Raises:
+        StatementError: the statement cannot be read, or the map is invalid.
+    """
+    ros = read_toml(path, _Addresses, StatementError).ros
+    is_bridge = isinstance(ros, dict) and "rosbridge" in ros
+    return read_ros_map(ros, str(path), StatementError) if is_bridge else None
+
+
 def api_of(path: Path) -> Api:
     """Return the description that a statement names, files relative to the statement's folder.
 

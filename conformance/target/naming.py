@@ -6,7 +6,7 @@ import difflib
 import itertools
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
@@ -30,11 +30,13 @@ from conformance.statement.statement import (
     Statement,
     StatementError,
     api_of,
+    bridge_in,
     empty_statement,
     endpoints_of,
     load_statement,
     maps_in,
 )
+from conformance.target.bridging import description_of, usual_map
 from conformance.target.connecting import connection_of, keyed
 from conformance.target.describing import described_contract, is_wsdl, soap_contract
 
@@ -131,9 +133,11 @@ def split_args(targets: tuple[str, ...], openapi: str | None, *, new: bool = Fal
         click.UsageError: two descriptions or two statements are named, or there is no such file.
     """
     for one in targets:
-        if not is_url(one) and not Path(one).exists() and not (new and one.endswith(".toml")):
+        if not is_url(one, bridge=True) and not Path(one).exists() and not (new and one.endswith(".toml")):
             raise click.UsageError(_no_file(one))
-    described = [one for one in targets if is_url(one) or one.endswith((".json", ".yaml", ".yml", ".wsdl"))]
+    described = [
+        one for one in targets if is_url(one, bridge=True) or one.endswith((".json", ".yaml", ".yml", ".wsdl"))
+    ]
     statements = [one for one in targets if one not in described]
     described += [openapi] if openapi else []
     for what, named in (("descriptions", described), ("statements", statements)):
@@ -163,6 +167,14 @@ def what_is_judged(source: str | None, statement: Path | None, options: DeviceOp
         UnreachableError: the server of the description does not respond.
     """
     contract = Contract.load(options.pack)
+    if source and not is_url(source) and is_url(source, bridge=True):
+        if not options.ros_play:
+            raise StatementError(f"{source} is a rosbridge: give --ros-play, or a statement with its map for --ros")
+        statement, source = usual_map(source, options.ros_domain_id or 0, options.out), None
+    if statement and (bridge := bridge_in(statement)):
+        # Nothing else of a web API can be asked of a WebSocket.
+        source = description_of(bridge, options.out)
+        options = replace(options, classes=options.classes or (ROS,))
     api = api_of(statement) if statement else None
     source = source or (api.openapi or api.wsdl if api else None)
     if source is not None:
@@ -243,7 +255,7 @@ def _check_map(declared: Statement, contract: Contract) -> None:
     """
     labels = [operation.label for operation in operations_of(contract)]
     calls = [("motion", call) for call in (declared.motion_map.calls if declared.motion_map else ())]
-    calls += [("ros.operations", call) for call in (declared.ros_map.calls if declared.ros_map else ())]
+    calls += [("ros.operations", call) for call in (declared.ros_map.described if declared.ros_map else ())]
     calls += [("states", call) for call in (declared.state_map.calls if declared.state_map else ())]
     for table, call in calls:
         if not named_by([call], labels):

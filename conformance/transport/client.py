@@ -200,6 +200,10 @@ class HttpClient:
             self.host.encode("idna").decode("ascii"), self.port, self.tls, connection.number
         )
 
+    def twin(self, connection: Connection) -> "HttpClient":
+        """Return another client of the same server."""
+        return HttpClient(self.base_url, connection)
+
     def close(self) -> None:
         """Close all open connections."""
         self._connections.close()

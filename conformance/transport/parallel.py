@@ -105,7 +105,7 @@ def crowd(to: HttpClient, requests: Sequence[Sequence[Outgoing]], timeout_s: flo
 
 def _sent_apart(to: HttpClient, requests: Sequence[Outgoing], timeout_s: float) -> list[Attempt]:
     """Send requests one after another from a client of their own, which has no listeners."""
-    own = HttpClient(to.base_url, to.connection.unheard(request_rate=None, resent=0))
+    own = to.twin(to.connection.unheard(request_rate=None, resent=0))
     attempts: list[Attempt] = []
     try:
         for one in requests:

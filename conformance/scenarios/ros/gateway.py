@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from typing import Any, Final, TypeVar
+
+import msgspec
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK
@@ -16,7 +20,9 @@ from conformance.scenarios.ros.samples import Maker
 from conformance.scenarios.ros.web import written
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
-from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.exchange import Exchange, Outgoing, Response
+from conformance.transport.rosbridge import Subscription
+from conformance.transport.streams import Message, Stream
 from conformance.verdict.run import Run
 
 _Operation = TypeVar("_Operation")
@@ -52,6 +58,8 @@ class Gateway:
     ros: RosMap
     _robot: Robot | None = field(default=None, init=False)
     _problem: str = field(default="", init=False)
+    _numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1), init=False)
+    _streams: dict[str, Stream] = field(default_factory=dict, init=False)
 
     @property
     def plays(self) -> bool:
@@ -95,7 +103,9 @@ class Gateway:
             self._robot = None
 
     def close(self) -> None:
-        """End the robot's end."""
+        """End the robot's end, and all streams."""
+        for stream in self._streams.values():
+            stream.close()
         if self._robot is not None:
             self._robot.close()
 
@@ -148,17 +158,35 @@ class Gateway:
     def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:
         """Return the request of an operation; ``value``: of the ROS message that it gets."""
         document = None
+        if self.ros.rosbridge:
+            # By its id, what comes is known to be the response to this one.
+            body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
             document = written(value, self.definition(_type_of(body)), body, self.ros)
         return self.binding.made(filled(call, body.values), document)
 
     def read(self, call: str, reads: Reads) -> Exchange:
-        """Read a topic.
+        """Read a topic; of a stream, return the last message.
 
         Raises:
-            NoAnswerError: there is no response.
+            NoAnswerError: there is no response, or no message yet.
         """
+        if reads.stream:
+            if call not in self._streams or self._streams[call].ended:
+                self._streams[call] = self.stream(call, reads)
+            return streamed(self._streams[call], self._streams[call].last)
         return self.send(self.request(call, reads), reads.response_s)
+
+    def stream(self, call: str, reads: Reads) -> Stream:
+        """Open the stream of an operation.
+
+        Raises:
+            NoAnswerError: it does not open.
+        """
+        timeout_s = max(reads.response_s, 1.0)
+        if reads.stream == "rosbridge":
+            return Subscription(self.api.client, reads.body, timeout_s, reads.throttle_s)
+        return Stream(self.api.client, self.request(call, reads).target, reads.stream or "sse", timeout_s)
 
     def send(self, made: Outgoing, timeout_s: float) -> Exchange:
         """Send a request.
@@ -169,6 +197,22 @@ class Gateway:
         return self.api.client.send(
             made.method, made.target, headers=made.headers, body=made.body, timeout_s=max(timeout_s, 1.0)
         )
+
+
+class Silence(Exchange):
+    """A stream on which nothing came."""
+
+    @property
+    def came(self) -> str:
+        """A short description, for findings."""
+        return "no message on the stream"
+
+
+def streamed(stream: Stream, message: Message | None) -> Exchange:
+    """Return a message of a stream as a response to the request that opened it."""
+    if message is None:
+        return Silence(stream.request, Response(HTTPStatus.NOT_FOUND, (), b"", 0.0))
+    return Exchange(stream.request, Response(HTTPStatus.OK, (), message.octets, 0.0, received_s=message.at))
 
 
 def _type_of(body: Body) -> str:

@@ -278,7 +278,10 @@ class _Caller:
 
     def _others(self) -> list[tuple[str, Reads | Lists]]:
         found = self._gateway.ros.operations.items()
-        return [(call, one) for call, one in found if isinstance(one, Reads | Lists)][-_BESIDE:]
+        others = [(call, one) for call, one in found if isinstance(one, Reads | Lists)]
+        return [(call, one) for call, one in others if isinstance(one, Lists) or one.stream in {"", "rosbridge"}][
+            -_BESIDE:
+        ]
 
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -39,6 +40,9 @@ def gateway(style: str, domain_id: int, folder: Path, fault: str = "") -> Iterat
         "ROS_STATIC_PEERS": "127.0.0.1",
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     }
+    if style == "rosbridge":
+        yield from _bridge(domain_id, folder, fault, environment)
+        return
     subprocess.run([sys.executable, _GATEWAYS / "surface.py", style, str(domain_id), folder], check=True)
     port, bridge = free_port(), free_port()
     script = "rosbridge.py" if style == "node" else f"on_{style}.py"
@@ -55,6 +59,31 @@ def gateway(style: str, domain_id: int, folder: Path, fault: str = "") -> Iterat
         statement = folder / "statement.toml"
         statement.write_text(_STATEMENT.format(style=style, url=url) + (folder / "ros.toml").read_text())
         yield statement
+
+
+def _bridge(domain_id: int, folder: Path, fault: str, environment: dict[str, str]) -> Iterator[Path]:
+    """Start the rosbridge alone, and yield its statement."""
+    port = free_port()
+    url = f"ws://127.0.0.1:{port}"
+    command = [sys.executable, _GATEWAYS / "rosbridge.py", str(port), str(domain_id), fault]
+    with subprocess.Popen([*map(str, command)], env=environment, stdout=DEVNULL, stderr=DEVNULL) as process:
+        try:
+            until = time.monotonic() + _STARTS_S
+            while True:
+                with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=5):
+                    break
+                assert time.monotonic() < until, f"the rosbridge at {url} does not start"
+                time.sleep(0.05)
+            statement = folder / "statement.toml"
+            statement.write_text(f'[robot]\nname = "rosbridge"\n\n{_map(url, domain_id)}', encoding="utf-8")
+            yield statement
+        finally:
+            process.kill()
+
+
+def _map(url: str, domain_id: int) -> str:
+    code = f"import surface; print(surface.bridge_map({url!r}, {domain_id}))"
+    return subprocess.check_output([sys.executable, "-c", code], cwd=_GATEWAYS, text=True)
 
 
 def _await(url: str) -> None:

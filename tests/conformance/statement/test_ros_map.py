@@ -47,6 +47,14 @@ def test_a_full_map():
     assert "GET /api/v1/goals/{id}" in ros.calls
 
 
+def test_a_stream_is_an_operation_of_its_own():
+    stream = '"GET /pose/{} = {{ topic = "/odom", type = "nav_msgs/msg/Odometry", stream = "{}", throttle_s = 0.5 }}'
+    lines = [stream.format('events?every=500"', "sse"), stream.format('socket"', "websocket")]
+    ros = _read("[operations]\n" + "\n".join(lines))
+    assert [(one.stream, one.throttle_s) for one in ros.operations.values()] == [("sse", 0.5), ("websocket", 0.5)]
+    assert ros.described == ("GET /pose/events",)
+
+
 def test_the_domain_is_that_of_the_environment(monkeypatch):
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     ros = _read(FULL.replace("domain_id = 7", ""))
@@ -71,6 +79,7 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
         ('"GET /api/v1/pose"', '"DELETE /api/v1/pose"', "is read by GET"),
         ('"GET /api/v1/pose"', '"pose"', "must be a method and a path"),
         ('id = "/id"', "", "'id' is missing"),
+        ("max_age_s = 2.0", 'stream = "tcp"', "stream = 'tcp' must be one of"),
     ],
 )
 def test_what_is_wrong_is_named(old, new, said):

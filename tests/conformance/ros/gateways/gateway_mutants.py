@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 _STYLES = ("fastapi", "aiohttp", "flask", "node")
 _IN_PYTHON = _STYLES[:3]
+_STREAMING = ("aiohttp", "fastapi", "rosbridge")
 _GATEWAYS_OF_AN_OPERATOR = 2
 
 
@@ -87,6 +88,17 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "cancel as refused": _IN_PYTHON,
     "first feedback for ever": _STYLES,
     "feedback reordered": _STYLES,
+    # streams
+    "stream drops": _STREAMING,
+    "stream doubles": _STREAMING,
+    "stream reorders": _STREAMING,
+    "stream of the first": _STREAMING,
+    "stream for one client": _STREAMING,
+    "stream once only": _STREAMING,
+    "stream throttle ignored": ("aiohttp", "rosbridge"),
+    "unsubscribe ignored": ("rosbridge",),
+    "wrong id": ("rosbridge",),
+    "service error as success": ("rosbridge",),
     # the graph
     "list of the start": _STYLES,
     "list keeps what is gone": _STYLES,
@@ -101,5 +113,5 @@ def rows() -> tuple[Mutant, ...]:
     return tuple(
         Mutant(styles[(number + step) % len(styles)], fault)
         for number, (fault, styles) in enumerate(OPERATORS.items())
-        for step in range(_GATEWAYS_OF_AN_OPERATOR)
+        for step in range(min(_GATEWAYS_OF_AN_OPERATOR, len(styles)))
     )

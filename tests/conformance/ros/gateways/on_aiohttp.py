@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -93,6 +94,49 @@ async def last(request: web.Request) -> Any:
     if message is None:
         raise _Problem(503, "nothing fresh")
     return web.json_response(text=json.dumps(ros.forms.write(message), ensure_ascii=False))
+
+
+@routes.get("/ros/{name}/events")
+async def events(request: web.Request) -> Any:
+    """Stream the messages of a topic as server-sent events, one in `every_ms` at most."""
+    response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
+    queue, end = _streamed(request)
+    await response.prepare(request)
+    try:
+        while True:
+            await response.write(f"data: {await queue.get()}\n\n".encode())
+    except ConnectionError:
+        return response
+    finally:
+        end()
+
+
+@routes.get("/ros/{name}/socket")
+async def messages(request: web.Request) -> Any:
+    """Send the messages of a topic over a WebSocket."""
+    socket = web.WebSocketResponse()
+    queue, end = _streamed(request)
+    await socket.prepare(request)
+
+    async def forward() -> None:
+        while True:
+            await socket.send_str(await queue.get())
+
+    sending = asyncio.create_task(forward())
+    try:
+        async for _ in socket:
+            pass
+    finally:
+        sending.cancel()
+        end()
+    return socket
+
+
+def _streamed(request: web.Request) -> tuple[asyncio.Queue[str], Callable[[], None]]:
+    queue: asyncio.Queue[str] = asyncio.Queue()
+    loop, throttle_s = asyncio.get_running_loop(), int(request.query.get("every_ms", "0")) / 1000
+    send = partial(loop.call_soon_threadsafe, queue.put_nowait)
+    return queue, ros.stream(_end(_reads, request), send, throttle_s)
 
 
 @routes.post("/ros/{name}/messages")

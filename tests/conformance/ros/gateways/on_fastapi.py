@@ -1,12 +1,14 @@
 """A gateway on FastAPI: async functions, resources under a version, errors as `detail`, absent topics are 404."""
 
 import asyncio
+from collections.abc import AsyncIterator
+from functools import partial
 from typing import Any
 
 import uvicorn
 from action_msgs.msg import GoalStatus
 from fastapi import FastAPI, HTTPException, Request
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, StreamingResponse
 from messages import RefusedError, interface, parsed
 from ros_end import Goal, begun
 from surface import ACTION, PUBLISHES, READS, SERVICES, STYLES, End, openapi
@@ -85,6 +87,22 @@ async def last(name: str) -> Any:
         raise HTTPException(404, "no message")
     # What JSON has no form for was replaced; the standard writer keeps -0.0 and all digits.
     return JSONResponse({"type": end.type, "data": ros.forms.write(message)})
+
+
+@app.get("/api/v1/topics/{name}/events")
+async def events(name: str) -> StreamingResponse:
+    """Stream the messages of a topic as server-sent events."""
+    queue: asyncio.Queue[str] = asyncio.Queue()
+    end = ros.stream(_found(_reads, name), partial(asyncio.get_running_loop().call_soon_threadsafe, queue.put_nowait))
+
+    async def written() -> AsyncIterator[str]:
+        try:
+            while True:
+                yield f"data: {await queue.get()}\n\n"
+        finally:
+            end()
+
+    return StreamingResponse(written(), media_type="text/event-stream")
 
 
 @app.post("/api/v1/topics/{name}", status_code=202)

@@ -4,6 +4,7 @@ Nothing here waits: what takes time returns a future, which each gateway awaits 
 """
 
 import argparse
+import json
 import threading
 import time
 import uuid
@@ -55,7 +56,7 @@ class Goal:
 @dataclass
 class _Heard:
     kind: type
-    callback: Callable[[Any], None]
+    callback: Callable[[Any], None] | None
     subscription: Any = None
     quality: tuple[ReliabilityPolicy, DurabilityPolicy] | None = None
 
@@ -83,6 +84,7 @@ class RosEnd:
         self._last: dict[str, tuple[Any, float]] = {}
         self._ends: dict[str, Any] = {}
         self._held: list[Any] = []
+        self._streams: list[list[str]] = []
         self._waiting, self._recent = 0, deque(maxlen=_MANY)
         self._topics: dict[str, str] = {}
         self._creating = threading.Lock()
@@ -119,14 +121,43 @@ class RosEnd:
     def subscribe(self, topic: str, kind: str, callback: Callable[[Any], None]) -> Callable[[], None]:
         """Call `callback` with each message; return what ends that."""
         heard = _Heard(interface(kind), callback)
-        self._heard.setdefault(topic, []).append(heard)
         self._connect(topic, heard)
+        self._heard.setdefault(topic, []).append(heard)
 
         def end() -> None:
-            self._heard[topic].remove(heard)
-            self.node.destroy_subscription(heard.subscription)
+            heard.callback = None  # the executor may be waiting for it: its own thread destroys it
 
         return end
+
+    def stream(self, end: End, send: Callable[[str], None], throttle_s: float = 0.0) -> Callable[[], None]:
+        """Send the JSON of each message of a topic, and none sooner than so long after another; return what ends it."""
+        held: list[str] = []
+        next_s = 0.0
+
+        def came(message: Any) -> None:
+            nonlocal next_s
+            now = time.monotonic()
+            if now < next_s and self.fault != "stream throttle ignored":
+                return
+            next_s = now + throttle_s
+            held.append(json.dumps(self.forms.write(message), ensure_ascii=False))
+            if self.fault == "stream drops" and len(held) % 4 == 0:
+                return
+            if self.fault == "stream reorders" and not throttle_s:
+                if len(held) % 2 == 0:
+                    send(held[-1])
+                    send(held[-2])
+                return
+            if self.fault == "stream for one client" and self._streams[-1] is not held:
+                return
+            send(held[0 if self.fault == "stream of the first" else -1])
+            if self.fault == "stream doubles":
+                send(held[-1])
+
+        self._streams.append(held)
+        if self.fault == "stream once only" and len(self._streams) > len(READS):
+            return lambda: None
+        return self.subscribe(end.ros, end.type, came)
 
     def last(self, end: End) -> Any:
         """Return the last message of a topic; None without one, or if it is too old."""
@@ -311,7 +342,11 @@ class RosEnd:
     def _look(self) -> None:
         for topic, all_heard in list(self._heard.items()):
             for heard in list(all_heard):
-                self._connect(topic, heard)
+                if heard.callback is None:
+                    all_heard.remove(heard)
+                    self.node.destroy_subscription(heard.subscription)
+                else:
+                    self._connect(topic, heard)
 
     def _connect(self, topic: str, heard: _Heard) -> None:
         """Subscribe with the reliability and durability of the topic's publishers."""
@@ -330,7 +365,9 @@ class RosEnd:
             return
         old, heard.quality = heard.subscription, quality
         profile = QoSProfile(depth=_DEPTH, reliability=quality[0], durability=quality[1])
-        heard.subscription = self.node.create_subscription(heard.kind, topic, heard.callback, profile)
+        heard.subscription = self.node.create_subscription(
+            heard.kind, topic, lambda message: heard.callback and heard.callback(message), profile
+        )
         if old is not None:
             self.node.destroy_subscription(old)
 

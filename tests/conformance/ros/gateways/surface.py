@@ -60,6 +60,7 @@ class Style:
     state_at: str = "/state"
     feedback_at: str = "/feedback"
     outcome_at: str = "/result"
+    streams: dict[str, str] = field(default_factory=dict)
     topics_at: str = ""
     topic_at: str = "/name"
     type_at: str = "/type"
@@ -92,6 +93,7 @@ STYLES = {
         topics="/api/v1/topics",
         topics_at="/topics",
         states=_WORDS,
+        streams={"/api/v1/topics/{}/events": "sse"},
     ),
     "aiohttp": Style(
         Forms(non_finite="string", integers="string", bytes="array"),
@@ -114,6 +116,7 @@ STYLES = {
         topics="/ros",
         topic_at="/topic",
         type_at="/kind",
+        streams={"/ros/{}/events": "sse", "/ros/{}/events?every_ms=200": "sse", "/ros/{}/socket": "websocket"},
         states={"running": [1, 2, 3], "succeeded": [4], "canceled": [5], "aborted": [6]},
     ),
     "flask": Style(
@@ -184,6 +187,10 @@ def ros_map(style: Style, domain_id: int) -> str:
             "at": style.read_at,
             "absent": [style.absent],
         } | ({"max_age_s": end.max_age_s} if end.max_age_s else {})
+    for path, kind in style.streams.items():
+        for end in READS[:2]:
+            throttle = {"throttle_s": 0.2} if "every_ms" in path else {}
+            operations[f"GET {path.format(end.name)}"] = {"topic": end.ros, "type": end.type, "stream": kind} | throttle
     for end in PUBLISHES:
         operations[f"POST {style.publishes.format(end.name)}"] = {
             "publishes": end.ros,
@@ -221,6 +228,16 @@ def ros_map(style: Style, domain_id: int) -> str:
     return "\n".join([*lines, *(f"{_toml(name)} = {_toml(entry)}" for name, entry in operations.items())]) + "\n"
 
 
+def bridge_map(url: str, domain_id: int) -> str:
+    """Return the tables `[ros]` and `[ros.rosbridge]` of a statement."""
+    of = {"subscribe": READS, "publish": PUBLISHES, "call": SERVICES, "act": (ACTION,)}
+    forms = STYLES["node"].forms
+    lines = ["[ros]", f"domain_id = {domain_id}", f'non_finite = "{forms.non_finite}"', f'bytes = "{forms.bytes}"']
+    lines += ["[ros.rosbridge]", f"url = {_toml(url)}", f"timeout_s = {2.5 * DEADLINE_S}"]
+    lines += [f"{what} = {_toml({end.ros: end.type for end in ends})}" for what, ends in of.items()]
+    return "\n".join(lines) + "\n"
+
+
 def openapi(style: Style) -> dict[str, Any]:
     """Return the OpenAPI of a style."""
     forms = style.forms
@@ -228,6 +245,14 @@ def openapi(style: Style) -> dict[str, Any]:
     for end in READS:
         message = _wrapped(style.read_at, forms.schema(interface(end.type), sent=False))
         _put(paths, "get", style.reads.format(end.name), {200: message, style.absent: _ERROR})
+    for path in (path for path, kind in style.streams.items() if kind == "sse" and "?" not in path):
+        for end in READS[:2]:
+            _put(paths, "get", path.format(end.name), {200: {"type": "string"}})
+            operation = paths[path.format(end.name)]["get"]
+            events = operation["responses"]["200"]
+            events["content"] = {"text/event-stream": events["content"]["application/json"]}
+            if f"{path}?every_ms=200" in style.streams:
+                operation["parameters"] = [{"name": "every_ms", "in": "query", "schema": {"type": "integer"}}]
     for end in PUBLISHES:
         done = {style.published: None if style.published == 204 else {"type": "object"}}
         body = _wrapped(style.publish_at, forms.schema(interface(end.type), sent=True))
@@ -296,7 +321,7 @@ def _merged(*schemas: dict[str, Any]) -> dict[str, Any]:
 
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items()) + " }"
     return json.dumps(value)
 
 

@@ -1,0 +1,146 @@
+"""The scenario on streams: messages that are published in a row, and what comes of them over a gateway's streams."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from msgspec.structs import replace
+
+from conformance.observe.clock import WALL_CLOCK
+from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.gateway import PATIENCE_S, Gateway, streamed
+from conformance.scenarios.ros.services import NO_PLAY
+from conformance.scenarios.ros.web import differences, document_of
+from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
+from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.statement.ros_map import Reads
+from conformance.transport.exchange import Exchange
+from conformance.transport.rosbridge import Subscription
+from conformance.transport.streams import Message, Stream
+from conformance.verdict.effort import Effort
+
+# So many messages in a row, and so long after each, s: no more than a subscription with ROS's default depth of 10 keeps
+# while its process waits for a processor.
+_IN_A_ROW: Final = 8
+_GAP_S: Final = 0.02
+_ROUNDS: Final = {"quick": 2, "standard": 3, "deep": 8}
+# A throttled stream is fed for so many of its intervals, by so many messages in each.
+_INTERVALS, _IN_EACH = 4, 5
+# That of a rosbridge, s.
+_THROTTLE_S: Final = 0.2
+# After the last message, what comes twice comes so soon, s.
+_MORE_S: Final = 0.3
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """Messages in a row on a topic, and what came of them over one stream.
+
+    Attributes:
+        operation: of the map.
+        body: its map.
+        how: as a noun phrase.
+        sent: JSON of each message, in the order of publishing.
+        came: for each message of the stream: request and message, and the place in ``sent`` of what it shows; -1: none.
+        lasted_s: from the first message that was published, or came, to the last, s.
+        opened: request and response of the stream's beginning, or what came last.
+        reliable: whether no message is lost on the way to the gateway.
+    """
+
+    operation: str
+    body: Reads
+    how: str
+    sent: tuple[str, ...]
+    came: tuple[tuple[Exchange, int], ...]
+    lasted_s: float
+    opened: Exchange
+    reliable: bool
+
+
+@scenario(needs=(Need.REST,), leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def topic_streams(gateway: Gateway, effort: Effort) -> tuple[Streamed, ...]:
+    """Publish messages in a row, and hear them over streams: of two clients, and again after each has reconnected."""
+    if not gateway.plays:
+        raise NotDeclaredError(NO_PLAY)
+    found: list[Streamed] = []
+    with partial_trace(lambda: tuple(found)):
+        for call, body in gateway.of(Reads):
+            # A rosbridge throttles whatever it is asked to (3.4.4).
+            ways = [body, replace(body, throttle_s=_THROTTLE_S)] if body.stream == "rosbridge" else [body]
+            for way in ways if body.stream else []:
+                with gateway.robot.publishing(body.topic):
+                    for turn in range(1 if way.throttle_s else _ROUNDS[effort.name]):
+                        found += _round(gateway, call, way, turn)
+                        if any(len(one.came) != len(one.sent) for one in found[-2:]):
+                            break
+        if not found:
+            raise NotDeclaredError("[ros.operations] has no topic with 'stream'")
+    return tuple(found)
+
+
+def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Streamed]:
+    """Yield what came over the streams of two clients, which are opened and closed for it."""
+    definition = gateway.definition(body.type)
+    maker, streams = gateway.maker(definition), [gateway.stream(call, body) for _ in range(2)]
+    robot, clock = gateway.robot, WALL_CLOCK
+    try:
+        # The last of these may come late: each is another message than those that count.
+        robot.publish(body.topic, body.type, maker.usual().value, repeat_s=0.1)
+        for stream in streams:
+            stream.heard(1, body.within_s + PATIENCE_S)
+        robot.publish(body.topic, body.type)
+        clock.sleep(_MORE_S + body.throttle_s)
+        for stream in streams:
+            stream.heard()
+        number, gap_s = _IN_A_ROW, _GAP_S
+        if body.throttle_s:
+            number, gap_s = _INTERVALS * _IN_EACH, body.throttle_s / _IN_EACH
+        values = [gateway.complete(body.type, maker.usual().value) for _ in range(number)]
+        began = clock.now()
+        published = robot.publish(body.topic, body.type, *values, gap_s=gap_s)
+        published_s = clock.now() - began
+        for place, stream in enumerate(streams):
+            how = f"{number} messages in a row, {('first', 'second')[place]} of two clients"
+            how += f" after it has reconnected {turn} times" if turn else ""
+            came = _came(stream, 1 if body.throttle_s else number, body)
+            lasted_s = max(published_s, came[-1].at - came[0].at if came else 0.0)
+            shown = tuple(_shown(gateway, stream, one, body, definition, values) for one in came)
+            opened = streamed(stream, came[-1] if came else Message(began, b""))
+            text = tuple(map(json.dumps, values))
+            yield Streamed(call, body, how, text, shown, lasted_s, opened, published.reliably)
+        if isinstance(streams[0], Subscription):
+            streams[0].unsubscribe()
+            clock.sleep(_MORE_S)
+            streams[0].heard()
+            robot.publish(body.topic, body.type, *values)
+            came = streams[0].heard(1, _MORE_S)
+            shown = tuple((streamed(streams[0], one), -1) for one in came)
+            opened = streamed(streams[0], streams[0].last)
+            yield Streamed(call, body, "after it was unsubscribed from", (), shown, 0.0, opened, reliable=True)
+    finally:
+        for stream in streams:
+            stream.close()
+
+
+def _came(stream: Stream, number: int, body: Reads) -> list[Message]:
+    """Return what comes until there are so many messages, or surely no more, and a moment after that."""
+    found: list[Message] = []
+    while len(found) < number and (more := stream.heard(1, body.within_s)):
+        found += more
+    return [*found, *stream.heard(number, _MORE_S + body.throttle_s)]
+
+
+def _shown(
+    gateway: Gateway,
+    stream: Stream,
+    message: Message,
+    body: Reads,
+    definition: Definition,
+    values: list[dict[str, Any]],
+) -> tuple[Exchange, int]:
+    document = document_of(message.octets)
+    places = (n for n, value in enumerate(values) if not differences(document, value, definition, body, gateway.ros))
+    return streamed(stream, message), next(places, -1)
