@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
@@ -18,7 +18,7 @@ from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
-from conformance.documents.json_schema import is_number, kinds_of
+from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
@@ -47,6 +47,9 @@ _GROWS: Final = re.compile(
     r"|\bonly (?:grows?|rises?|increases?)\b",
     re.IGNORECASE,
 )
+# Texts of a description that say that a state is final, and what limits them.
+_IS_FINAL: Final = re.compile(r"([^.;:]*?)\b(?:is|are) (?:final|terminal)\b", re.IGNORECASE)
+_UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
 # Operations after which a number may start again at its beginning.
 _ANEW: Final = frozenset({"reset", "clear", "restart", "reboot", "restore", "zero"})
 
@@ -84,6 +87,12 @@ class Changes:
         reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
+        }
+        # States of which the description says that they are final, by the template of the thing.
+        self._said_final = {
+            template: said
+            for template, name in self._states.items()
+            if (said := _final(reads[template], name, operations))
         }
         # States that one thing alone may be in, by the operation that leads to them; and accepted ones until a read.
         self._alone = {one.label: found for one in operations if "409" in one.responses and (found := _alone(one))}
@@ -141,6 +150,11 @@ class Changes:
         before = self._known.pop(path, None)
         now = _state_in(occasion, name) if state_of(operation) == name else ""
         was = before.value if before is not None and not before.told else ""
+        template = operation.template.rstrip("/").rpartition("/")[0]
+        if now and before is not None and before.value in self._said_final.get(template, ()):
+            expected = f"{before.value} as {name}, which is final by the description, or a refusal"
+            holds = now == before.value or now in _AWAY
+            yield self._case(occasion, holds, expected, f"{now} as {name}", operation.label)
         is_kept = was in FINAL and "409" in operation.responses and words_of(operation.template) & ENDING
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
@@ -247,11 +261,23 @@ def _growing(read: Operation) -> frozenset[str]:
     """Return the numbers of a resource that never become less by its description."""
     parts = flat(read.shape or {}).get("properties", {})
     given = {name: flat(one) for name, one in parts.items() if isinstance(one, dict)}
+
+    def grows(name: str, schema: Schema) -> bool:
+        said = re.compile(rf"\b{re.escape(name)}`? (?:{_GROWS.pattern})", re.IGNORECASE).search(read.text)
+        return bool(said or _GROWS.search(str(schema.get("description", ""))))
+
     return frozenset(
-        name
-        for name, one in given.items()
-        if kinds_of(one) & {"integer", "number"} and _GROWS.search(str(one.get("description", "")))
+        name for name, one in given.items() if kinds_of(one) & {"integer", "number"} and grows(str(name), one)
     )
+
+
+def _final(read: Operation, name: str, operations: Iterable[Operation]) -> frozenset[str]:
+    """Return the states of a thing that its operations call final, as in "done and failed are final"."""
+    given = flat(flat(read.shape or {}).get("properties", {}).get(name, {}))
+    own = [one.text for one in operations if f"{one.template}/".startswith(f"{read.template.rstrip('/')}/")]
+    said = [found[1] for text in own for found in _IS_FINAL.finditer(text) if not _UNLESS.search(found[1])]
+    words = {word for text in said for word in re.findall(r"[\w-]+", text.casefold())}
+    return frozenset(str(one) for one in given.get("enum", ()) if str(one).casefold() in words)
 
 
 def _state_in(occasion: Occasion, name: str) -> str:

@@ -8,6 +8,7 @@ from conformance.checkers.occasion import METHODS, Occasion
 from conformance.documents.openapi import inside_prefix, is_normal
 from conformance.documents.representation import UnreadableError, parse_xml
 from conformance.documents.traceback import inside_shown, path_shown
+from conformance.transport.credentials import WRONG
 from conformance.transport.exchange import Response
 from conformance.verdict.evidence import Case
 
@@ -23,8 +24,13 @@ _ERROR, _NOT_ACCEPTABLE, _SERVER_ERROR, _UNAVAILABLE = 400, 406, 500, 503
 
 
 def inside(occasion: Occasion) -> Iterator[Case]:
-    """Judge that an error shows no traceback, and no path of the device's file system (CWE-209)."""
+    """Judge that an error shows no traceback, no path of the device's file system, and no other request (CWE-209)."""
     if occasion.response.status >= _ERROR:
+        request = occasion.request
+        sent = f"{request.url} {request.headers}".encode() + request.body
+        if WRONG.encode() in occasion.response.body and WRONG.encode() not in sent and request.raw is None:
+            expected, found = "an error that shows nothing of other requests", f"the credentials {WRONG} of another one"
+            yield occasion.case("robustness/no-internals", False, expected, found, cause="credentials")  # noqa: FBT003
         # What is shown differs from file to file, and from one request to the next.
         inside, path = inside_shown(occasion.exchange), path_shown(occasion.exchange)
         found, cause = f"status {occasion.response.status} with {inside or path!r}", "inside" if inside else "path"

@@ -15,6 +15,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
 from conformance.checkers.transitions import Transitions
+from conformance.checkers.untouched import Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
@@ -42,9 +43,11 @@ class RestCheckers:
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far.
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
+        self._untouched = Untouched(contract)
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
+            self._untouched,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
@@ -52,6 +55,7 @@ class RestCheckers:
         self._memory.forget(deletes=deletes)
         self._writes.forget()
         self._changes.forget()
+        self._untouched.forget()
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""

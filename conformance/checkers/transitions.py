@@ -1,18 +1,17 @@
-"""State-dependent operations by the description: the states they start from, and what a refusal leaves unchanged."""
+"""State-dependent operations by the description: the states they start from."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-from conformance.api.rest.patches import same
 from conformance.api.rest.things import collection_of, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -21,25 +20,14 @@ from conformance.verdict.evidence import Case
 _STATES: Final = frozenset({"state", "status", "phase", "mode"})
 # Texts of a description on what an operation does in all states that another sentence does not name.
 _ELSE: Final = re.compile(r"\b(?:an)?other state|\botherwise\b", re.IGNORECASE)
-#: Texts of a description that say that a refusal changes nothing.
-KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
 # Times that a change must follow: once may be a change by itself at that moment.
 _TWICE: Final = 2
-#: Refusals after each of which a change must follow: a change by itself does not.
-OFTEN: Final = 3
 _OCTETS, _MOST = 65_536, 1_000
 
 
-class _Seen(NamedTuple):
-    """The members of a thing, as they were last read, and the refused operation since then."""
-
-    members: dict[str, Any]
-    refused: Operation | None = None
-
-
 class Transitions:
-    """Judges operations of things by the read before them, and each read by the refused operation before it.
+    """Judges operations of things by the read before them.
 
     Args:
         contract: the description's.
@@ -51,11 +39,9 @@ class Transitions:
         # The member with the state of a thing, and the states from which each operation of it starts.
         self._states = {template: name for template, one in reads.items() if (name := state_member(one))}
         self._starts = {one.label: named for one in operations if (named := self._named(reads, one))}
-        self._seen: dict[str, _Seen] = {}
+        # The members of each thing, as they were last read.
+        self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
-        # By operation: how often it was refused between two reads, and which members were others then; "": by nothing.
-        self._refused: Counter[str] = Counter()
-        self._changed: dict[str, Counter[str]] = defaultdict(Counter)
 
     def _named(self, reads: dict[str, Operation], operation: Operation) -> frozenset[str]:
         """Return the states that the description of an operation names; none where they may mean something else."""
@@ -77,13 +63,12 @@ class Transitions:
         above = path.rpartition("/")[0]
         if occasion.request.method in SAFE:
             if occasion.request.method == "GET" and operation is not None:
-                yield from self._read(occasion, operation.template.rstrip("/"), path)
+                self._read(occasion, operation.template.rstrip("/"), path)
             return
         before = self._seen.get(above)
         if operation is not None and before is not None and operation.method == "POST" and occasion.context.usual:
-            yield from self._act(occasion, operation, before.members)
-            if status == HTTPStatus.CONFLICT and before.refused is None:
-                self._seen[above] = _Seen(before.members, operation)
+            yield from self._act(occasion, operation, before)
+            if status == HTTPStatus.CONFLICT:
                 return
         self._seen.clear()
 
@@ -99,29 +84,14 @@ class Transitions:
                 found, cause = f"status {occasion.response.status}, and {state} before", f"{operation.label} {state}"
                 yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
 
-    def _read(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
-        """Judge a read by the one before it, where an operation was refused in between."""
-        answer = occasion.response
-        value = read_json(answer.body).value if is_json(answer.media_type) and len(answer.body) < _OCTETS else None
-        name, before = self._states.get(template, ""), self._seen.pop(path, None)
-        now = represented(value, {plain_name(name)}) if name and answer.ok else {}
-        if not now:
-            return
-        if len(self._seen) < _MOST:
-            self._seen[path] = _Seen(now)
-        if before is None or (before.refused is not None and not KEEPS.search(before.refused.text)):
-            return
-        label = before.refused.label if before.refused is not None else ""
-        self._refused[label] += 1
-        self._changed[label].update(one for one in now if not same(now[one], before.members.get(one)))
-        always = [one for one, count in self._changed[label].items() if count == self._refused[label]]
-        # What changes between two reads alone, and by other refusals, changes by itself.
-        others = {one for other, found in self._changed.items() if other != label for one in found}
-        wrong = next((one for one in always if one not in others), "")
-        if label and self._refused[label] >= OFTEN:
-            expected = f"the members as before {label} with status 409, after which nothing changes by the description"
-            found = f"{shown(now[wrong])} as {wrong}, and {shown(before.members.get(wrong))} before" if wrong else ""
-            yield occasion.case("description/refused-keeps", not wrong, expected, found, cause=f"{label} refused")
+    def _read(self, occasion: Occasion, template: str, path: str) -> None:
+        """Note what a thing reads."""
+        answer, name = occasion.response, self._states.get(template, "")
+        is_usable = bool(name) and answer.ok and is_json(answer.media_type) and len(answer.body) < _OCTETS
+        now = represented(read_json(answer.body).value, {plain_name(name)}) if is_usable else {}
+        self._seen.pop(path, None)
+        if now and len(self._seen) < _MOST:
+            self._seen[path] = now
 
 
 def state_member(read: Operation) -> str:

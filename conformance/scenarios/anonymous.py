@@ -9,7 +9,7 @@ from conformance.api.rest.applicable import allowed, callable_operations
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stranger import Stranger
-from conformance.api.rest.things import collection_of
+from conformance.api.rest.things import collection_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.security import demands
@@ -25,6 +25,9 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 _UNDECIDED: Final = frozenset({404, 409, 410})
 # Operations of a slow device that are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
+# The turn of an identifier that nobody creates.
+_NEVER: Final = 97
+_ABSENT: Final = "roaas-is-not-there"
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
@@ -60,6 +63,12 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                     found += [exchange] if exchange else []
                     if exchange and exchange.response.status in _UNDECIDED:
                         found += _on_new_thing(Surveyor(api, values), operation, request, client, authorized=authorized)
+        # An error of another request shows nothing of the wrong credentials before it.
+        for read in [
+            one for one in operations_of(api.run.contract) if one.method == "GET" and path_chosen(one, _NEVER)
+        ][:1]:
+            with suppress(NoAnswerError):
+                api.client.send("GET", path_chosen(read, _NEVER))
     return (*found, *_on_kept_connection(api, values, closed), *_beyond_ascii(api, values, closed))
 
 

@@ -21,7 +21,8 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, identified, represented
 from conformance.api.rest.values import Values
 from conformance.checkers.changes import ENDING, FINAL, state_of
-from conformance.checkers.transitions import KEEPS, OFTEN, state_member
+from conformance.checkers.transitions import state_member
+from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation

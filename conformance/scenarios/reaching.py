@@ -6,10 +6,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import Inputs, renewed, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Variation
+from conformance.checkers.untouched import ALONE, OFTEN, keeps_all
 from conformance.documents.openapi import Operation, is_json
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Outgoing
@@ -20,6 +22,8 @@ CONFLICT: Final = 409
 #: The device demands a condition, or the condition in the request does not hold.
 WANTS_CONDITION: Final = frozenset({412, 428})
 _IF_MATCH: Final = "if-match"
+# So many refused operations are looked at.
+_AROUND: Final = 2
 _QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)
 
 
@@ -77,3 +81,22 @@ class Reaching:
                 found = True
         self.api.single[label] = self.api.single.get(label, False) and not found
         return found
+
+    def refused(self, status: int, operation: Operation, request: Outgoing) -> None:
+        """Keep a refused request; send the first ones that a state forbade again, if the description says what stays.
+
+        Before and after each, all that can be read without input is read, which a checker judges.
+        """
+        is_new = (status, operation.label) not in self.api.refused
+        self.api.refused.setdefault((status, operation.label), request)
+        held = [label for number, label in self.api.refused if number == CONFLICT]
+        if not (is_new and status == CONFLICT and len(held) <= _AROUND and keeps_all(self.api.run.contract)):
+            return
+        own = [one for (method, _), one in callable_operations(self.api).items() if method == "GET"]
+        reads = [one for one in own if not any(given.required for given in one.parameters)]
+        with suppress(NoAnswerError):
+            for turn in range(-ALONE if len(held) == 1 else 0, OFTEN + 1):
+                if turn > 0:
+                    self.api.send(request)
+                for read in reads:
+                    self.api.send(Outgoing("GET", read.template))

@@ -70,6 +70,9 @@ def special_bodies(
         needed = flat(read.shape or {}).get("required", ())
         nulls = [name for name in there if name not in needed and there[name] is not None and may(name)]
         yield from ({name: None} for name in nulls[:_NULLS] if fits(parts[name], None))
+    # All together, and what has a time zone alone: the device may have a reason to refuse another one.
+    zoned = [{name: one} for name, one in changed.items() if flat(parts[name]).get("format") == "date-time"]
+    yield from (one for one in (changed, *zoned) if one and fits(schema, one))
     yield from half_valid(change, usual, changed)
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
@@ -201,7 +204,9 @@ def _patches(
         lambda: [{"op": "copy", "from": _pointer(one), "path": _pointer(last)}] if one != last else [],
     ]
     for name in (one for one, part in parts.items() if may(one) and "array" in kinds_of(part)):
-        *rest, last_item = alike_and_apart(parts[name])[1] or [None]
+        apart = alike_and_apart(parts[name])[1] or [None]
+        # What is there already would show nothing.
+        *rest, last_item = apart[::-1] if same(first.get(name), apart) else apart
         whole, added = (
             {"op": "add", "path": _pointer(name), "value": rest},
             {"op": "add", "path": f"{_pointer(name)}/-", "value": last_item},
@@ -217,6 +222,8 @@ def _patches(
     for make in makers:
         if (patch := make()) and fits(schema, patch):
             yield patch
+    if fits(schema, []):
+        yield []
     there = now()
     restored = [
         {"op": "replace" if name in there else "add", "path": _pointer(name), "value": value}

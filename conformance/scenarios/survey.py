@@ -254,7 +254,7 @@ class Surveyor:
             self.values.learn(operation, exchange)
             self.values.accepted(operation, request)
         elif status in REFUSALS:
-            self.api.refused.setdefault((status, operation.label), request)
+            self._reaching.refused(status, operation, request)
         if not operation.safe and status not in REFUSALS - WANTS_CONDITION:
             self._reaching.acted()
 

@@ -8,13 +8,14 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listing_of, page_of
+from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import Values
 from conformance.documents.json_schema import is_number
@@ -66,9 +67,10 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
         for read in reads:
             api.run.limit.check()
             with suppress(NoAnswerError):  # the survey tells what breaks a connection
-                first = _compared(api, values, read)
-                again = _compared(api, values, read) if first is not None and first.fault else first
-                found += [one for one in (again,) if one is not None]
+                for compare in (_compared, _chosen):
+                    first = compare(api, values, read)
+                    again = compare(api, values, read) if first is not None and first.fault else first
+                    found += [one for one in (again,) if one is not None]
     if not found:
         raise NoOccasionError("no list is declared as CSV and as JSON, and was the same twice")
     return tuple(found)
@@ -111,8 +113,7 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
     items = [one for one in pages[0].items if isinstance(one, dict)]
     if not items or pages[0].items != pages[1].items or len(items) < len(pages[0].items) or answer.cut:
         return None
-    text = answer.body.decode("utf-8-sig", "replace") if len(answer.body) <= _LARGEST else ""
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    rows = _rows(table)
     columns, head = _columns(rows[0], items) if rows else {}, ",".join(rows[0]) if rows else ""
     other = next((one for one in ";\t|" if len(_columns(head.split(one), items)) > len(columns)), "")
     if other and _COMMAS.search(read.text):
@@ -123,6 +124,41 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
     is_paged = pages[0].goes_on or (listing_of(read) is not None and len(rows) - 1 > len(items))
     fault = next(_differences(rows[1:], items, columns, is_paged=is_paged), "")
     return Table(read.label, table, f"the {len(items)} items that JSON has before and after, one a row", fault)
+
+
+def _chosen(api: RestInterface, values: Values, read: Operation) -> Table | None:
+    """Read a list by one of its filters as JSON and as CSV; None if JSON shows that it does not leave others out."""
+    listing, json_type = listing_of(read), next(filter(is_json, read.formats))
+
+    def ask(media_type: str, **query: Any) -> Exchange:
+        inputs = usual_inputs(read, values)[0]
+        request = written(read, replace(inputs, query={**inputs.query, **query}, accept=media_type))
+        return api.client.send("GET", request.target, headers=request.headers)
+
+    page = page_of(ask(json_type).response, read)
+    items = [one for one in page.items if isinstance(one, dict)] if page is not None else []
+    for name, filter_ in listing.filters.items() if listing is not None else ():
+        texts = list(dict.fromkeys(one[name] for one in items if isinstance(one.get(name), str)))
+        if len(texts) < 2 or not fits(filter_.schema, texts[0]):  # noqa: PLR2004 - one shows no choice
+            continue
+        page = page_of(ask(json_type, **{filter_.name: texts[0]}).response, read)
+        table = ask(_CSV, **{filter_.name: texts[0]})
+        own = {one.get(name) for one in page.items if isinstance(one, dict)} if page is not None else set()
+        rows = _rows(table)
+        place = _columns(rows[0], items).get(name) if rows else None
+        if own != {texts[0]} or place is None or not table.response.ok:
+            return None
+        others = [row[place] for row in rows[1:] if len(row) > place and row[place] in texts[1:]]
+        expected = f"rows with {texts[0]} as {name} alone, as the list by {filter_.name} has them in JSON"
+        return Table(read.label, table, expected, f"a row with {others[0]} as {name}" if others else "")
+    return None
+
+
+def _rows(table: Exchange) -> list[list[str]]:
+    """Return the lines of a table; none if it is too large."""
+    octets = table.response.body
+    text = octets.decode("utf-8-sig", "replace") if len(octets) <= _LARGEST else ""
+    return [row for row in csv.reader(io.StringIO(text)) if row]
 
 
 def _columns(head: list[str], items: list[dict[str, Any]]) -> dict[str, int]:

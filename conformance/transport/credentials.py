@@ -35,7 +35,7 @@ _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
 _REQUEST_LINE: Final = re.compile(rb"(\S+) (\S+) HTTP/")
 _ANSWER: Final = re.compile(r"(Authorization: Digest )[^\r\n]*")
 _SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST\r\n")
-_WRONG: Final = "roaas-not-this-one"
+WRONG: Final = "roaas-not-this-one"
 # Headers whose value begins with the name of a scheme (RFC 9110 11.6.2, 11.7.2); a pair in a Cookie header.
 _AUTHORIZATION: Final = frozenset({"authorization", "proxy-authorization"})
 _COOKIE_VALUE: Final = re.compile(r"([^=;\s]+=)[^;]*")
@@ -67,14 +67,14 @@ class Credential:
     name: str = ""
 
     def __post_init__(self) -> None:
-        if _WRONG not in self.secret:
+        if WRONG not in self.secret:
             for secret in self.secrets:
                 SECRETS.keep(secret, self.variable)
 
     @property
     def variable(self) -> str:
         """The shell variable that stands for the sent text, with its dollar sign; the text itself where it is wrong."""
-        if _WRONG in self.secret:
+        if WRONG in self.secret:
             return self.sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
         return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
@@ -105,9 +105,9 @@ class Credential:
     @property
     def wrong(self) -> Credential:
         """The same credential with a secret that no robot knows; the scheme of an Authorization header is kept."""
-        secret = f"{_WRONG}:x" if self.kind in {Kind.BASIC, Kind.DIGEST} else _WRONG
+        secret = f"{WRONG}:x" if self.kind in {Kind.BASIC, Kind.DIGEST} else WRONG
         if self.kind is Kind.HEADER and self.name.lower() == "cookie":
-            secret = _COOKIE_VALUE.sub(rf"\1{_WRONG}", self.secret)
+            secret = _COOKIE_VALUE.sub(rf"\1{WRONG}", self.secret)
         return Credential(self.kind, f"{self.scheme} {secret}".lstrip(), self.name)
 
     @property

@@ -19,7 +19,7 @@ _FAULTS = {
     "null keeps": _PATCH,
     "null keeps loud": _PATCH,
     "objects replaced": _PATCH,
-    "others reset": _READ,
+    "others reset": _PATCH,
     "steps added": _PATCH,
     "speed cut off": _READ,
     "steps sorted": _READ,

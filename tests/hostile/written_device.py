@@ -75,6 +75,7 @@ class Written:
         id_ = {"in": "path", "name": "id", "required": True, "schema": {"type": "integer", "minimum": 1}}
         query = [{"in": "query", "name": name, "schema": _PARTS[name]} for name in ("kind", "loud")]
         steps = {"type": "array", "items": {"type": "object", "required": ["op", "path"]}}
+        merge, listed = _body(_MERGE, _object(_SETTINGS)), _body(_STEPS, steps)
         paths = {
             "/items": {
                 "get": {"parameters": query, "responses": many},
@@ -90,10 +91,11 @@ class Written:
             "/settings": {
                 "get": {"responses": told},
                 "put": {"requestBody": _body("application/json", _object(_SETTINGS, ("speed",))), "responses": told},
-                "patch": {"requestBody": _body(_STEPS, steps), "responses": told},
+                "patch": {"requestBody": {"content": {**merge["content"], **listed["content"]}}, "responses": told},
             },
         }
         self.write, self.change, self.whole = write, patch, _object(_SETTINGS, ("speed",))
+        self.part = _object(_SETTINGS)
         item = {"GET": self.get, "PUT": self.put, "PATCH": self.patch, "DELETE": self.delete}
         routes = {"/items": {"GET": self.list, "POST": self.post}, "/items/{id}": item}
         return described(paths, "3.1.0"), {
@@ -247,9 +249,14 @@ class Written:
         return web.json_response(self.settings)
 
     async def step(self, request):
-        """Change the settings by a JSON patch."""
+        """Change the settings by a merge patch, or by a JSON patch."""
         operations, made = await self.body(request), list[dict]()
-        if not isinstance(operations, list) or not all(isinstance(one, dict) for one in operations) or not operations:
+        if request.content_type == _MERGE:
+            if refusal := self.refused(operations, self.part, self.settings):
+                return refusal
+            self.settings = merged(self.settings, self.lost(operations, self.settings))
+            return web.json_response(self.settings)
+        if not isinstance(operations, list) or not all(isinstance(one, dict) for one in operations):
             return error(422, "not valid")
         tests = [one for one in operations if one.get("op") == "test"]
         if self.fault == "test ignored" or (self.fault == "last test ignored" and operations[-1:] == tests[-1:]):
@@ -265,7 +272,7 @@ class Written:
         if not made or not fits(self.whole, made[0]):
             return error(422, "not valid")
         self.settings = self.settings if self.fault == "patch without effect" else made[0]
-        if self.fault == "added first" and str(operations[-1].get("path")).endswith("/-"):
+        if self.fault == "added first" and operations and str(operations[-1].get("path")).endswith("/-"):
             steps = self.settings["steps"]
             self.settings = {**self.settings, "steps": [steps[-1], *steps[:-1]]}
         return web.json_response(made[0])

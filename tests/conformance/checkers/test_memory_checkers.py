@@ -53,7 +53,10 @@ _PATHS = {
     },
     "/jobs/{id}/start": {
         "parameters": [_ID],
-        "post": {"summary": "409 while another job is `running`.", "responses": {**_OK, "409": {"description": "no"}}},
+        "post": {
+            "summary": "409 while another job is `running`. Archived is final.",
+            "responses": {**_OK, "409": {"description": "no"}},
+        },
     },
     "/tags": {"post": {"requestBody": _BODY, "responses": _OK}},
     "/tags/{id}": {"parameters": [_ONCE], "get": {"responses": _OK}, "delete": {"responses": _OK}},
@@ -63,7 +66,7 @@ _PATHS = {
     "/keys/{id}": {"parameters": [_UUID], "get": {"responses": _OK}, "delete": {"responses": _OK}},
     "/notes/{id}": {
         "parameters": [_ID],
-        "get": {"responses": _OK},
+        "get": {"summary": "Read a note; its `rank` never falls.", "responses": _OK},
         "patch": {"requestBody": {"content": {"application/merge-patch+json": {"schema": _JOB}}}, "responses": _OK},
     },
     "/reset": {"post": {"responses": _OK}},
@@ -170,6 +173,10 @@ BROKEN = {
     "deleted, and read": ([_post("1"), _delete("1"), 5.0, _get("1")], GONE),
     "a label is deleted, and read": ([_LABEL, _NO_LABEL, 4.0, _below("GET")], GONE),
     "parts outlive their job": ([_delete("1"), _get("1", 404), 4.0, _parts()], GONE),
+    "a rank falls": (
+        [("GET", "/notes/1", None, 200, {"rank": 5}), ("GET", "/notes/1", None, 200, {"rank": 4})], STATES,
+    ),
+    "told archived, and then queued": ([_cancel(phase="archived"), _cancel(act="retry", phase="queued")], STATES),
     "laps fall": ([_get("1", laps=5), _get("1", laps=3)], STATES),
     "two run where one may": (
         [_get("1", phase="running"), *_started("2"), _get("1", phase="running")], STATES,
@@ -254,6 +261,7 @@ BROKEN = {
 RIGHT = {
     "parts of a job that is not gone for sure": [_delete("1"), 4.0, _parts()],
     "parts of another job": [_delete("1"), _get("1", 404), 4.0, ("GET", "/jobs/2/parts", None, 200, [])],
+    "told queued, and then archived": [_cancel(act="retry", phase="queued"), _cancel(phase="archived")],
     "laps of a job that is put again, and of two": [_get("1", laps=5), _put("1"), _get("1", laps=0), _get("2", laps=3)],
     "one runs when the other one has ended": [
         _get("1", phase="running"), *_started("2"), _get("1", phase="done"), _get("2", phase="running"),

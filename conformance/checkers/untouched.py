@@ -1,0 +1,125 @@
+"""What changes between two reads though only a request was refused, or a read had a condition (RFC 9110 9.2.1, 15.5).
+
+Between two equal reads, only one operation was refused, or the resource was read by other header fields. What changes
+then each time, and never between two reads alone, has been changed by that.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any, Final, NamedTuple
+
+from conformance.api.rest.patches import same
+from conformance.api.rest.statuses import refuses
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_text import read_json, shown
+from conformance.documents.openapi import SAFE, is_json
+from conformance.documents.parameters import plain_name
+from conformance.verdict.evidence import Case
+
+#: What changed so often, and did not change between so many reads alone, is no chance.
+OFTEN, ALONE = 3, 2
+_OCTETS, _MOST = 65_536, 1_000
+#: By these words an operation says that it keeps all when it is refused.
+KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
+# Members that change when a thing does.
+_REVISION: Final = re.compile(r"(?:revision|version|etag|(?:updated|modified|changed)(?:at|on|time)?)$")
+# By these words a description says of all requests that a refused one changes nothing.
+_SAID: Final = re.compile(
+    r"\b(?:refus|reject|4xx)\w*\b[^.:]*\b(?:changes? nothing|nothing (?:is )?changed?|no effect|unchanged)",
+    re.IGNORECASE,
+)
+_CONDITIONAL: Final = "GET with If-None-Match"
+
+
+def keeps_all(contract: Contract) -> bool:
+    """Return whether the description says of all requests that a refused one changes nothing."""
+    info = contract.openapi.get("info", {}) if contract.openapi_path else {}
+    return bool(_SAID.search(str(info.get("description", ""))))
+
+
+class _Seen(NamedTuple):
+    """The members of a resource as they were read, and what came since: labels of what should change nothing."""
+
+    members: dict[str, Any]
+    since: frozenset[str] = frozenset()
+
+
+class Untouched:
+    """Judges each plain GET by the one before it, if nothing between them may have changed anything.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        self._keeps_all = keeps_all(contract)
+        self._seen: dict[str, _Seen] = {}
+        # Labels of operations that say so for themselves.
+        self._keeping: set[str] = set()
+        # By template and what came between: how often that was, and which members were others then.
+        self._count: Counter[tuple[str, str]] = Counter()
+        self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+
+    def forget(self) -> None:
+        """Forget all reads: something else may have changed the resources."""
+        self._seen.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, request, status = occasion.operation, occasion.request, occasion.response.status
+        path = occasion.context.target
+        if request.method in SAFE:
+            has_condition = any(name.lower() == "if-none-match" for name, _ in request.headers)
+            if request.method == "GET" and operation is not None and has_condition and path in self._seen:
+                before = self._seen[path]
+                self._seen[path] = before._replace(since=before.since | {_CONDITIONAL})
+            elif request.method == "GET" and operation is not None and occasion.context.plain:
+                yield from self._read(occasion, operation.template, path)
+        elif refuses(status, operation) and operation is not None and occasion.context.usual:
+            label, place = f"{operation.label} with status {status}", f"{path.partition('?')[0].rstrip('/')}/"
+            self._keeping |= {label} if KEEPS.search(operation.text) and status == HTTPStatus.CONFLICT else set()
+            for target, one in self._seen.items():
+                if self._keeps_all or place.startswith(f"{target}/"):
+                    self._seen[target] = one._replace(since=one.since | {label})
+        else:
+            self._seen.clear()
+
+    def _read(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
+        answer, before = occasion.response, self._seen.pop(path, None)
+        is_usable = answer.status == HTTPStatus.OK and is_json(answer.media_type) and len(answer.body) < _OCTETS
+        now = read_json(answer.body).value if is_usable and not answer.cut else None
+        if not isinstance(now, dict):
+            return
+        if len(self._seen) < _MOST:
+            self._seen[path] = _Seen(now)
+        if before is None or len(before.since) > 1:
+            return
+        label = next(iter(before.since), "")
+        key = template, label
+        self._count[key] += 1
+        self._changed[key].update(name for name in now if not same(now[name], before.members.get(name)))
+        if not label or self._count[key] < OFTEN or self._count[template, ""] < ALONE:
+            return
+        # What a refused request may not change: all, by the description, and what tells that the thing has changed.
+        always = [name for name, count in self._changed[key].items() if count == self._count[key]]
+        is_all = self._keeps_all or label == _CONDITIONAL
+        others = {
+            one for other, found in self._changed.items() if other[0] == template and other != key for one in found
+        }
+        wrong = [
+            name
+            for name in always
+            if not self._changed[template, ""][name]
+            and (is_all or _REVISION.search(plain_name(name)) or (label in self._keeping and name not in others))
+        ]
+        id_ = "description/safe" if label == _CONDITIONAL else "description/refused-keeps"
+        found = (
+            f"{shown(now[wrong[0]])} as {wrong[0]}, and {shown(before.members.get(wrong[0]))} before" if wrong else ""
+        )
+        expected = f"the members as before {label}, as {self._count[key]} times"
+        yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched")

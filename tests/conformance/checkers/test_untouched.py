@@ -1,0 +1,92 @@
+"""What should change nothing: refused requests, and reads by a condition; what changes by itself is not blamed."""
+
+import json
+
+import pytest
+from small_device import REFUSED, answers, described
+
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://device:8000"
+_VALVE = {"type": "object", "properties": {"id": {}, "revision": {"type": "integer"}, "seen": {"type": "integer"}}}
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_KEPT, _SAFE, _INSIDE = "description/refused-keeps", "description/safe", "robustness/no-internals"
+_OK = {"200": answers(_VALVE), "4XX": REFUSED}
+_PATHS = {
+    "/valves/{id}": {
+        "parameters": [_ID],
+        "get": {"responses": _OK},
+        "patch": {"requestBody": {"content": {"application/json": {"schema": _VALVE}}}, "responses": _OK},
+    },
+    "/events": {"get": {"responses": _OK}},
+}
+_SAYS = "(R1) A request that is refused (4xx) changes nothing: no resource, and it appends no event."
+_TAG = ("If-None-Match", '"roaas-nothing"')
+
+
+@pytest.fixture(name="contracts", scope="module")
+def _contracts(tmp_path_factory):
+    """Return the contract of a device that says of all refusals that they change nothing, and of one that does not."""
+    found = {}
+    for text in (_SAYS, ""):
+        document = described(_PATHS, "3.1.0")
+        document["info"]["description"] = text
+        found[bool(text)] = Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+    return found
+
+
+def _broken(contract, steps):
+    checkers, broken = RestCheckers(contract, _BASE), set()
+    for number, (line, members, *fields) in enumerate(steps):
+        method, path, status = line.split()
+        body = json.dumps(members).encode()
+        sent = b'{"revision": "x"}' if method == "PATCH" else b""
+        kind = (("Content-Type", "application/json"),)
+        headers = (("Host", "device:8000"), *fields, *(kind if sent else ()))
+        request = Request(method, _BASE + path, headers, sent)
+        exchange = Exchange(request, Response(int(status), kind, body, 1.0, received_s=float(number)))
+        broken |= {one.requirement for one in checkers(exchange) if not one.holds}
+    return broken & {_KEPT, _SAFE, _INSIDE}
+
+
+def _rounds(between, name="revision", path="/valves/1", idle=0, times=3):
+    """Return rounds of a read twice, a request that should change nothing, and a read that shows a change."""
+    found, now = [], 1
+    for _ in range(times):
+        found += [(f"GET {path} 200", {name: now}), (f"GET {path} 200", {name: now + idle})]
+        now += 1 + idle
+        found += [between, (f"GET {path} 200", {name: now})]
+    return found
+
+
+_REFUSAL = ("PATCH /valves/1 422", {})
+_ECHOED = ("GET /valves/9 404", {"detail": "last: Bearer roaas-not-this-one"})
+_BROKEN = {
+    "a refused patch counts as a revision": (_rounds(_REFUSAL), False, _KEPT),
+    "a refused patch appends an event": (_rounds(_REFUSAL, "last", "/events"), True, _KEPT),
+    "a read by a condition counts": (_rounds(("GET /valves/1 200", {"revision": 1}, _TAG)), False, _SAFE),
+    "an error shows credentials of an earlier request": ([_ECHOED], False, _INSIDE),
+}
+_RIGHT = {
+    "a count that goes on by itself": (_rounds(_REFUSAL, idle=1), True),
+    "once, by chance": (_rounds(_REFUSAL, times=2), True),
+    "a member of which nothing is said": (_rounds(_REFUSAL, "seen"), False),
+    "an event, where nothing is said": (_rounds(_REFUSAL, "last", "/events"), False),
+    "a patch that was taken": (_rounds(("PATCH /valves/1 200", {})), True),
+    "its own wrong credentials": ([(*_ECHOED, ("Authorization", "Bearer roaas-not-this-one"))], False),
+}
+
+
+@pytest.mark.parametrize("name", _BROKEN)
+def test_what_should_change_nothing_is_judged(contracts, name):
+    steps, is_said, requirement = _BROKEN[name]
+    assert _broken(contracts[is_said], steps) == {requirement}
+
+
+@pytest.mark.parametrize("name", _RIGHT)
+def test_what_may_change_is_not(contracts, name):
+    steps, is_said = _RIGHT[name]
+    assert _broken(contracts[is_said], steps) == set()
