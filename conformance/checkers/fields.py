@@ -25,6 +25,8 @@ _IMF_FIXDATE = re.compile(
 )
 # Statuses by which a web server itself refuses a request, unless the API's author declares them.
 _OF_PARSERS = frozenset({400, 413, 414, 431})
+# Last-Modified may be later than Date by this, s: a proxy may set Date, and servers write the same Date for a second.
+_SKEW_S: Final = 60.0
 # RFC 9110 8.8.3: entity-tag.
 _ENTITY_TAG = re.compile(r'(?:W/)?"[\x21\x23-\x7e\x80-\xff]*"')
 
@@ -75,6 +77,15 @@ def formats(occasion: Occasion) -> Iterator[Case]:
             holds = _ENTITY_TAG.fullmatch(value.strip()) is not None
             expected = 'ETag with a tag in double quotes, such as "a1" or W/"a1"'
             yield occasion.case("http/etag-format", holds, expected, f"ETag: {value}", cause="etag")
+
+
+def last_modified(occasion: Occasion) -> Iterator[Case]:
+    """Judge that nothing was changed later than the response was made (RFC 9110 8.8.2.1)."""
+    said, now = (occasion.response.header(name) or "" for name in ("last-modified", "date"))
+    if all(_IMF_FIXDATE.fullmatch(one.strip()) and _is_date(one) for one in (said, now)):
+        late = parsedate_to_datetime(said) - parsedate_to_datetime(now)
+        expected, holds = f"Last-Modified no later than Date: {now}", late.total_seconds() <= _SKEW_S
+        yield occasion.case("http/last-modified", holds, expected, f"Last-Modified: {said}", cause="late")
 
 
 @lru_cache(maxsize=64)

@@ -22,7 +22,7 @@ from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.evidence import Case
 
 # Checkers of any response; checkers that need the description's operation.
-_ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.formats)
+_ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.stated, problem.form, fields.allow, fields.challenge,
     declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,

@@ -21,7 +21,7 @@ _MUST_UNDERSTAND: Final = clark(ENVELOPE, "mustUnderstand")
 _FAULT_CHILDREN: Final = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
 _FAULT_CODES: Final = frozenset({"VersionMismatch", "MustUnderstand", "Client", "Server"})
 #: The namespace of SOAP 1.2, as its envelopes have it.
-_SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
+SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
 _CHARSET: Final = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 _UTF: Final = "UTF-8 or UTF-16"
 _DECLARED: Final = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
@@ -69,7 +69,7 @@ class SoapCheckers:
         request = attempt.request
         if not isinstance(attempt, Exchange) or request.method != "POST" or request.url not in self._endpoints:
             return
-        if _SOAP_12 in request.body:
+        if SOAP_12 in request.body:
             return  # a node that has SOAP 1.2 as well answers a request of that version in it
         rules, response = _Rules(attempt), attempt.response
         yield rules.case("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")

@@ -374,8 +374,8 @@ def inside_prefix(contract: Contract, path: str) -> bool:
     }
 
 
-# Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
-_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
+#: Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
+IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 # Fields by which a server may take another method, target or end of the request than the request line says: they would
 # make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
 _STEERING: Final = re.compile(
@@ -389,7 +389,7 @@ _METHOD_IN_QUERY: Final = re.compile(r"_method|_?x?-?http-?method(?:-?override)?
 _FORM_TYPE: Final = "application/x-www-form-urlencoded"
 
 
-def with_sent(value: Any, document: Schema, ignored: frozenset[str] = _IGNORED) -> Any:
+def with_sent(value: Any, document: Schema, ignored: frozenset[str] = IGNORED) -> Any:
     """Return a part of an OpenAPI 3 document with the parameters that are sent, each by its own name.
 
     The specification ignores some header parameters. Those by which a request becomes another one are not sent either.

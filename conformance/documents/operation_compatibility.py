@@ -9,7 +9,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from conformance.documents.json_schema import Schema, kinds_of, modern, pointed
-from conformance.documents.openapi import PARAMETER, methods_of
+from conformance.documents.openapi import IGNORED, PARAMETER, methods_of
 from conformance.documents.parameters import Parameter, by_media_type, read_encoding, read_parameter
 from conformance.documents.schema_compatibility import schema_changes
 from conformance.documents.schema_sides import Side
@@ -17,8 +17,6 @@ from conformance.documents.schema_sides import Side
 #: A change: whether it breaks a client (None if that is not known), and its text.
 Found = tuple[bool | None, str]
 _KINDS: Final = {"query": "query parameter", "header": "header", "cookie": "cookie", "path": "path parameter"}
-# Other keywords describe these (OpenAPI 3.1, 4.8.12.2).
-_IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
 # Styles that write something before a single value.
 _MARKED: Final = frozenset({"matrix", "label"})
 
@@ -76,7 +74,7 @@ class Described:
             given = self.followed(one)
             parameter = read_parameter({**given, "schema": {}})
             name, where = parameter.name, parameter.where
-            if (where == "header" and name.lower() in _IGNORED) or (where == "path" and name not in names):
+            if (where == "header" and name.lower() in IGNORED) or (where == "path" and name not in names):
                 continue
             content: Any = next(iter(given.get("content", {}).values()), {})
             key = str(names.index(name)) if where == "path" else name.lower() if where == "header" else name

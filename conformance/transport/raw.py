@@ -343,8 +343,8 @@ def rest_of(came: RawAnswer, octets: bytes) -> RawAnswer:
     return RawAnswer(octets, came.closed, came.sent_all, came.elapsed_ms)
 
 
-# l_onoff 1, l_linger 0: close() sends RST instead of FIN.
-_RESET: Final = struct.pack("ii", 1, 0)
+#: l_onoff 1, l_linger 0: close() sends RST instead of FIN.
+RESET: Final = struct.pack("ii", 1, 0)
 
 
 class PartialRequest:
@@ -411,7 +411,7 @@ class PartialRequest:
         """Break the connection off, by a TCP reset or by a normal close, as when a client's process is killed."""
         with contextlib.suppress(OSError):
             if reset:
-                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
         with contextlib.suppress(OSError):
             self._socket.close()
         if self._sent_s:

@@ -9,11 +9,11 @@ import contextlib
 import multiprocessing
 import random
 import socket
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import Connection as Pipe
 
+from conformance.transport.raw import RESET
 from proof.selftest.at_once import safe_path
 
 Address = tuple[str, int]
@@ -22,8 +22,6 @@ _SEGMENT = 1460
 # Octets under way in one direction of a connection before the sender has to wait.
 _WINDOW = 262_144
 _START_S = 20.0
-# l_onoff 1, l_linger 0: close() sends RST instead of FIN.
-_RESET = struct.pack("ii", 1, 0)
 
 
 @dataclass(frozen=True)
@@ -213,5 +211,5 @@ def _abort(writer: asyncio.StreamWriter) -> None:
     """Reset a connection, as the other end did."""
     sock: socket.socket = writer.get_extra_info("socket")
     with contextlib.suppress(OSError):
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
     writer.transport.abort()

@@ -17,6 +17,10 @@ from conformance.verdict.evidence import Judge
 
 _LEAK: Final = re.compile(LEAKS)
 _REFUSED: Final = 400
+#: At less than this share of the standard effort, each requirement gets one attack.
+HALF: Final = 0.5
+#: More attacks than there are for any requirement.
+ALL: Final = 99
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,7 @@ def series() -> _Reads:
     "http/date",
     "http/date-format",
     "http/etag-format",
+    "http/last-modified",
     "http/field-once",
     "http/framing",
     "http/json-finite",

@@ -8,7 +8,7 @@ from lxml import etree
 
 from conformance.api.interfaces import Interfaces
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.attack_runner import AttackRunner, judge_calls, outcome
+from conformance.api.soap.attack_runner import ALL, HALF, AttackRunner, judge_calls, outcome
 from conformance.api.soap.attacks import VALUE_SLOT, Attack, Template, attacks
 from conformance.api.soap.callback_server import CallbackServer
 from conformance.contract.classes import Interface, Level
@@ -25,10 +25,6 @@ _REST = "xml-security/rest"
 _XML = "application/xml"
 _BODIES = ("put", "post", "patch")
 _DEADLINE_S = 10.0
-# More attacks than there are for any requirement.
-_EACH = 99
-# At less than half the standard effort (quick runs, slow robots) each requirement gets one attack.
-_HALF = 0.5
 # Attacks that have no meaning for XML bodies over REST.
 _NOT_HERE = frozenset({"no-callback"})
 
@@ -84,13 +80,13 @@ def test_attacks(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
     if Interface.REST in api.run.unreachable:
         pytest.skip(f"the robot's REST interface does not answer: {api.run.unreachable[Interface.REST]}")
     rest, alone = api.client, not soap.there
-    quick = effort.factor < _HALF
+    quick = effort.factor < HALF
     with CallbackServer(rest.host, rest.port) as callbacks:
         runners = []
         for number, (method, path) in enumerate(targets[:1] if quick else targets):
             runner = _runner(api, method, path, alone=alone)
             runners.append(runner)
-            for attack in attacks(_template(rest, path), callbacks.url, 1 if quick else _EACH, f"rest{number}"):
+            for attack in attacks(_template(rest, path), callbacks.url, 1 if quick else ALL, f"rest{number}"):
                 if runner.ids(attack):
                     runner.attack(attack)
         judge_calls(judge, callbacks, runners)

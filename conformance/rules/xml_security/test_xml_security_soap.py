@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from conformance.api.soap.attack_runner import AttackRunner, judge_calls, outcome
+from conformance.api.soap.attack_runner import ALL, HALF, AttackRunner, judge_calls, outcome
 from conformance.api.soap.attacks import IGNORED_SLOT, VALUE_SLOT, Attack, Template, attacks
 from conformance.api.soap.callable_services import SoapServices, callable_services
 from conformance.api.soap.callback_server import CallbackServer
@@ -40,10 +40,6 @@ _NAMES = (
 _SPOOFING = "xml-security/addressing-spoofing"
 _IDS = tuple(f"xml-security/{name}" for name in _NAMES)
 _DEADLINE_S = 10.0
-# More attacks than there are for any requirement.
-_EACH = 99
-# At less than half the standard effort (quick runs, slow robots) each requirement gets one attack.
-_HALF = 0.5
 
 
 def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
@@ -99,7 +95,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 continue
             # Addresses first: a robot that calls them has time until the other attacks are over.
             spoofed = list(_spoofed(service, harmless[0], callbacks))
-            others = _attacks(service, harmless, callbacks, 1 if effort.factor < _HALF else _EACH)
+            others = _attacks(service, harmless, callbacks, 1 if effort.factor < HALF else ALL)
             for chosen in (spoofed[: effort.cases(len(spoofed))], others):
                 runners.append(_runner(judge, service, harmless[0]))
                 for attack in chosen:

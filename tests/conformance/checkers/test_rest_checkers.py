@@ -265,6 +265,12 @@ def test_the_format_of_a_time(name, value, holds):
     assert ("http/date-format" in found) is not holds
 
 
+@pytest.mark.parametrize(("at", "holds"), [("22:00:00", True), ("23:00:59", True), ("23:02:00", False)])
+def test_nothing_is_changed_after_its_response(at, holds):
+    found = seen("OPTIONS", "/robot/velocity/", 204, [DATE, ("Last-Modified", f"Fri, 20 Nov 2026 {at} GMT")])
+    assert ("http/last-modified" in found) is not holds
+
+
 @pytest.mark.parametrize(
     ("value", "holds"),
     [

@@ -11,6 +11,7 @@ from typing import Any, Final
 from lxml import etree
 
 from conformance.api.soap.service import SoapService
+from conformance.checkers.soap import SOAP_12
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
 from conformance.documents.xml import ENVELOPE, NotXmlError, clark, elements, local, parse
@@ -33,8 +34,6 @@ _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soa
 # Plans longer than this are judged only by the check that requests them, octets.
 _LARGE: Final = 100_000
 _SUFFIX: Final = "Response"
-# A service that speaks SOAP 1.2 as well answers it in kind.
-_SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
 #: Name of the requirement, and shape, of what an operation returns.
 _CONTENT: Final[Mapping[str, tuple[str, Shape]]] = {
     "GetPose": ("pose", ODOMETRY),
@@ -75,7 +74,7 @@ class SoapResponses:
             return  # judged as what it is
         parts = [part for part in elements(root) if part.tag == clark(ENVELOPE, "Body")]
         inside = [child for part in parts for child in elements(part)]
-        if _SOAP_12 in exchange.request.body or (inside and local(str(inside[0].tag)) == "Fault"):
+        if SOAP_12 in exchange.request.body or (inside and local(str(inside[0].tag)) == "Fault"):
             return
         # What the robot says of itself is fetched by the checks, and not while an exchange is judged.
         described = [vars(service).get("described", service.contract), service.contract]
