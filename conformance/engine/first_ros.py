@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
 from conformance.contract.toml_file import basic_string
@@ -116,7 +117,8 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
             # A gateway may subscribe only when somebody asks.
             with suppress(NoAnswerError):
                 exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
-                read[one.label] = read_json(exchange.response.body).value
+                response = exchange.response
+                read[one.label] = read_json(response.body).value if response.ok else response.status
     robot = Robot(domain_id, "roaas_init")
     try:
         robot.await_ready()
@@ -152,7 +154,7 @@ def proposed_ros_map(
         operations: of the description.
         graph: the ROS graph.
         domain_id: its domain.
-        read: what operations returned, by label.
+        read: what operations returned, by label: the document, or the status of what was no success.
     """
     found: dict[str, _Proposal] = {}
     followers: set[str] = set()
@@ -164,7 +166,7 @@ def proposed_ros_map(
         if one.method in _SENDS:
             proposal = _goal(one, operations, graph, followers) or _call(one, graph) or _topic(one, graph, written)
         else:
-            proposal = _lists(one, graph, read.get(one.label)) or _topic(one, graph, written)
+            proposal = _lists(one, graph, read.get(one.label)) or _topic(one, graph, written, read.get(one.label))
         if proposal:
             found[one.label] = proposal
             written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
@@ -199,8 +201,11 @@ def _why_not(one: Operation, graph: Graph) -> str:
     return f"nothing on the graph has its fields, of {ends}"
 
 
-def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal | None:
-    """Return the proposal that an operation reads a topic, or publishes on it."""
+def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = None) -> _Proposal | None:
+    """Return the proposal that an operation reads a topic, or publishes on it.
+
+    A declared 404 may be for anything: `absent` is a status that it returned, for want of a message, as it seems.
+    """
     reads = one.method == "GET"
     fits = graph.fitting(one.shape if reads else body_of(one), graph.topics)
     # Some fields of any message may be some of an operation, if not its name says so.
@@ -208,7 +213,8 @@ def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal 
     name, guess = _best(one, fits, written if reads else ())
     if not name:
         return None
-    absent = [int(status) for status in one.responses if status in {"404", "503"}] if reads else []
+    none = isinstance(read, int) and read in {HTTPStatus.NOT_FOUND, HTTPStatus.SERVICE_UNAVAILABLE}
+    absent = [read] if none else []
     keys = {"topic" if reads else "publishes": name, "type": graph.topics[name]} | fits[name].keys
     return _Proposal(keys | ({"absent": absent} if absent else {}), fits[name].forms, guess)
 

@@ -92,6 +92,8 @@ def test_a_failure_shows_both_ends(tmp_path, domain_id):
     assert web[1] in ends["GET /basic"]["differs"]["web"]
     assert ends["POST /velocity"]["compared"] > 0
     assert "differs" not in ends["POST /velocity"]
+    text = (tmp_path / "out" / "certificate.md").read_text(encoding="utf-8")
+    assert re.search(rf"\| `GET /basic` \| reads `/basic` .*{web[1]}.*\|.*{own[1]}", text), text
     page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
     row = page.partition('id="ros"')[2].partition("</tr>")[2].partition("</tr>")[0]
     assert re.search(f"GET /basic.*reads.*BasicTypes.*web says.*{web[1]}.*ROS says.*{own[1]}", row, re.DOTALL), row

@@ -25,7 +25,6 @@ KILLED = {
     "stream reorders": ("stream-order", "fastapi"),
     "stream throttle ignored": ("stream-throttle", "rosbridge"),
     "unsubscribe ignored": ("stream-once", "rosbridge"),
-    "wrong id": ("service-response", "rosbridge"),
     "service error as success": ("service-failure", "rosbridge"),
 }
 
