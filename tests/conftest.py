@@ -6,6 +6,7 @@ import os
 import signal
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from _pytest.terminal import TerminalReporter
@@ -24,12 +25,21 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGQUIT"):
     signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 
-# Folders whose tests start whole commands: few tests that take long. One that began last would run alone at the end.
-_OF_COMMANDS = {"ci", "first_verdict", "hostile", "loadtests", "motion", "selftest"}
+# What takes longest begins first; a module that began last would run alone at the end. Load tests are two chains of
+# minutes, the modules named here take one to three, and tests of these folders start whole commands.
+_LONGEST = (
+    "test_ros_gateway.py", "test_wired_device.py", "test_ros_gateways.py", "test_lost_device.py", "test_servers.py",
+    "test_stateful_devices.py", "test_motion_drive.py", "test_wheel.py", "test_web_servers.py", "test_gateway.py",
+    "test_load_secrets.py", "test_certify_command.py", "test_soap.py", "test_lost_robot.py", "test_bombs.py",
+)  # fmt: skip
+_OF_COMMANDS = {
+    "ci", "cli", "described", "first_verdict", "fleet", "hostile", "loadtests", "motion", "ros", "selftest", "soap",
+    "states", "webservices",
+}  # fmt: skip
 
 
 # Load tests measure. However many processes share the tests, two at most run at a time: one of these, one of the rest.
-_HALF_OF_LOAD_TESTS = ("tests/loadtests/test_load_command.py", "tests/loadtests/test_load_workers.py")
+_HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in ("command", "workers", "locust", "against")}
 
 
 class _Sharing(LoadFileScheduling):
@@ -68,10 +78,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the modules that start commands, and with those that have most tests, if processes share the tests."""
+    """Begin with load tests, the longest modules and those that start commands, if processes share the tests."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         tests = Counter(item.path for item in items)
-        items.sort(key=lambda item: (item.path.parent.name not in _OF_COMMANDS, -tests[item.path], item.path))
+        items.sort(key=lambda item: (*_turn(item.path), -tests[item.path], item.path))
+
+
+def _turn(module: Path) -> tuple[int, bool]:
+    """Return when a module begins; the least comes first."""
+    is_load_test = module.parent.name == "loadtests" and module.name.startswith("test_load_")
+    place = _LONGEST.index(module.name) if module.name in _LONGEST else len(_LONGEST)
+    return -1 if is_load_test else place, module.parent.name not in _OF_COMMANDS
 
 
 def pytest_collection_finish() -> None:

@@ -113,11 +113,12 @@ def test_each_style_that_a_device_reads_rightly_passes(tmp_path):
     assert f"{len(_paths())} of {len(_paths())} operations called" in seen.text
 
 
-@pytest.mark.parametrize("first", range(0, 17, 5))
+@pytest.mark.parametrize("first", [0, 9])
 def test_a_device_that_takes_anything_in_any_style_is_caught_at_quick(tmp_path, first):
-    some = dict(list(_paths().items())[first : first + 5])
+    some = dict(list(_paths().items())[first : first + 9])
     with small_device(described(some), {path: _lax()[path] for path in some}) as url:
-        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
+        more = ("--call", "*", "--select", "description/invalid-refused")
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", *more)
     assert seen.blamed["description/invalid-refused"] == "fail"
     found = {one["operation"].split()[1] for one in seen.result["api"]["operations"] if one["findings"]}
     assert found == some.keys() - {"/ignored"}

@@ -14,12 +14,21 @@ RUNS = 5
 MOVES = QUICK[: QUICK.index("[motion.action]")].replace('beyond_limits = "refused"\n', "")
 
 
-def judged_by_map(serving, motion, tmp_path, api='openapi = "{url}/openapi.json"'):
-    """Return what a run says of a device, by requirement of the class motion; ``api``: where its description is."""
+def judged_by_map(serving, motion, tmp_path, api='openapi = "{url}/openapi.json"', only=()):
+    """Return what a run says of a device, by requirement of the class motion.
+
+    Args:
+        serving: serves the device, and yields its address.
+        motion: its motion map.
+        tmp_path: for the run's files.
+        api: where its description is.
+        only: the names of the requirements that are judged; all without any.
+    """
     statement, out = tmp_path / "device.toml", tmp_path / "out"
     with serving as url:
         statement.write_text(f"[api]\n{api.format(url=url)}\n{motion}", encoding="utf-8")
-        more = ["--allow-motion", "--effort", "quick", "--class", "motion", "--out", str(out)]
+        chosen = [f"--select=motion/{name}" for name in only] or ["--class=motion"]
+        more = ["--allow-motion", "--effort", "quick", *chosen, "--out", str(out)]
         done = ended(sys.executable, "-m", "roaas", "certify", str(statement), *more)
     assert "Traceback" not in done.stdout + done.stderr, done.stderr
     if not (out / "result.json").exists():
@@ -46,6 +55,6 @@ def passed_but(missing, judge):
     return done
 
 
-def of_arm(arm, tmp_path, motion=QUICK):
+def of_arm(arm, tmp_path, motion=QUICK, only=()):
     """Return the same of the arm, whose moves are short."""
-    return judged_by_map(serving_app(arm.app()), motion, tmp_path)
+    return judged_by_map(serving_app(arm.app()), motion, tmp_path, only=only)

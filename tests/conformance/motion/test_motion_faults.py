@@ -7,7 +7,7 @@ from judged_devices import MOVES, of_arm
 
 
 def test_an_incomplete_request_that_moves_the_arm_is_found(tmp_path):
-    done, judged = of_arm(Arm(fault="incomplete-moves"), tmp_path, MOVES)
+    done, judged = of_arm(Arm(fault="incomplete-moves"), tmp_path, MOVES, ["incomplete-still"])
     assert judged["motion/incomplete-still"] == "fail", done.stdout
 
 

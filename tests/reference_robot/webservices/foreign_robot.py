@@ -2,7 +2,7 @@
 
 Run as ``python foreign_robot.py DOMAIN Twist|TwistStamped [silent] [planner]``. It prints one JSON object a line:
 ``ready``, then ``delivery``, ``velocity``, ``goal`` and ``cancel`` as they come. Each line on its stdin is a command:
-``{"odometry": {"x": …, "covariance": …, "stopped_clock": …}}`` publishes that odometry over and over,
+``{"odometry": {"x": …, "covariance": …}}`` publishes that odometry over and over,
 ``{"transform": [x, y, yaw]}`` tells how its odometry lies in the map, ``{"finish": true}`` ends the goal,
 ``{"current_goal": …}`` tells of one that another client sent, ``{"tell_next_goal_as": …}`` tells of the next one that
 comes, and of no later one. After each it tells ``obeyed``. With ``planner`` it tells ``plan`` of each one that it is
@@ -56,7 +56,6 @@ class ForeignRobot(Node):
     def __init__(self, context: Context, velocity: type, *, silent: bool) -> None:
         super().__init__("foreign_robot", context=context)
         self.odometry = None if silent else Odometry()
-        self.stopped_clock = False
         self._tf = self.create_publisher(TFMessage, "/tf", 100)
         self.transforms = TFMessage(transforms=[transform("odom", "base_link", 1.0, 2.0, 3.0)])
         self.tells_goal_as: dict[str, Any] | None = None
@@ -77,8 +76,7 @@ class ForeignRobot(Node):
     def _publish(self) -> None:
         odometry = self.odometry
         if odometry is not None:
-            if not self.stopped_clock:
-                odometry.header.stamp = self.get_clock().now().to_msg()
+            odometry.header.stamp = self.get_clock().now().to_msg()
             self._publisher.publish(odometry)
         self._tf.publish(self.transforms)
 
@@ -143,7 +141,6 @@ class ForeignRobot(Node):
             odometry.pose.pose.position.x = command["odometry"]["x"]
             odometry.pose.covariance[35] = command["odometry"]["covariance"]
             odometry.twist.twist.linear.x = command["odometry"]["x"] / 10
-            self.stopped_clock = command["odometry"].get("stopped_clock", False)
             self.odometry = odometry
         if "transform" in command:
             self.transforms.transforms = [
