@@ -181,7 +181,7 @@ def _report(seed: int) -> dict[str, Any]:
 
 
 def merging(workers: int) -> bool:
-    """Measure the time in which the master merges one report from each of so many workers."""
+    """Measure how long the master takes to merge one report from each worker."""
     reports = [_report(seed) for seed in range(min(workers, 20))]
     size = sum(
         len(part)

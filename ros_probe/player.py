@@ -46,7 +46,7 @@ from ros_probe.values import described, message_of, plain, type_of
 # Messages that came and were not asked for yet, of one topic; then the oldest are lost, and that is said.
 _KEPT: Final = 20_000
 _DEPTH: Final = 5000
-# As many calls and goals may wait at the same moment.
+# Calls and goals that may wait at the same moment.
 _THREADS: Final = 48
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 60.0

@@ -79,7 +79,7 @@ class Looks:
         return [place for place in seen[0][1] if all(place in one for _, one in seen)] if seen else []
 
     def samples(self, operation: str, place: str, begin: float, end: float = math.inf) -> list[Sample]:
-        """Return the samples of a place between two moments; what turns goes on beyond a whole turn."""
+        """Return the samples of a place between two moments; angles go on beyond a whole turn."""
         found: list[Sample] = []
         for moment, numbers in self._seen.get(operation, []):
             if begin <= moment <= end and place in numbers:

@@ -17,7 +17,7 @@ from loadtests.clients.robot import Described
 from loadtests.described.device import Device
 from loadtests.settings.settings import SettingsError
 
-#: So many messages of an operation that acts are tried at most, until the device accepts one.
+#: Messages of an acting operation that are tried until the device accepts one.
 _TRIED = 4
 
 

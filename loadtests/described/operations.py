@@ -74,7 +74,7 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
 
 
 def named_alike(name: str, device: Device) -> str:
-    """Return what the result calls the operation that a name in the statement's [slo] means.
+    """Return the result's name of an operation that the statement's [slo] names.
 
     Raises:
         SettingsError: it means none, or several.

@@ -1,7 +1,7 @@
 """Several operators at one device: all read its state, and one drives it and stops it by the motion map.
 
-What they feel is how late a stop takes effect while the others read. One person alone and all of them take turns, so
-that what else goes on on the machine meets both alike.
+They notice how late a stop takes effect while the others read. Rounds with one operator and with all of them alternate,
+so that other load on the machine affects both alike.
 """
 
 import threading

@@ -20,7 +20,7 @@ from loadtests.statistics.histogram import Histogram
 PAUSE_S = 0.1
 _BEHIND = 10  # requests right behind one another, after the one that follows the pause
 _FEWEST, _MOST = 6, 50
-#: Of the duel's time: what the pauses may take.
+#: Share of the duel's time that the pauses may take.
 _SHARE = 0.2
 
 

@@ -31,7 +31,7 @@ class Addresses:
         """Return a client's request with the robot's own address in it, or None for a path that is not the robot's."""
         if request.side != "rest" or not self.prefix or request.raw is not None:
             return request
-        # In absolute form too (RFC 9112 3.2.2), of which the robot then gets the origin form.
+        # A target in absolute form (RFC 9112 3.2.2) reaches the robot in origin form.
         target = _ORIGIN.sub("", request.target)
         if not target.startswith(self.prefix):
             return None

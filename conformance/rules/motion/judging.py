@@ -15,11 +15,11 @@ from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
-# A velocity is seen to be renewed over so long, s.
+# Time over which a velocity is seen to be renewed, s.
 _RENEWED_S = 0.35
-# A velocity that is renewed does not fall to this part of it in between.
+# Share of a renewed velocity to which it must not fall in between.
 _LULL = 0.5
-# A stop is answered no later than so long after the device must rest, s.
+# Time after the device must rest in which a stop must be answered, s.
 _TOO_LATE_S = 1.0
 #: The scenarios in which a device moves.
 ALL = (

@@ -17,15 +17,15 @@ from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
-# Readings that are so far apart tell a speed, s.
+# Time between two readings that shows a speed, s.
 _APART_S = 0.15
-# And in so long a drive one axis is told from another, s.
+# Time of a drive that tells one axis from another, s.
 _TOLD_S = 0.3
-# Of the declared speed: nobody measures it more exactly than that from outside.
+# Multiple of the declared speed that counts as faster: it cannot be measured more exactly from outside.
 _FASTER = 1.1
 # After the time to rest: for so long a device that still moves has not stopped in time; later it has set out again, s.
 _SOON_S = 0.5
-# Of the time that the rest of a way takes by the speed so far.
+# Share of the time that the rest of a way takes by the speed so far.
 _SURELY = 0.7
 _NO_STOP = NotClaimed("the map declares no stop")
 

@@ -15,12 +15,12 @@ from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
-# Of the hold time: within that part the device must still drive, and at least at this part of its velocity.
+# Part of the hold time in which the device must still drive; least share of its velocity.
 _HELD = (0.2, 0.7)
 _STILL_DRIVES = 0.5
-# A velocity holds for at most so much longer than its hold time, as a part of it, and s.
+# Time that a velocity may hold beyond its hold time: as a share of it, and s.
 _LONGER, _LONGER_S = 0.4, 0.25
-# So long after a refusal a device that it stops is seen to be slower, s.
+# Time after which a device that a refusal stops is seen to be slower, s.
 _SLOWS_S = 0.1
 
 

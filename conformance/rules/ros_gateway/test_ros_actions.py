@@ -22,7 +22,7 @@ _ENDS: Final = {
     Course.SUCCEEDS: "succeeded", Course.GOES_ON: "succeeded", Course.ABORTS: "aborted", Course.CANCELED: "canceled",
     Course.FIRST: "canceled",
 }  # fmt: skip
-# What a server gives is shown so long after, at the latest, by several looks, s.
+# Time in which several reads must show what a server sent, s.
 _SHOWN_S: Final = 0.3
 _SEVERAL: Final = 2
 _NO_STATE: Final = NotClaimed("the map has no state of goals")

@@ -26,9 +26,9 @@ from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
-# So many differing fields say enough.
+# Differing fields that a finding shows.
 _ROWS: Final = 4
-# As many characters of a message.
+# Characters of a message that a finding shows.
 _SHOWN: Final = 200
 #: What the link and a busy machine take on top of what the map says, s.
 SLACK_S: Final = 1.0

@@ -13,7 +13,7 @@ from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.verdict.evidence import Case
 
-# Of a topic of best effort, the suite may miss messages that the gateway has; not most of them.
+# Share of a best-effort topic's messages that the suite may miss although the gateway has them.
 _MISSED: Final = 0.5
 
 

@@ -17,9 +17,9 @@ from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
 from conformance.transport.exchange import NoAnswerError
 from conformance.transport.raw import PartialRequest
 
-# For so long the effect of an attempt at rest is awaited at most, without the time to settle, s.
+# Longest wait for the effect of an attempt at rest, beside the time to settle, s.
 _EFFECT_S: Final = 2.0
-# For so long a server has time to read the part of a request that was sent, s.
+# Time that a server has to read the sent part of a request, s.
 _READ_S: Final = 0.03
 
 

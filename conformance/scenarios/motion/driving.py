@@ -11,10 +11,10 @@ from conformance.scenarios.motion.room import MEASURABLE, Span
 from conformance.scenarios.motion.trace import Reading
 from conformance.scenarios.scenario import NotPossibleError
 
-# A drive back: this share of the limit, and so long at most, s.
+# Share of the limit at which the device drives back, and longest time for that, s.
 _BACK_SHARE: Final = 0.4
 _BACK_S: Final = 20.0
-# A slow drive shows in that time what it changes, s.
+# Time in which a slow drive shows which axes it changes, s.
 _LEARNED_S: Final = 0.5
 
 

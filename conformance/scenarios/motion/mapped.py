@@ -30,15 +30,15 @@ from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velo
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
 
-#: For so long a device that has arrived is watched, s.
+#: How long a device that has arrived is watched, s.
 STAYS_S: Final = 0.3
-# From one reading to the next, s.
+# Pause between two readings, s.
 _PACE_S: Final = 0.02
 # The deadline of a stop, s.
 _STOP_S: Final = 2.0
-# A device that takes one move at a time may still finish the one before: for so long it is asked again, so often, s.
+# Time for which, and interval at which, a move is sent again while the device finishes the one before, s.
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
-# A device that takes no positions comes to rest in that time, s.
+# Time in which a device without positions comes to rest, s.
 _RESTS_S: Final = 5.0
 
 Position = dict[str, float]

@@ -12,9 +12,9 @@ from conformance.statement.motion_map import MotionMap
 
 # A reading is late if it takes longer than usual, and more than this share of the drive.
 _SHARE: Final = 0.1
-# A velocity is measured over so long at least, s.
+# Shortest time over which a velocity is measured, s.
 _LAPSE_S: Final = 0.1
-#: A velocity is steady if each half of so long shows it, s. One that only passes it on its way to another does not.
+#: A velocity is steady if each half of this time shows it, s; one that the device only passes through is not.
 STEADY_S: Final = 0.36
 
 

@@ -20,24 +20,24 @@ from conformance.verdict.run import Run
 
 _NEEDS: Final = (Need.REST, Need.MOTION)
 _Part = TypeVar("_Part")
-# Of the way: so far a device has come when it is stopped, or gets another target.
+# Share of the way after which a device is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
-#: What a slow link or a loaded machine has spoilt is tried again: so often in all.
+#: Tries in all of what a slow link or a loaded machine has spoilt.
 TRIES: Final = 3
 # After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
 # must rest, and at most so long in all, s.
 _AT_LEAST_S: Final = 1.5
 _AT_MOST_S: Final = 5.0
-# Beyond the time of a move that was displaced, s.
+# Time that is added to that of a displaced move, s.
 _LONGER_S: Final = 0.5
 _COMMANDS: Final = 100
 # A velocity with a longer hold time is not commanded only to be let go, s.
 _SHORT_HOLD_S: Final = 2.0
-# The first move surely takes no longer than so many times what it takes by the part that is done.
+# The first move takes at most this multiple of the time that its finished part suggests.
 _SURELY: Final = 1.5
-# A way of at least so many tolerances is long enough to be stopped under way.
+# Tolerances in a way that is long enough to be stopped under way.
 _LONG: Final = 12
-# Of the range of an axis: so far beyond its limits are targets that the device must not take.
+# Shares of an axis's range by which forbidden targets lie beyond its limits.
 _BEYOND: Final = (0.05, 0.5)
 
 

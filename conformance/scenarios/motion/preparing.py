@@ -13,7 +13,7 @@ from conformance.statement.motion_map import MotionMap, Step
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Exchange, Outgoing
 
-# Of the time between two renewals: a lease is renewed after that part.
+# Share of the time between two renewals after which a lease is renewed.
 _SOON: Final = 0.5
 _LOOKS_S: Final = 0.05
 #: Statuses by which a device says that it wants a lease: Conflict, Locked, Precondition Required.

@@ -10,7 +10,7 @@ from conformance.measures.samples import SEVERAL, Noise, Sample, goes_on, slope
 from conformance.scenarios.motion.trace import Reading, Resting
 from conformance.statement.motion_map import MotionMap
 
-#: A device that is watched for less than that is not seen to creep, s.
+#: Shortest time that shows whether a device creeps, s.
 CREEPS_S: Final = 1.0
 # Where the map does not declare how fast a device may seem to move at rest: these shares of its tolerances.
 _OF_SPEED: Final = 0.1

@@ -18,11 +18,11 @@ from conformance.statement.motion_map import MotionMap
 # Responses between the last look at the device that lets a drive go on and the moment when its end arrives: of that
 # reading, of a command, of the next reading, and of the end.
 _BLIND: Final = 3
-# Readings that are at least so far apart show how fast a device is, s.
+# Time between two readings that shows how fast a device is, s.
 _APART_S: Final = 0.3
 # A drive is planned for a device that is so much faster than declared or seen: the fastest is seen under way only.
 _FASTER: Final = 1.25
-# Of the tolerance of an axis: two readings at rest may be so far apart, beside their noise.
+# Share of an axis's tolerance by which two readings at rest may differ, beside their noise.
 _UNSURE: Final = 0.2
 #: A velocity is not lowered to less than this many times the tolerance of its measurement.
 MEASURABLE: Final = 2.0

@@ -18,7 +18,7 @@ from conformance.transport.exchange import Exchange
 _NEEDS = (Need.REST, Need.MOTION)
 _STEP_S = 0.05
 _AT_REST = "at rest"
-# Of the limits: the velocities at which several operations are read.
+# Share of the limits at which several operations are read.
 _SHARE = 0.4
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from conformance.measures.samples import LATE, Noise, usual_s
 from conformance.transport.exchange import Exchange
 
-# A late response takes at least so long, s.
+# A response is late if it takes at least this long, s.
 _LATE_S = 0.1
 
 

@@ -33,34 +33,34 @@ HALF_OPEN: Final = "and the link breaks without a word"
 POLLING: Final = "and the client only goes on reading the state"
 #: How a client vanishes, each as the end of a drive's name.
 WAYS: Final = (SILENT, CLOSED, HALF_OPEN, POLLING)
-# A device of which no hold time is declared is watched for so long, s; no verdict follows.
+# How long a device without a declared hold time is watched, s; no verdict follows.
 _UNDECLARED_S: Final = 2.0
-# For so long a velocity that is not steady is measured once it must be reached, s.
+# How long an unsteady velocity is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
-# Of the limit: a slow velocity, and the slowest.
+# A slow velocity and the slowest, as shares of the limit.
 _SLOW: Final = 0.4
 _SLOWEST: Final = 0.1
-# So many times its tolerance a velocity is at least, to be told from rest.
+# Multiple of its tolerance that a velocity needs to differ from rest.
 _TOLD: Final = 1.5
-# So many velocities turn into each other before the device is stopped; at quick all do.
+# Velocities that follow each other before the device is stopped; at quick effort all do.
 _PAIR: Final = 2
 # A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
 _LONGEST_HOLD_S: Final = 2.0
 # After these parts of the hold time commands that must be refused follow the last one: after the first the device is
 # seen to drive on, and the second renews nothing.
 _REFUSED_AT: Final = (0.1, 0.9)
-# A device is told its velocity that often within its hold time, at least every so many s.
+# Renewals of a velocity within its hold time, and longest time between two, s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
 # Rather than that it is moved for room, a device that is let go may begin this part of the velocity slower.
 _SLOWER: Final = 0.7
-# After the time to rest it is watched for so long, s.
+# How long a device is watched after the time to rest, s.
 _REST_S: Final = 0.5
-# So long one is watched that still moves a little: one that creeps does so on and on, s.
+# How long a device that still moves a little is watched, s: one that creeps goes on.
 _SLOWS_S: Final = 2.0
-# And by at most so many readings more.
+# Most further readings of it.
 _MORE: Final = 50
-# The speed is learned from so many readings.
+# Readings from which the speed is learned.
 _NOTED: Final = 50
 
 

@@ -25,16 +25,16 @@ from conformance.transport.exchange import Exchange
 
 _NEEDS: Final = (Need.REST,)
 _PACE_S: Final = 0.06
-# From one feedback to the next, and so long a goal goes on before it is canceled, s.
+# Pause between two feedbacks; time that a goal goes on before it is canceled, s.
 _GAP_S, _RUNS_S = 0.6, 0.3
-# A goal that refuses to be canceled, and one beside another, go on for so long, s.
+# Time that a goal which refuses to be canceled, or runs beside another, goes on, s.
 _GOES_ON_S: Final = 1.5
 _FEEDBACKS: Final = 3
 _PARTS: Final = ("Goal", "Result", "Feedback")
-# After its end, a goal is read so often.
+# Reads of a goal after its end.
 _AFTERWARDS: Final = 3
 _MORE_S: Final = 0.3
-# A busy server ends a goal so late, s.
+# Delay with which a busy server ends a goal, s.
 _LATE_S: Final = 1.0
 
 

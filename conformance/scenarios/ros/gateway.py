@@ -28,9 +28,9 @@ from conformance.verdict.run import Run
 _Operation = TypeVar("_Operation")
 #: Clients at once for a gateway without a robot.
 CROWD: Final = 32
-# From one look at the gateway to the next, s.
+# Pause between two reads of the gateway, s.
 PACE_S: Final = 0.03
-#: A busy machine may need so much longer to show what comes at last, s.
+#: Further time that a busy machine may need to show the last messages, s.
 PATIENCE_S: Final = 10.0
 _DISCOVERY_S: Final = 15.0
 _KEYS: Final[dict[type, str]] = {

@@ -29,7 +29,7 @@ _REPEAT_S: Final = 0.1
 _LATE_S: Final = 1.0
 _TRIES: Final = 2
 _ROUNDS: Final = 5
-# Reads by which subscriptions that are never closed show.
+# Reads that show whether subscriptions are never closed.
 _READS: Final = {"quick": 20, "standard": 40, "deep": 200}
 
 

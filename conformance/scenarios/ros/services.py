@@ -27,20 +27,20 @@ from conformance.verdict.effort import Effort
 #: Why a scenario cannot be played where there is a real robot.
 NO_PLAY: Final = "the suite is not the robot, whose servers it would order: --ros-play"
 _NEEDS: Final = (Need.REST,)
-# A slow server takes this part of the gateway's time.
+# Share of the gateway's time that a slow server takes.
 _SLOW: Final = 0.2
-# What comes on top of what was sent comes so soon, s.
+# Time in which surplus messages arrive, s.
 _MORE_S: Final = 0.15
-# On top of its time, a response has so long, s.
+# Time that a response has beyond its declared time, s.
 _LATE_S: Final = 2.0
 #: Where others are held up, that is tried again: once may be a coincidence.
 ROUNDS: Final = 2
 _BESIDE: Final = 4
-# A request is held up if it takes so long, s, and so many times as long as it usually takes.
+# A request is held up if it takes this long, s, and this multiple of its usual time.
 _HELD_S, _HELD = 0.8, 5.0
 # What a call held up ends with it: so much before its response arrives, at most, s.
 _TOGETHER_S: Final = 0.25
-# Of many calls at once, every second one is overtaken by the next, s.
+# Time by which every second of many concurrent calls is overtaken by the next, s.
 _OVERTAKEN_S: Final = 0.1
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 

@@ -27,14 +27,14 @@ _NEEDS: Final = (Need.REST,)
 # A message is published again so often, for gateways that subscribe when they are asked, or wait for the next one, s.
 _REPEAT_S: Final = 0.1
 _REPEAT_LARGE_S: Final = 1.0
-# A large one that may be lost on the way is waited for so long, s.
+# Wait for a large message that may be lost, s.
 _LARGE_S: Final = 2.5
 # Reads in a row that show the same wrong message: it is not on its way any more.
 _SURE: Final = 4
 _SURE_S: Final = 0.4
-# After so many messages that never came, an operation is given up.
+# Lost messages after which an operation is given up.
 _GIVES_UP: Final = 2
-# What comes on top of what was sent comes so soon, s.
+# Time in which surplus messages arrive, s.
 _MORE_S: Final = 0.5
 # A watchdog has spoken when nothing came for so long; a topic that is never silent is given up then, s.
 _SILENCE_S: Final = 2.0

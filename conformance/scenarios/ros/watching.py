@@ -17,7 +17,7 @@ from conformance.verdict.effort import Effort
 
 _READS: Final = {"quick": 5, "standard": 15, "deep": 60}
 _AT_ONCE: Final = 2
-# What comes later than declared comes so much later at least, s.
+# Delay beyond the declared one from which a message is late, s.
 _LATE_S: Final = 2.5
 # A message may be on its way to the suite while the gateway has it already, s.
 _COMES_S: Final = 0.5

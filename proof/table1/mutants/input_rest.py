@@ -45,14 +45,14 @@ def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
 
 
 def _filled(value: Any, pattern: Any) -> Any:
-    """Fill in missing members with those of the pattern."""
+    """Fill in a JSON body's missing members with the values of a complete one."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
 
 
 def _known(value: Any, pattern: Any) -> Any:
-    """Remove members that the pattern does not have."""
+    """Remove members that the complete body does not have."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     parts = {**_OPTIONAL, **pattern} if "goal" in pattern or "frame_id" in pattern or "id" in pattern else pattern
