@@ -1,23 +1,15 @@
-"""Load on one HTTP request: by wrk where it is installed, else by sockets in a process of its own.
-
-Both send the next request of a connection when the answer to the last one is complete (a closed model). As a program,
-this module is the second kind: ``python loader.py HOST PORT CONNECTIONS SECONDS < request``.
-"""
+"""Load on one HTTP request by wrk, whose connections each send the next request after a response; and in turns."""
 
 import gc
 import json
 import os
 import re
-import select
-import shutil
 import socket
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 _DEADLINE = 10.0  # seconds for an answer
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
@@ -68,7 +60,7 @@ class Load:
 
 
 def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = None) -> Load:
-    """Repeat a request over several connections for a time, from a second process.
+    """Repeat a request over several connections for a time, by wrk.
 
     Args:
         call: the request.
@@ -81,14 +73,6 @@ def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = N
         if cpus:
             os.sched_setaffinity(0, cpus)
 
-    if shutil.which("wrk"):
-        return _by_wrk(call, connections, seconds, pin)
-    command = [sys.executable, __file__, call.host, str(call.port), str(connections), str(seconds)]
-    done = subprocess.run(command, input=call.octets(), check=True, capture_output=True, preexec_fn=pin)
-    return Load(**json.loads(done.stdout))
-
-
-def _by_wrk(call: Call, connections: int, seconds: float, pin: Callable[[], None]) -> Load:
     script = f"wrk.method = {json.dumps(call.method)}\n"
     if call.body:
         script += f"wrk.body = {json.dumps(call.body)}\nwrk.headers['Content-Type'] = {json.dumps(call.content_type)}\n"
@@ -154,28 +138,3 @@ class _Connection:
         if not end or len(rest) < (int(length[1]) if length else 0):
             return None
         return time.perf_counter() - self._sent, head[9:10] == b"2"
-
-
-def _main(host: str, port: str, connections: str, seconds: str) -> None:
-    request = sys.stdin.buffer.read()
-    poll = select.epoll()
-    by_number = {}
-    started = time.perf_counter()
-    for _ in range(int(connections)):
-        connection = _Connection(host, int(port), request)
-        by_number[connection.socket.fileno()] = connection
-        poll.register(connection.socket, select.EPOLLIN)
-        connection.send()
-    times, errors = [], 0
-    while time.perf_counter() - started < float(seconds):
-        for number, _ in poll.poll(1.0):
-            outcome = by_number[number].received()
-            if outcome is not None:
-                times.append(outcome[0])
-                errors += not outcome[1]
-                by_number[number].send()
-    print(json.dumps(asdict(_load_of(times, errors, time.perf_counter() - started))))
-
-
-if __name__ == "__main__":
-    _main(*sys.argv[1:])

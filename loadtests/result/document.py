@@ -168,6 +168,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     for entry in series:
         entry.after_pause = _after_pause(outcome.paused.get(entry.name))
         entry.modes = modes.modes(measured.total(entry.name, "duel").service)
+    grown = over_time.add_growth(measured, series)
     found = Found(
         measured.plan,
         settings.limits.max_rate,
@@ -187,7 +188,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "valid": not reasons and not undecided,
         "trustworthy": not reasons,
         "invalid_because": reasons + undecided,
-        "notes": [*settings.notes, *outcome.notes, *notes, *spoilt, *losses, *SECRETS.notes],
+        "notes": [*settings.notes, *outcome.notes, *notes, *grown, *spoilt, *losses, *SECRETS.notes],
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started.at),

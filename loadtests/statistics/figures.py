@@ -46,6 +46,7 @@ class Series(msgspec.Struct, kw_only=True):
     failed_response_histogram: str | None
     after_pause: dict[str, Any] | None = None
     modes: dict[str, Any] | None = None
+    growth: dict[str, Any] | None = None
 
     @property
     def name(self) -> SeriesName:

@@ -1,17 +1,27 @@
-"""The run over time: figures by second, by block and by stage of a changing load, and errors with their times."""
+"""The run over time: figures by second, by block and by stage, slow growth, and errors with their times."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from scipy import stats
+
 from loadtests.schedule.plan import SERIES
-from loadtests.statistics.figures import named, plain_quantiles, rounded
+from loadtests.statistics.figures import Series, named, plain_quantiles, rounded
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import Measured, counted
 from loadtests.statistics.recorder import Cell, Recorder
+from loadtests.statistics.rounds import lag_correlation, widening
 
 _NS = 1_000_000_000
 _PHASES = ("duel", "aa")
 WIDTH_S = 1.0
+#: Parts of a run whose medians a slope goes through. With more of them, neighbours would correlate.
+_PARTS = 20
+#: A change over the run of less than this share of the median is not worth a sentence, nor one that comes and goes:
+#: each of so many longer parts has to be slower than the one before (or quicker), as a busy machine makes none.
+_WORTH, _STEADY = 0.2, 5
 
 
 def time_series(measured: Measured) -> dict[str, Any]:
@@ -63,6 +73,51 @@ def blocks(measured: Measured) -> list[dict[str, Any]]:
                 }
             )
     return found
+
+
+def growth(parts: Sequence[tuple[float, Histogram]]) -> dict[str, Any] | None:
+    """Return how the median of the response time changes over a run, in ms per hour, with its 99 % interval.
+
+    The slope is the Theil-Sen estimator through the medians of 20 parts of the run. The interval is Sen's (1968),
+    widened by the correlation of neighbours. None with fewer than 20 blocks. `steady`: it never turned.
+
+    Args:
+        parts: when each block began, in seconds, and its response times.
+    """
+    if len(parts) < _PARTS:
+        return None
+    groups = [parts[one[0] : one[-1] + 1] for one in np.array_split(np.arange(len(parts)), _PARTS)]
+    times = np.array([np.mean([at_s for at_s, _ in group]) for group in groups])
+    medians = np.array([Histogram.sum_of(each for _, each in group).quantile_ms(0.5) for group in groups], float)
+    slope, start, *ends = stats.theilslopes(medians, times, 0.99)
+    correlation = lag_correlation(medians - start - slope * times, np.zeros(_PARTS, int))
+    wider = [slope + (end - slope) * widening(correlation) for end in ends]
+    hour, low, high = (rounded(float(each) * 3600) for each in (slope, *wider))
+    steps = np.sign(np.diff(np.median(medians.reshape(_STEADY, -1), axis=1)))
+    return {
+        "ms_per_hour": hour,
+        "ci99_ms_per_hour": [low, high],
+        "over_run_ms": rounded(float(slope * np.ptp(times))),
+        "steady": bool(abs(steps.sum()) == len(steps)),
+    }
+
+
+def add_growth(measured: Measured, entries: Sequence[Series]) -> list[str]:
+    """Add to each series how its median changes over the run, if the load does not; return what is worth a remark."""
+    said = []
+    for entry in entries if not measured.plan.load.stages else ():
+        found = growth([(one.start_s, counted(one.cell, "response")) for one in measured.blocks(entry.name, "duel")])
+        entry.growth, usual = found, entry.response_ms["p50"]
+        if found is None or usual is None or not found["steady"] or abs(found["over_run_ms"]) < _WORTH * usual:
+            continue
+        low, high = found["ci99_ms_per_hour"]
+        if low > 0 or high < 0:
+            said.append(
+                f"{entry.operation} over {entry.interface.upper()}: its median {'grew' if low > 0 else 'fell'} by "
+                f"{abs(found['over_run_ms']):.3g} ms over the run ({found['ms_per_hour']:.3g} ms per hour, 99 % "
+                f"interval {low:.3g} to {high:.3g}); a longer run shows whether it goes on"
+            )
+    return said
 
 
 def errors(recorder: Recorder, operations: tuple[str, ...]) -> list[dict[str, Any]]:

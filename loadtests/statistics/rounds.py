@@ -132,8 +132,13 @@ class Rounds:
     @property
     def widening(self) -> float:
         """Return by how much the remaining correlation widens an interval, 1 or more."""
-        left = min(max(self.correlation or 0.0, 0.0), _MOST)
-        return math.sqrt((1 + left) / (1 - left))
+        return widening(self.correlation)
+
+
+def widening(correlation: float | None) -> float:
+    """Return by how much the correlation of each value with the next widens an interval, 1 or more."""
+    left = min(max(correlation or 0.0, 0.0), _MOST)
+    return math.sqrt((1 + left) / (1 - left))
 
 
 def lag_correlation(values: Floats, repeats: Ints) -> float | None:

@@ -35,10 +35,26 @@ def registry() -> None:
     help="What a certificate must meet to count (TOML).  [default: the strict policy]",
 )
 @CONTRACT
+@click.option(
+    "--device",
+    "devices",
+    multiple=True,
+    nargs=3,
+    metavar="NAME POLICY PACK",
+    help="Judge the device of this name by a policy (TOML) and a pack of its own, such as the folder of its "
+    "description; repeatable.",
+)
 @click.option("--out", required=True, type=FOLDER, metavar="SITE", help="Folder of the site.")
 @click.pass_obj
 def build(
-    door: FrontDoor, envelopes: tuple[Path, ...], keys: Path, *, policy: Path | None, pack: str | None, out: Path
+    door: FrontDoor,
+    envelopes: tuple[Path, ...],
+    keys: Path,
+    *,
+    policy: Path | None,
+    pack: str | None,
+    devices: tuple[tuple[str, str, str], ...],
+    out: Path,
 ) -> None:
     """Write a static site (SITE) from signed certificates: ENVELOPES are files or folders.
 
@@ -46,10 +62,15 @@ def build(
     envelope verifies; 1 the site is written, and some envelopes were refused; 2 no site is written.
     """
     now = dt.datetime.now(dt.UTC)
-    wanted, known = policy_of(door, policy, pack)
+    usual = policy_of(door, policy, pack)
+    own = {name: policy_of(door, Path(file), folder) for name, file, folder in devices}
     trusted, unusable = read_keys(keys)
     entries = read_entries(envelopes, trusted)
-    found = histories((one for one in entries if isinstance(one, Certificate)), wanted, known, now)
+    certificates = [one for one in entries if isinstance(one, Certificate)]
+    unknown = own.keys() - {one.run.robot.name for one in certificates}
+    if unknown:
+        raise click.UsageError(f"--device: no certificate names the device {', '.join(map(repr, sorted(unknown)))}")
+    found = histories(certificates, lambda name: own.get(name, usual), now)
     refused = [one for one in entries if isinstance(one, Refused)]
     write_site(out, found, refused, now)
     for said in unusable:

@@ -6,7 +6,6 @@ from typing import Any
 
 from reports.latency import against
 from reports.latency.distributions import AllSeries
-from reports.latency.figures.spans import means
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, rate, share
 from reports.pages.page import counted, opened
@@ -57,7 +56,6 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
     A knee is the highest request rate at which the robot still meets the latency criterion.
     """
     return [
-        *_server_share(series),
         *work(series),
         *cold(series),
         *repeated(series),
@@ -68,22 +66,6 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
         *_failed(result, series),
         *_noted(result),
     ]
-
-
-def _server_share(series: AllSeries) -> Iterator[str]:
-    """Yield for each operation how much of SOAP's extra time the server spends, if both state a Server-Timing."""
-    for (operation, client, interface), soap in series.items():
-        rest = series.get((operation, client, "rest"))
-        if (client, interface) != ("wire", "soap") or rest is None:
-            continue
-        rest_parts, soap_parts = means(rest), means(soap)
-        extra = sum(soap_parts.values()) - sum(rest_parts.values())
-        if "server" in rest_parts and "server" in soap_parts and extra > 0:
-            server = soap_parts["server"] - rest_parts["server"]
-            yield (
-                f"SOAP takes {ms(extra)} ms longer than REST for {operation} on average; "
-                f"{ms(server)} ms of that is the server's own work."
-            )
 
 
 def _further(result: Mapping[str, Any]) -> Iterator[str]:
@@ -158,8 +140,6 @@ def _searched(result: Mapping[str, Any]) -> Iterator[str]:
 def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
     errors = sum(one.data["errors"] for one in series.values())
     if not errors and not result.get("errors"):
-        if any(one.data["count"] for one in series.values()):
-            yield "No request failed."
         return
     answered = sum(one.data["count"] for one in series.values())
     told = (

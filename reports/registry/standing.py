@@ -3,7 +3,7 @@
 import datetime as dt
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import msgspec
@@ -105,8 +105,10 @@ class History:
         return tuple(latest.values())
 
 
-def histories(certificates: Iterable[Certificate], policy: Policy, known: Known, now: dt.datetime) -> list[History]:
-    """Group certificates by robot (name and vendor), judge each by the policy, and return the robots sorted by name.
+def histories(
+    certificates: Iterable[Certificate], judged_by: Callable[[str], tuple[Policy, Known]], now: dt.datetime
+) -> list[History]:
+    """Group certificates by robot (name and vendor), judge each by its policy, and return the robots sorted by name.
 
     A later certificate always supersedes an earlier one, whichever trusted key signed it and whatever its verdict: an
     older result may no longer hold. Only a certificate that is dated in the future supersedes none.
@@ -116,11 +118,10 @@ def histories(certificates: Iterable[Certificate], policy: Policy, known: Known,
         robot = certificate.run.robot
         by_robot[robot.name or "", robot.vendor or ""].append(certificate)
     found = []
-    for _, group in sorted(by_robot.items()):
+    for (name, _), group in sorted(by_robot.items()):
+        judged = judged_by(name)
         latest_first = sorted(group, key=lambda one: (_past(one.run.ended, now), one.digest), reverse=True)
-        found.append(
-            History(tuple(_standing(one, policy, known, now, first=not at) for at, one in enumerate(latest_first)))
-        )
+        found.append(History(tuple(_standing(one, *judged, now, first=not at) for at, one in enumerate(latest_first))))
     return found
 
 

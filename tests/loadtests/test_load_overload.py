@@ -13,7 +13,7 @@ from reports.latency.page import latency_html
 @pytest.fixture
 def bucket(started):
     """Start a device that answers so many requests a second; gives its description."""
-    return lambda rate: f"http://127.0.0.1:{started('bucket.py', str(rate))[1]}/openapi.json"
+    return lambda *numbers: f"http://127.0.0.1:{started('bucket.py', *map(str, numbers))[1]}/openapi.json"
 
 
 @contextmanager
@@ -93,6 +93,16 @@ def test_one_side_alone_counts_all_its_requests(bucket, load):
     assert counts["achieved_rate"] == pytest.approx(80, rel=0.05)
     assert re.search(r"^asked +400  80.0/s for 5.0 s$", run.out, re.MULTILINE), run.out
     assert "p99 needs 1,000 requests, and GET /state gets 400: --duration 13 is long enough" in run.err
+
+
+def test_a_device_that_gets_slower_is_told_with_its_slope(bucket, load):
+    run = load(bucket(5000, 20), "--operation 'GET /state' --rate 100 --duration 6 --warmup 0.2")
+    growth = run.series("GET /state", "rest")["growth"]
+    low, high = growth["ci99_ms_per_hour"]
+    assert low < growth["ms_per_hour"] < high
+    assert growth["ms_per_hour"] == pytest.approx(20 * 3600, rel=0.2)
+    assert low > 0
+    assert "GET /state over REST: its median grew by" in run.out
 
 
 def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load):

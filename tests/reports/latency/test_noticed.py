@@ -101,12 +101,12 @@ def test_failures_are_counted_in_time(described):
     assert noticed(described) == ["This run does not show what a user of the robot will notice; the reasons are below."]
 
 
-def test_the_page_begins_with_what_is_noticed_and_shows_service_levels(described):
+def test_the_page_says_what_is_noticed_after_its_verdict_and_shows_service_levels(described):
     page = html.document_fromstring(latency_html(described))
     shown = " ".join(page.text_content().split())
-    first = page.xpath("//p[@id='noticed']")[0].text_content()
+    first = page.xpath("//ul[@id='noticed']/li")[0].text_content()
     assert first.startswith("GET /a/{b_c}: a person")
-    assert shown.index(first[:40]) < shown.index(described["headline"]["sentence"][:40])
+    assert shown.index(first[:40]) > shown.index(described["headline"]["sentence"][:40])
     assert [tag.text for tag in page.xpath("//section[@aria-labelledby='slo']//span")] == [
         "✗ broken",
         "✓ kept",

@@ -101,6 +101,10 @@ def test_a_policy_says_what_counts(host):
     (host.folder / "policy.toml").write_text('efforts = ["quick"]\nfirmware = "2.5"\n')
     host.build("--policy", str(host.folder / "policy.toml"))
     assert index(host)["Courier 7"][0] == "another firmware"
+    assert host.build("--device", "Courier 7", str(host.folder / "policy.toml"), "table1").exit_code == 0
+    assert index(host)["Courier 7"][0] == "another firmware"
+    refused = host.build("--device", "Courier 8", str(host.folder / "policy.toml"), "table1")
+    assert (refused.exit_code, "no certificate names the device 'Courier 8'" in refused.output) == (2, True)
 
 
 def test_the_latest_supersedes_whatever_it_says(host):
