@@ -127,8 +127,8 @@ class _Walker:
 
     def _edges(self, state: str) -> Iterator[tuple[str, str]]:
         for name, one in self._map.operations.items():
-            to = self._led.get((name, state), one.to if one.is_taken_in(state) else "")
-            if to:
+            to = self._led.get((name, state), one.leads(state) if one.is_taken_in(state) else "")
+            if to not in {"", state}:
                 yield name, to
         change = self._map.changes.get(state)
         if change is not None and change.within_s is not None:
@@ -145,10 +145,10 @@ class _Walker:
             return
         one, before = self._map.operations[name], self._read()
         self._tried[name, before] += 1
-        made = self._binding.made(name, one.body)
+        made = self._binding.made(one.send or name, one.body)
         exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
         taken = exchange.response.ok and not self._failed(exchange)
-        wanted = self._map.following(one.to or before) if taken else self._map.following(before)
+        wanted = self._map.following(one.leads(before) if taken else before)
         within_s = (one.within_s or self._map.within_s) if taken else _KEEPS_S
         shown, arrived = [self._read()], False
         for _ in poll_for(self._clock, _PACE_S, within_s):
@@ -171,9 +171,12 @@ class _Walker:
         made = self._binding.made(self._map.read, None)
         exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
         try:
-            return str(at(self._binding.content(exchange.response.body), self._map.at))
+            said = str(at(self._binding.content(exchange.response.body), self._map.at))
         except NoValueError as error:
             raise NotPossibleError(f"[states] {self._map.read} got {exchange.came}: {error}") from error
+        if state := self._map.state_in(said):
+            return state
+        raise NotPossibleError(f"[states] {self._map.read} got {exchange.came}: no state in {said[:80]!r}")
 
     def _failed(self, exchange: Exchange) -> bool:
         if self._map.failed is None:
@@ -191,10 +194,11 @@ def walked(api: RestInterface, state_map: StateMap) -> Walk:
     if not api.run.allow_motion:
         raise NotPossibleError("the operations of [states] act on the device, and --allow-motion was not given")
     walker = _Walker(api, state_map, WALL_CLOCK)
-    taken_in = {name: one.taken_in or state_map.states for name, one in state_map.operations.items()}
+    states = state_map.states
+    taken_in = {name: tuple(filter(one.is_taken_in, states)) for name, one in state_map.operations.items()}
 
     def seen() -> Walk:
-        return Walk(state_map.states, taken_in, tuple(walker.steps), walker.first, walker.here)
+        return Walk(states, taken_in, tuple(walker.steps), walker.first, walker.here)
 
     try:
         walker.walk()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import re
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -18,24 +19,38 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
     """One operation.
 
     Attributes:
-        taken_in: the states in which it is taken (``from``); in all others it must be refused. Empty: in all.
-        to: the state to which it leads; empty: the state stays.
+        send: the operation of the description, where the map calls it by another name; empty: the name is it.
+        taken_in: the states in which it is taken (``from``); in all others it must be refused. Empty: those of a table
+            ``to``, or all.
+        to: the state to which it leads, or a table of them by the state before; empty: the state stays.
         via: states that may be shown on the way there, in this order.
         within_s: time for that, s; None: that of the map.
         body: of the request; None: it has none, or the usual message of a WSDL.
         refusal: the statuses of a refusal; empty: any that is no success.
     """
 
+    send: Call | Literal[""] = ""
     taken_in: tuple[State, ...] = ()
-    to: str = ""
+    to: str | dict[State, State] = ""
     via: tuple[State, ...] = ()
     within_s: Positive | None = None
     body: Any = None
     refusal: tuple[Status, ...] = ()
 
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states that it names, in their order."""
+        leads = {"": self.to} if isinstance(self.to, str) else self.to
+        return (*self.taken_in, *leads, *self.via, *leads.values())
+
     def is_taken_in(self, state: str) -> bool:
         """Return whether it is taken in a state."""
-        return not self.taken_in or state in self.taken_in
+        named = self.taken_in or (() if isinstance(self.to, str) else tuple(self.to))
+        return not named or state in named
+
+    def leads(self, state: str) -> str:
+        """Return the state to which it leads from another one."""
+        return (self.to if isinstance(self.to, str) else self.to.get(state, "")) or state
 
 
 class Change(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,8 +70,9 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         read: the operation that tells the state.
-        at: where the state is in its response.
-        operations: by "METHOD PATH" or "POST /PORT/OPERATION" of a WSDL.
+        at: where the state is in its response, whatever its status.
+        pattern: a regular expression that finds the state in that text, as its only group; empty: the text is it.
+        operations: by "METHOD PATH" or "POST /PORT/OPERATION" of a WSDL, or by another name if they have ``send``.
         changes: what the device does by itself, by the state before it.
         within_s: time for an operation without a time of its own, s.
         failed: how a 2xx says that its request failed, or None.
@@ -64,31 +80,46 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     read: Call
     at: Pointer
-    operations: dict[Call, Operation]
+    operations: dict[str, Operation]
+    pattern: str = ""
     changes: dict[str, Change] = {}
     within_s: Positive = 5.0
     failed: Failed | None = None
 
     def __post_init__(self) -> None:
-        """Check that there is something to judge.
+        """Check that there is something to judge, that each operation can be sent, and that the state can be found.
 
         Raises:
-            ValueError: there are fewer than two states.
+            ValueError: there are fewer than two states, or a name is no operation, or the pattern has not one group.
         """
+        for name, one in self.operations.items():
+            if not (one.send or re.match(r"[A-Z]+ /\S*$", name)):
+                raise ValueError(f'{name!r} is no "METHOD PATH", so it needs send = "METHOD PATH"')
+        try:
+            groups = re.compile(self.pattern).groups if self.pattern else 1
+        except re.error as error:
+            raise ValueError(f"pattern = {self.pattern!r} is no regular expression: {error}") from error
+        if groups != 1:
+            raise ValueError(f"pattern = {self.pattern!r} must have one group, which is the state")
         if len(self.states) < 2:  # noqa: PLR2004 - a state, and another one
             raise ValueError("operations name fewer than two states in from, to and via")
 
     @property
     def states(self) -> tuple[str, ...]:
         """All states that the map names, in the order in which it does."""
-        named = [one for each in self.operations.values() for one in (*each.taken_in, *each.via, each.to) if one]
+        named = [one for each in self.operations.values() for one in each.states if one]
         changing = [one for name, each in self.changes.items() for one in (name, *each.to)]
         return tuple(dict.fromkeys((*named, *changing)))
 
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names, that which reads first."""
-        return (self.read, *self.operations)
+        return (self.read, *(one.send or name for name, one in self.operations.items()))
+
+    def state_in(self, text: str) -> str:
+        """Return the state that a text names; empty: none."""
+        found = re.search(self.pattern, text) if self.pattern else None
+        return found[1] or "" if found else "" if self.pattern else text
 
     def following(self, state: str) -> frozenset[str]:
         """Return a state and those that it may change to by itself, in order."""

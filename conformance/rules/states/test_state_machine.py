@@ -84,7 +84,7 @@ def leads(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
         one = state_map.operations[step.operation]
         if not (step.taken and one.is_taken_in(step.state)):
             continue
-        wanted, within_s = one.to or step.state, one.within_s or state_map.within_s
+        wanted, within_s = one.leads(step.state), one.within_s or state_map.within_s
         lasts = step.shown[-1] in state_map.following(wanted)
         expected = f"the state {wanted} within {within_s:g} s after {step.operation} in {step.state}, and afterwards"
         found = f"{', then '.join(step.shown)}" + ("" if step.arrived else f" after {within_s:g} s")
@@ -98,12 +98,12 @@ def order(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
         one = state_map.operations[step.operation]
         if not (step.taken and one.to and one.is_taken_in(step.state)):
             continue
-        way = [state_map.following(step.state) - {one.to}, *({state} for state in one.via), state_map.following(one.to)]
-        at = 0
+        to, at = one.leads(step.state), 0
+        way = [state_map.following(step.state) - {to}, *({state} for state in one.via), state_map.following(to)]
         for state in step.shown:
             if state in trace.states:
                 at = next((index for index in range(at, len(way)) if state in way[index]), len(way))
-        named = ", ".join((step.state, *one.via, one.to))
+        named = ", ".join((step.state, *one.via, to))
         expected = f"of {named} each at most once, in this order, after {step.operation}"
         yield Case(
             at < len(way), step.exchange, expected, ", then ".join(step.shown), f"{step.operation} in {step.state}"

@@ -11,12 +11,13 @@ MAP = """
 [states]
 read = "GET /cell"
 at = "/state"
+pattern = "^([a-z ]+)$"
 within_s = 2
 
 [states.operations]
 "POST /start" = { from = ["ready"], via = ["starting"], to = "running" }
 "POST /pause" = { from = ["running"], to = "paused" }
-"POST /resume" = { from = ["paused"], to = "running" }
+go-on = { send = "POST /resume", to = { paused = "running" } }
 "POST /stop" = { from = ["ready", "starting", "running", "paused"], to = "ready" }
 "POST /estop" = { to = "protective stop" }
 "POST /reset" = { from = ["protective stop"], to = "ready", refusal = [409] }
