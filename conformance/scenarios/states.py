@@ -110,6 +110,8 @@ class _Walker:
         return self._way(lambda state: not all(self._is_done(name, state) for name in self._map.operations))
 
     def _is_done(self, name: str, state: str) -> bool:
+        if state in self._map.operations[name].not_in:
+            return True
         return self._tried[name, state] >= (_TRIES if state in self._map.changes else 1)
 
     def _way(self, is_wanted: Callable[[str], bool]) -> str | None:
@@ -127,7 +129,8 @@ class _Walker:
 
     def _edges(self, state: str) -> Iterator[tuple[str, str]]:
         for name, one in self._map.operations.items():
-            to = self._led.get((name, state), one.leads(state) if one.is_taken_in(state) else "")
+            is_taken = one.is_taken_in(state) and state not in one.not_in
+            to = self._led.get((name, state), one.leads(state) if is_taken else "")
             if to not in {"", state}:
                 yield name, to
         change = self._map.changes.get(state)

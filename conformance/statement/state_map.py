@@ -22,6 +22,7 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
         send: the operation of the description, where the map calls it by another name; empty: the name is it.
         taken_in: the states in which it is taken (``from``); in all others it must be refused. Empty: those of a table
             ``to``, or all.
+        not_in: the states in which it is not sent: nobody says what comes of it there.
         to: the state to which it leads, or a table of them by the state before; empty: the state stays.
         via: states that may be shown on the way there, in this order.
         within_s: time for that, s; None: that of the map.
@@ -31,6 +32,7 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
 
     send: Call | Literal[""] = ""
     taken_in: tuple[State, ...] = ()
+    not_in: tuple[State, ...] = ()
     to: str | dict[State, State] = ""
     via: tuple[State, ...] = ()
     within_s: Positive | None = None
@@ -41,7 +43,7 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
     def states(self) -> tuple[str, ...]:
         """The states that it names, in their order."""
         leads = {"": self.to} if isinstance(self.to, str) else self.to
-        return (*self.taken_in, *leads, *self.via, *leads.values())
+        return (*self.taken_in, *self.not_in, *leads, *self.via, *leads.values())
 
     def is_taken_in(self, state: str) -> bool:
         """Return whether it is taken in a state."""

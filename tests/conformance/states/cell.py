@@ -19,7 +19,7 @@ within_s = 2
 "POST /pause" = { from = ["running"], to = "paused" }
 go-on = { send = "POST /resume", to = { paused = "running" } }
 "POST /stop" = { from = ["ready", "starting", "running", "paused"], to = "ready" }
-"POST /estop" = { to = "protective stop" }
+"POST /estop" = { not_in = ["paused"], to = "protective stop" }
 "POST /reset" = { from = ["protective stop"], to = "ready", refusal = [409] }
 "PUT /speed" = { from = ["ready", "paused"], body = { percent = 20 } }
 

@@ -2,6 +2,7 @@
 
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -12,12 +13,14 @@ from small_device import certified, small_device
 from conformance.contract.pack import Contract
 from conformance.rules.states import test_state_machine
 from conformance.scenarios.rule import Rule
-from conformance.scenarios.states import walked
+from conformance.scenarios.states import Step, Walk, walked
 from conformance.statement.state_map import StateMap
 from conformance.statement.statement import StatementError, load_statement
+from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
 from reports.certificate.states_shown import grid
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 _RULES = [one for one in vars(test_state_machine).values() if isinstance(one, Rule)]
 
 
@@ -58,6 +61,7 @@ def test_a_right_cell_is_led_through_all_states_and_back(judged, tmp_path):
     shown = grid(tmp_path / "out", outcome.result)
     assert shown is not None
     assert "".join(cell.sign[:3] for cell in shown.rows["POST /reset"]) == "✓ r·✓ r✓ r✓ t"
+    assert "".join(cell.sign[:3] for cell in shown.rows["POST /estop"]) == "✓ t·✓ t·✓ t"
 
 
 @pytest.fixture(scope="module")
@@ -81,12 +85,30 @@ def test_a_program_that_ends_by_itself_is_no_fault(judged):
     assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
 
 
+@pytest.mark.parametrize(("ends", "blamed"), [(["paused", "ready"], set()), (["ready"] * 2, {"leads"})])
+def test_what_was_over_before_it_could_pause_is_excused_by_a_try_in_time(ends, blamed):
+    more = 'running = { to = ["ready"] }\n'
+    states = msgspec.convert(tomllib.loads(MAP + more)["states"], StateMap)
+    exchange = Exchange(Request("POST", "http://cell/pause", (), b""), Response(200, (), b"", 1.0))
+    steps = [Step("POST /pause", "running", exchange, True, (end,), end == "paused") for end in ends]
+    walk = Walk(states.states, {}, tuple(steps), "ready", "ready")
+    judged = {one.requirement: list(one.judge(walk, states)) for one in _RULES}
+    failed = {name for name, found in judged.items() if not all(one.holds for one in found if isinstance(one, Case))}
+    assert failed == {f"states/{one}" for one in blamed}
+
+
 def test_nothing_is_sent_without_permission(judged):
     cell = Cell()
     outcome = judged(cell, "", "--never", "/nothing")
     assert outcome.exit_code == 4
     assert "--allow-motion" in outcome.text
     assert cell.sent == []
+
+
+@pytest.mark.parametrize("path", [one for one in EXAMPLES.glob("*/*.toml") if "[states]" in one.read_text("utf-8")])
+def test_a_map_among_the_examples_is_right(path):
+    states = msgspec.convert(tomllib.loads(path.read_text("utf-8"))["states"], StateMap)
+    assert len(states.states) > 5
 
 
 @pytest.mark.parametrize(
