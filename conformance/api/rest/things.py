@@ -49,12 +49,12 @@ def collection_of(template: str) -> str:
 
 def path_chosen(item: Operation, turn: int) -> str:
     """Return the path of a thing with an identifier that the client chooses, another one each turn; else empty."""
-    parameter = item.parameter("path")[-1]
+    if len(item.parameter("path")) != 1:
+        return ""
+    (parameter,) = item.parameter("path")
     candidates: list[Any] = [one.format(turn) for one in _CHOSEN] + [_CHOSEN_NUMBER + turn]
     id_ = next((one for one in candidates if fits(parameter.schema, one)), None)
-    if id_ is None or len(item.parameter("path")) > 1:
-        return ""
-    return item.template.replace(f"{{{parameter.name}}}", str(id_))
+    return "" if id_ is None else item.template.replace(f"{{{parameter.name}}}", str(id_))
 
 
 def identified(value: Any, item: Operation) -> tuple[str, Any]:
