@@ -26,6 +26,8 @@ OFTEN, ALONE = 3, 2
 _OCTETS, _MOST = 65_536, 1_000
 #: By these words an operation says that it keeps all when it is refused.
 KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
+# What tells of a change is sure after fewer times, where it did not change between so many reads alone.
+_TWICE, _MANY = 2, 12
 # Members that change when a thing does.
 _REVISION: Final = re.compile(r"(?:revision|version|etag|(?:updated|modified|changed)(?:at|on|time)?)$")
 # By these words a description says of all requests that a refused one changes nothing.
@@ -103,23 +105,24 @@ class Untouched:
         key = template, label
         self._count[key] += 1
         self._changed[key].update(name for name in now if not same(now[name], before.members.get(name)))
-        if not label or self._count[key] < OFTEN or self._count[template, ""] < ALONE:
+        times, alone = self._count[key], self._count[template, ""]
+        is_often = times >= OFTEN and alone >= ALONE
+        if not label or not (is_often or (times >= _TWICE and alone >= _MANY)):
             return
         # What a refused request may not change: all, by the description, and what tells that the thing has changed.
         always = [name for name, count in self._changed[key].items() if count == self._count[key]]
         is_all = self._keeps_all or label == _CONDITIONAL
-        others = {
-            one for other, found in self._changed.items() if other[0] == template and other != key for one in found
-        }
+        changed = [found for other, found in self._changed.items() if other[0] == template and other != key]
+        others = {one for found in changed for one in found} if label in self._keeping else set(now)
         wrong = [
             name
             for name in always
             if not self._changed[template, ""][name]
-            and (is_all or _REVISION.search(plain_name(name)) or (label in self._keeping and name not in others))
+            and (_REVISION.search(plain_name(name)) or (is_often and (is_all or name not in others)))
         ]
         id_ = "description/safe" if label == _CONDITIONAL else "description/refused-keeps"
-        found = (
-            f"{shown(now[wrong[0]])} as {wrong[0]}, and {shown(before.members.get(wrong[0]))} before" if wrong else ""
+        found = ", ".join(
+            f"{shown(now[one])} as {one}, and {shown(before.members.get(one))} before" for one in wrong[:1]
         )
-        expected = f"the members as before {label}, as {self._count[key]} times"
+        expected = f"the members as before {label}, as {times} times"
         yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched")

@@ -204,7 +204,8 @@ def projected(value: Any, schema: Schema) -> Any:
         return value
     schema = flat(schema)
     if isinstance(value, list):
-        items = flat(schema.get("items", {}))
+        given = schema.get("items")
+        items = flat(given) if isinstance(given, dict) else {}  # false, beside prefixItems
         if not items.get("properties") and "items" not in items:
             return list(value)  # numbers, mostly: a covariance matrix has 36 of them
         return [projected(item, items) for item in value]
