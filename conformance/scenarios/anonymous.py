@@ -64,11 +64,10 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                     if exchange and exchange.response.status in _UNDECIDED:
                         found += _on_new_thing(Surveyor(api, values), operation, request, client, authorized=authorized)
         # An error of another request shows nothing of the wrong credentials before it.
-        for read in [
-            one for one in operations_of(api.run.contract) if one.method == "GET" and path_chosen(one, _NEVER)
-        ][:1]:
-            with suppress(NoAnswerError):
-                api.client.send("GET", path_chosen(read, _NEVER))
+        reads = [one for (method, _), one in callable_operations(api).items() if method == "GET"]
+        absent = (path_chosen(one, _NEVER) for one in reads if one.parameter("path"))
+        with suppress(NoAnswerError):
+            api.client.send("GET", next(filter(None, absent), f"/{_ABSENT}"))
     return (*found, *_on_kept_connection(api, values, closed), *_beyond_ascii(api, values, closed))
 
 
