@@ -13,9 +13,10 @@ from importlib import import_module
 from socket import SHUT_RDWR, socket
 from typing import Any, Final, Literal, NamedTuple
 
+from conformance.commandline.extras import told
 from conformance.transport.client import HttpClient
 from conformance.transport.connections import open_link
-from conformance.transport.exchange import NoAnswer, NoAnswerError, Request, Response, Unanswered
+from conformance.transport.exchange import NoAnswer, NoAnswerError, NotPermittedError, Request, Response, Unanswered
 from conformance.transport.passage import Heard, Passage
 
 Kind = Literal["sse", "websocket"]
@@ -153,7 +154,10 @@ def _data(response: http.client.HTTPResponse) -> Iterator[bytes]:
 def _messages(link: socket, url: str, headers: dict[str, str], timeout_s: float) -> _Opened:
     """Open a WebSocket."""
     # By its name, as only streams need it; who installed roaas without ROS has no use for it.
-    library: Any = import_module("websockets.sync.client")
+    try:
+        library: Any = import_module("websockets.sync.client")
+    except ModuleNotFoundError as error:
+        raise NotPermittedError(str(told(error.name, "a WebSocket"))) from error
     try:
         opened = library.connect(
             f"ws://{url}", sock=link, additional_headers=headers, open_timeout=timeout_s, max_size=_LONGEST,

@@ -130,7 +130,14 @@ def _name_of(value: float) -> str:
 def differences(
     document: Document, value: dict[str, Any], definition: Definition, body: Body, ros: RosMap
 ) -> list[Difference]:
-    """Return the fields in which a web's message is not a ROS message; empty: they are the same.
+    """Return the fields in which a web's message is not a ROS message; empty: they are the same."""
+    return list(differing(document, value, definition, body, ros))
+
+
+def differing(
+    document: Document, value: dict[str, Any], definition: Definition, body: Body, ros: RosMap
+) -> Iterator[Difference]:
+    """Yield the fields in which a web's message is not a ROS message.
 
     Args:
         document: that has the web's message.
@@ -141,13 +148,11 @@ def differences(
     """
     judge, message = _Comparison(definition, ros, document.is_xml), value_at(document.value, body.at)
     if not body.fields:
-        return list(judge.compared(message, value, Shape(definition.root), ""))
-    found: list[Difference] = []
+        yield from judge.compared(message, value, Shape(definition.root), "")
     for web, own in body.fields.items():
         shape = definition.at(own)
         if shape is not None:
-            found += judge.compared(value_at(message, web, _MISSING), value_at(value, own), shape, own)
-    return found
+            yield from judge.compared(value_at(message, web, _MISSING), value_at(value, own), shape, own)
 
 
 @dataclass(frozen=True)
