@@ -179,10 +179,15 @@ class Device:
         body = root.find(f"{{{self.soap}}}Body")
         payload = body[0] if body is not None and len(body) else None
         name = etree.QName(payload).localname if payload is not None else ""
-        if payload is None or not _schema(self.xsd).validate(payload):
+        if payload is None or not self.schema.validate(payload):
             return self.fault("Client", "not valid")
         inside = self.answer(name, payload)
         return self.fault("Client", "not known") if inside is None else (200, self.envelope(inside))
+
+    @property
+    def schema(self) -> etree.XMLSchema:
+        """The schema that validates requests."""
+        return _schema(self.xsd)
 
     def answer(self, name: str, _payload: Any) -> str | None:
         """Return XML of the Body of the response to a valid request; None: it is refused."""
