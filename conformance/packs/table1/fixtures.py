@@ -13,12 +13,14 @@ from conformance.packs.table1.robot.beats import Beats
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.deliveries_seen import read_awaited
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
+from conformance.packs.table1.robot.motion_map import motion_map_of, xml_root_of
 from conformance.packs.table1.robot.probe import RosProbe
 from conformance.packs.table1.robot.refused_requests import RefusedRequests
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.robot.standstill import Standstill
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.scenarios.stage import Stage
 from conformance.transport.client import Connection
@@ -102,6 +104,21 @@ def refused(api: RestInterface) -> RefusedRequests:
     if not isinstance(api.device, Device):
         raise TypeError("the run judges another kind of device")
     return api.device.refused[0]
+
+
+@pytest.fixture(scope="session")
+def mapped_robot(interfaces: Interfaces) -> MappedDevice:
+    """Return the robot as the generic suite drives it; at rest when a scenario first asks for it.
+
+    Raises:
+        NotPossibleError: the device has no REST interface.
+    """
+    api = interfaces.rest
+    if api is None:
+        raise NotPossibleError("the device has no REST interface")
+    found = MappedDevice(api, motion_map_of(said_of(api.run), xml_root_of(Robot(api))))
+    api.stop_device = None  # the pack stops the robot by itself
+    return found
 
 
 @pytest.fixture(autouse=True)

@@ -127,9 +127,9 @@ def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Itera
     long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
     found = measured(late, name, motion) if wanted and long_enough else None
     if found is not None:
-        slowest = _slowest(late, name, wanted)
-        if slowest is not None and slowest < _LULL * abs(wanted) and abs(wanted) > 2 * motion.speed_tolerance(name):
-            found = math.copysign(1, wanted) * slowest
+        slow = slowest(late, name, wanted)
+        if slow is not None and slow < _LULL * abs(wanted) and abs(wanted) > 2 * motion.speed_tolerance(name):
+            found = math.copysign(1, wanted) * slow
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             drive.commands[-1].exchange,
@@ -139,7 +139,7 @@ def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Itera
         )
 
 
-def _slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | None:
+def slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | None:
     """Return the least of the medians of several readings in a row, in the direction that is wanted."""
     seen = [math.copysign(1, wanted) * one.speeds[name] for one in readings if name in one.speeds]
     return min((median(seen[index : index + SEVERAL]) for index in range(len(seen) - SEVERAL + 1)), default=None)

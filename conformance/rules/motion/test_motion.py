@@ -257,12 +257,10 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     if len(speeds) < len(found):
         # The hold time is too short for it, or the link too slow: positions tell enough of most devices.
         return
+    fastest_of = {name: max(abs(one.targets[name]) for one in drive.commands) for name in speeds}
     fits = any(
-        # Each client drives one axis: nearer to its velocity, or to rest, than to the other.
-        all(
-            abs(speeds[name] - one.targets[name]) < max(abs(two.targets[name]) for two in drive.commands) / 2
-            for name in speeds
-        )
+        # Nearer to its velocity, or to rest, than to another client's; of an axis that nobody drives nothing is told.
+        all(abs(speeds[name] - one.targets[name]) < most / 2 for name, most in fastest_of.items() if most)
         for one in accepted
     )
     yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=named(speeds), cause="velocity")

@@ -22,7 +22,7 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
 
     It may rest anywhere within the tolerance of its last target, so two places of rest may be twice that apart.
     """
-    seen = tuple(one for one in quiet.readings if one.values)
+    seen = tuple(one for one in quiet.readings if one.values or (one.speeds and not motion.state.axes))
     if len(seen) < SEVERAL:
         return None
     windows = (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
-from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, tries_of, went_on
+from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, slowest, tries_of, went_on
 from conformance.scenarios.motion.measuring import measured, noise_of
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
@@ -31,8 +31,8 @@ def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
-    """Return the axes that still move in some readings; empty if none does, None if they do not show it."""
-    seen = tuple(one for one in readings if one.values)
+    """Return what still moves in some readings; empty if nothing does, None if they do not show it."""
+    seen = tuple(one for one in readings if one.values or (one.speeds and not motion.state.axes))
     if len(seen) < 2 * SEVERAL:
         return None
     moved = off(at(seen[-SEVERAL:], motion), at(seen[:SEVERAL], motion), motion)
@@ -101,17 +101,26 @@ def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) ->
     return ""
 
 
-def _held(drive: Drive, hold_s: float) -> tuple[float, float]:
+def _held(drive: Drive, hold_s: float, share: float, motion: MotionMap) -> tuple[float, float]:
     """Return from when to when a device that was let go must still drive, also if it refused something meanwhile."""
     last, refused = drive.commands[-1], drive.refused
+    # A last command of some velocities alone need not renew the others.
+    names = motion.velocity.axes.keys() if motion.velocity else set()
+    in_part = motion.velocity is not None and any(way.axes < names for way in motion.velocity.ways)
+    sent = drive.commands[-2].sent if in_part and len(drive.commands) > 1 else last.sent
     if refused is None:
-        return last.answered + _HELD[0] * hold_s, last.sent + _HELD[1] * hold_s
-    return refused.answered + _SLOWS_S, last.sent + hold_s
+        return last.answered + _HELD[0] * hold_s, sent + share * hold_s
+    return refused.answered + _SLOWS_S, sent + hold_s
 
 
 @rule("motion/hold", on=(let_go,))
 def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a device that gets no command any more still drives within its hold time.
+    """Judge whether a device that gets no command any more still drives within its hold time."""
+    return held(trace, motion, _HELD[1])
+
+
+def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[Outcome]:
+    """Judge whether a device still drives for a share of its hold time.
 
     On a slow machine a drive may show too little of it; another one of the same axis is enough.
     """
@@ -119,13 +128,15 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         return
     unseen, seen = set[str](), set[str]()
     for drive in trace:
-        last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s)
+        last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s, share, motion)
         within = [one for one in drive.after if begin <= one.sent and one.received <= end]
         for name, wanted in drive.wanted.items():
             found = measured(within, name, motion) if wanted else None
             if found is not None:
                 seen.add(name)
                 room = noise_of(within, name, motion, drive.resting)
+                slow = slowest(within, name, wanted)
+                found = found if slow is None else math.copysign(1, wanted) * slow
                 yield Case(
                     math.copysign(1, wanted) * found >= _STILL_DRIVES * abs(wanted) - room,
                     last.exchange,

@@ -53,7 +53,7 @@ class Room:
             name: {speed.of: (speed.scale, speed.scale)} if speed.of else {} for name, speed in speeds.items()
         }
         self.noise: Mapping[str, Noise] = {}
-        self.unknown = {name for name, speed in speeds.items() if not speed.of}
+        self.unknown = {name for name, speed in speeds.items() if not speed.of and self._axes}
         self._declared = {name for name, speed in speeds.items() if speed.of}
         self._turns = any(axis.angle for axis in motion.state.axes.values())
         # The same while nothing but this velocity was commanded: a device that did not turn drives the same way.

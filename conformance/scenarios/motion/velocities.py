@@ -73,12 +73,12 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
     """
     if effort.name == "quick":
         parts = [
-            _Part(_named(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
+            Part(_named(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
             for number, (speeds, longer) in enumerate(_planned(mapped, quick=True), run.seed)
         ]
         return recorded(_in_a_row(mapped, parts))
-    parts = [_Part(_named(speeds), speeds, longer=longer) for speeds, longer in _planned(mapped, quick=False)]
-    parts += [_Part(_named(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
+    parts = [Part(_named(speeds), speeds, longer=longer) for speeds, longer in _planned(mapped, quick=False)]
+    parts += [Part(_named(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
     pairs = (parts[index : index + _PAIR] for index in range(0, len(parts), _PAIR))
     return recorded(drive for pair in pairs for drive in _in_a_row(mapped, pair))
 
@@ -143,7 +143,7 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
     if mapped.drives.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that velocities beyond the limits are clamped")
     parts = [
-        _Part(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
+        Part(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
         for name, limit, value in beyond(mapped.drives.axes)
         if limit
     ]
@@ -180,13 +180,13 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
         # An odd number of commands and an even one; and with readings and without.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
         gone = SILENT if silent else POLLING
-        part = _Part(f"{_named(speeds, by)}, {gone}", speeds, by=by)
-        yield from _left_alone(mapped, part, hold_s, more=made % 2, gone=gone, brief=made > 0)
+        part = Part(f"{_named(speeds, by)}, {gone}", speeds, by=by)
+        yield from left_alone(mapped, part, hold_s, more=made % 2, gone=gone, brief=made > 0)
     name = axes[0][0]
     for kind, refused in refusals[: 1 if quick else None]:
         limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
         what = f"{name} {limit:g}, let go, with {kind} after it, which must be refused"
-        yield from _left_alone(mapped, _Part(what, {name: limit}), hold_s, refused=refused, brief=True)
+        yield from left_alone(mapped, Part(what, {name: limit}), hold_s, refused=refused, brief=True)
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -203,7 +203,7 @@ def _vanished(mapped: MappedDevice, way: str) -> Iterator[Drive]:
     least = min(_TOLD * mapped.motion.speed_tolerance(name), abs(limit))
     speeds = {name: math.copysign(max(_SLOW * abs(limit), least), limit)}
     hold_s = mapped.drives.hold_s if mapped.drives.hold_s is not None else _UNDECLARED_S
-    yield from _left_alone(mapped, _Part(f"{_named(speeds)}, {way}", speeds), hold_s, gone=way, brief=True)
+    yield from left_alone(mapped, Part(f"{_named(speeds)}, {way}", speeds), hold_s, gone=way, brief=True)
 
 
 def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
@@ -232,7 +232,7 @@ def _there_and_back(mapped: MappedDevice, limits: tuple[float, float], of: str) 
 
 
 @dataclass(frozen=True)
-class _Part:
+class Part:
     """A velocity to drive at.
 
     Attributes:
@@ -250,11 +250,11 @@ class _Part:
     by: _By = ()
 
 
-def _in_a_row(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[Drive]:
-    """Drive at velocities one after the other, and end the last by velocity 0; repeat what a slow link spoilt."""
+def _in_a_row(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
+    """Drive at velocities one after the other, and end the last by velocity 0; try again what a slow link spoilt."""
     left = list(parts)
     for _ in range(TRIES):
-        again: list[_Part] = []
+        again: list[Part] = []
         for part, drive, whole in _at_each(mapped, left):
             yield drive
             in_time = drive.end is None or not drive.end.was_late(drive.readings)
@@ -265,13 +265,13 @@ def _in_a_row(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[Drive]:
             return
 
 
-def _at_each(mapped: MappedDevice, parts: Sequence[_Part]) -> Iterator[tuple[_Part, Drive, bool]]:
-    """Yield each part with its drive, and whether the room sufficed for all of it.
+def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part, Drive, bool]]:
+    """Yield each part with its drive, and whether there was room for the whole of it.
 
     A velocity turns into the next one while the limits leave room for both.
     """
     drives, hold_s = mapped.drives, mapped.drives.hold_s or 0.0
-    before: tuple[_Part, Drive, bool] | None = None
+    before: tuple[Part, Drive, bool] | None = None
     for part in parts:
         outlasts_s = hold_s if part.longer and hold_s <= _LONGEST_HOLD_S else 0.0
         settle_s = drives.settle_s * _times(mapped, before[1].wanted if before else {}, part.speeds)
@@ -313,15 +313,17 @@ def _goes_on(mapped: MappedDevice, before: Drive, speeds: Position, lasts_s: flo
     return room.leads_on(before.wanted, seen, mapped.drives.settle_s) and room.leads_on(speeds, seen, lasts_s)
 
 
-def _left_alone(
+def left_alone(
     mapped: MappedDevice,
-    part: _Part,
+    part: Part,
     hold_s: float,
     *,
     more: int = 0,
-    refused: Callable[[], Command] | None = None,
+    refused: Callable[[], Command | None] | None = None,
     gone: str = "",
     brief: bool,
+    silent_s: float | None = None,
+    beside: Callable[[], None] = lambda: None,
 ) -> Iterator[Drive]:
     """Drive at a velocity, then send nothing any more, and watch; again where a slow link or the limits spoilt it.
 
@@ -330,11 +332,17 @@ def _left_alone(
         part: the velocity.
         hold_s: its hold time, s.
         more: how often the velocity is sent once more at the end, on a connection of its own.
-        refused: sends what the device must refuse after the last command; None: nothing is sent.
+        refused: sends what commands nothing after the last command, and returns what the device must refuse, if any;
+            None: nothing is sent.
         gone: how the client vanishes, one of WAYS; empty: it stays, and keeps its lease.
         brief: whether to look no longer than until it rests.
+        silent_s: for so long after the last command a client that vanishes sends nothing, s; None: until the device
+            must rest, unless it goes on reading.
+        beside: called after each reading before the last call of ``refused``.
     """
     settle_s, whole = mapped.drives.settle_s, False
+    if silent_s is None:
+        silent_s = 0.0 if gone in {"", POLLING} else hold_s + settle_s
     for _ in range(TRIES):
         rests_s = hold_s + more * mapped.room.slowest_s + settle_s
         made = with_room(mapped, [part.speeds], settle_s + rests_s, slower=_SLOWER)[0]
@@ -352,7 +360,7 @@ def _left_alone(
                 drive = replace(drive, commands=(*drive.commands, _unread(mapped, made, drive, links, gone)))
             if gone:
                 mapped.ready.fall_silent()
-            drive = _let_go_of(mapped, drive, hold_s, refused, silent=gone not in {"", POLLING}, brief=brief)
+            drive = _let_go_of(mapped, drive, hold_s, refused, beside, silent_s=silent_s, brief=brief)
         if drive.refused is None or not drive.refused.accepted:
             yield drive
         if drive.was_kept(hold_s):
@@ -388,20 +396,20 @@ def _let_go_of(
     mapped: MappedDevice,
     drive: Drive,
     hold_s: float,
-    refused: Callable[[], Command] | None,
+    refused: Callable[[], Command | None] | None,
+    beside: Callable[[], None],
     *,
-    silent: bool,
+    silent_s: float,
     brief: bool,
 ) -> Drive:
     last, after = drive.commands[-1], list[Reading]()
     rests_at = last.answered + hold_s + mapped.drives.settle_s
     answer: Command | None = None
     for part in _REFUSED_AT if refused is not None else ():
-        after += mapped.watch(last.answered + part * hold_s)
+        after += mapped.watch(last.answered + part * hold_s, lambda _: beside())
         one = refused() if refused is not None else None
         answer = one if answer is None or (one and one.accepted) else answer
-    if silent:
-        mapped.clock.sleep(rests_at - mapped.clock.now())
+    mapped.clock.sleep(last.answered + silent_s - mapped.clock.now())
     drive = _watched(mapped, drive, after, rests_at, brief_from=last.answered + hold_s if brief else None)
     if not mapped.rests:
         mapped.stop()
@@ -410,7 +418,7 @@ def _let_go_of(
 
 def _kept_up(
     mapped: MappedDevice,
-    part: _Part,
+    part: Part,
     made: Position,
     settle_s: float,
     rests_s: float,

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.robot import drive_rules, windows
-from conformance.packs.table1.robot.drive_trace import ALL, Command, Reach, Trace, Turn
-from conformance.packs.table1.robot.letting_go import COUNTED_ON_S, Way, certain_s
+from conformance.packs.table1.robot.drive_trace import ALL, COUNTED_ON_S, Command, Reach, Trace, Turn, certain_s
+from conformance.packs.table1.robot.motion_map import By
 from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
@@ -151,7 +151,7 @@ class Drive:
         """GET the velocity alone, which is faster than a whole look."""
         self.trace = self.trace.looked(Turn(None, self.clock.now(), *self.robot.velocity()))
 
-    def stop(self, moving: Velocity, by: Way = "velocity") -> bool:
+    def stop(self, moving: Velocity, by: By = "velocity") -> bool:
         """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
 
         The time counts from sending. Where the response is late, the request may have been late on its way as well: so

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 from conformance.packs.table1.robot.robot import Odometry, Velocity
 from conformance.transport.exchange import Exchange
@@ -10,6 +11,17 @@ from conformance.verdict.evidence import Case
 
 #: All components of a velocity, its linear part, its angular part.
 ALL, LINEAR_PART, ANGULAR_PART = slice(None), slice(0, 3), slice(3, 6)
+#: How long a velocity is counted on to hold where no hold time is declared, s.
+COUNTED_ON_S: Final = 0.5
+#: Of the hold time: for so long what holds is judged. A client that still has to send something counts on less.
+JUDGED: Final = 0.95
+_COUNTED_ON: Final = 0.9
+_LATE_S: Final = 0.02
+
+
+def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
+    """Return how long after its command a velocity certainly holds, s; ``share``: counted share of the hold time."""
+    return COUNTED_ON_S if hold_s is None else share * hold_s - _LATE_S
 
 
 @dataclass(frozen=True)

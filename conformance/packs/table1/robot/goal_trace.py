@@ -242,3 +242,31 @@ class GoalStep:
         status = self.exchange.response.status
         holds = not self.differs and (status in statuses or (self.ended and status == HTTPStatus.NOT_FOUND))
         return Case(holds, self.exchange, expected, self.differs)
+
+
+@dataclass(frozen=True)
+class GoalRead:
+    """A GET of the goal.
+
+    Attributes:
+        exchange: the GET's request and response.
+        differs: how the goal differs from each goal that was PUT; empty when it equals one of them.
+    """
+
+    exchange: Exchange
+    differs: str
+
+
+@dataclass(frozen=True)
+class ConcurrentGoal:
+    """Several clients' simultaneous PUTs of one new goal.
+
+    Attributes:
+        puts: the PUTs that the robot did not answer with 429 or 503.
+        read: the goal afterwards; None when it may have ended before it could be read.
+        cancelled: the GETs after the goal was cancelled, up to the first that shows the goal again.
+    """
+
+    puts: tuple[Exchange, ...]
+    read: GoalRead | None
+    cancelled: tuple[GoalRead, ...] = ()

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import poll
+from conformance.packs.table1.robot.drive_trace import certain_s
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import await_goal, goal_body
-from conformance.packs.table1.robot.letting_go import certain_s
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange

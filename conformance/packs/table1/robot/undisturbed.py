@@ -8,8 +8,7 @@ from typing import Final
 
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.drive_trace import ANGULAR_PART
-from conformance.packs.table1.robot.letting_go import certain_s
+from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, certain_s
 from conformance.packs.table1.robot.no_commands import refuse_goal
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 

@@ -5,7 +5,7 @@ import random
 from typing import Final
 
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
-from conformance.packs.table1.robot.letting_go import Way
+from conformance.packs.table1.robot.motion_map import By
 from conformance.packs.table1.robot.robot import Robot, Velocity
 
 # A slow velocity, as a share of its limit, or as a multiple of what may pass for rest, but at most the last share.
@@ -16,7 +16,7 @@ _MOST: Final = 0.6
 
 def unrenewed(
     bent: Velocity, ahead: Velocity, across: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
-) -> list[tuple[Velocity, Way]]:
+) -> list[tuple[Velocity, By]]:
     """Return velocities that are not renewed, and what commands them last.
 
     A robot may keep a watchdog for each path, for each sign, for each part, and for small or large velocities. At the
@@ -30,7 +30,7 @@ def unrenewed(
         effort: quick, standard or deep.
         seed: of the run.
     """
-    ways: list[tuple[Velocity, Way]] = [
+    ways: list[tuple[Velocity, By]] = [
         (bent, "linear" if bent.linear_x else "velocity"),
         (bent, "velocity"),
         (ahead, "linear" if ahead.linear_x else "velocity"),

@@ -9,30 +9,35 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
-from conformance.observe.clock import poll, poll_for
-from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
+from conformance.measures.samples import SEVERAL
+from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.delivery import path_of
-from conformance.packs.table1.robot.drive_trace import Command, Turn
 from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body
+from conformance.packs.table1.robot.goal_trace import ConcurrentGoal, GoalRead
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
-from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.motion_map import speeds_of
+from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, Robot
+from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.moves import recorded
+from conformance.scenarios.motion.resting import fastest
+from conformance.scenarios.motion.several import of_drivers
+from conformance.scenarios.motion.trace import Drive
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Attempt, Exchange, Outgoing, Unanswered
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 
-# Tries of velocities that ended before a read, or that were not reached in time.
+# How often velocities are put of which the robot shows none.
 _TRIES: Final = 3
 _CLIENTS: Final = 4
 # How long a goal is read after it was cancelled, s: each fifth time for longer.
 _WATCHED_S: Final = 0.03
 _WATCHED_LONGER_S: Final = 0.1
 _GOAL_STEP_S: Final = 0.02
-_VELOCITY_STEP_S: Final = 0.01
-# Shares of the limits, ahead and turning: no velocity has one of its components in common with another.
-_SHARES: Final = ((0.5, -0.5), (-0.5, 0.5), (0.17, 0.17))
+# Shares of the limits, ahead and turning: what mixes two clients' velocities is none of them.
+_SHARES: Final = ((0.5, -0.5), (-0.5, 0.5)) * 2
 
 
 @scenario(needs={Need.REST, Need.MOTION})
@@ -91,38 +96,25 @@ def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def concurrent_velocities(robot: Robot, effort: Effort) -> tuple[ConcurrentVelocities, ...]:
-    """PUT different velocities from several clients at the same moment, and read which one the robot reaches."""
-    velocities = [robot.share_of_limits(*shares) for shares in _SHARES]
-    trace: list[ConcurrentVelocities] = []
-    for _ in range(1 if effort.name == "quick" else 4):
-        for turn in range(1, _TRIES + 1):
-            trace.append(_put_velocities(robot, velocities, last=turn == _TRIES))
-            robot.put_velocity(STILL)
-            if trace[-1].is_decided(robot.limits):
-                break
-    return tuple(trace)
+def concurrent_velocities(robot: Robot, mapped_robot: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
+    """PUT different velocities from several clients at the same moment, and watch which one the robot reaches.
+
+    Without a declared hold time, a robot that rests when its settle time is over may have reached one of them.
+    """
+    if robot.limits.hold_s is None:
+        return ()
+    still = dict.fromkeys(mapped_robot.drives.axes, 0.0)
+    several = [still | speeds_of(robot.share_of_limits(*shares)) for shares in _SHARES]
+    return recorded(_driven(mapped_robot, several) for _ in range(1 if effort.name == "quick" else 4))
 
 
-def _put_velocities(robot: Robot, velocities: Sequence[Velocity], *, last: bool) -> ConcurrentVelocities:
-    """PUT velocities at the same moment, and read until the robot reaches one, or it may have ended by itself."""
-    sent = robot.clock.now()
-    attempts = _put_together(robot, VELOCITY, [velocity.twist for velocity in velocities])
-    answered = robot.clock.now()
-    accepted = tuple(
-        Command(velocity, sent, answered, one)
-        for velocity, one in zip(velocities, attempts, strict=True)
-        if isinstance(one, Exchange) and one.response.ok
-    )
-    put = ConcurrentVelocities(accepted, sent, answered, (), last)
-    if not accepted:
-        return put
-    until = min(put.answered + robot.settle_s, put.ends(robot.limits))
-    for _ in poll(robot.clock, _VELOCITY_STEP_S, lambda: robot.clock.now() > until):
-        put = put.read(Turn(None, robot.clock.now(), *robot.velocity()))
-        if put.is_unreadable or put.reached(robot.limits) is not None:
+def _driven(mapped: MappedDevice, several: list[Position]) -> Drive:
+    """Command velocities at the same moment, and again where the robot does not move: it may have been delayed."""
+    for _ in range(_TRIES):
+        drive = of_drivers(mapped, several)
+        if fastest(drive.under_way[-SEVERAL:], mapped.motion):
             break
-    return put
+    return drive
 
 
 def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:

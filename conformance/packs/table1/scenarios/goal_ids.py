@@ -5,9 +5,8 @@ from typing import Final
 
 from hypothesis import strategies as st
 
-from conformance.packs.table1.robot.concurrent_puts import GoalRead
 from conformance.packs.table1.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
-from conformance.packs.table1.robot.goal_trace import Put
+from conformance.packs.table1.robot.goal_trace import GoalRead, Put
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.robot import Robot
 from conformance.packs.table1.scenarios.goal_life import put_new

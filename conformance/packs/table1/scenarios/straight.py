@@ -6,7 +6,7 @@ from typing import Final
 from conformance.packs.table1.robot.abilities import AHEAD
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.goals import make_room
-from conformance.packs.table1.robot.letting_go import Way
+from conformance.packs.table1.robot.motion_map import By
 from conformance.packs.table1.robot.robot import Robot, Velocity
 from conformance.packs.table1.robot.velocity_range import direction, fastest, reach, slowest
 from conformance.packs.table1.scenarios.trace import Driven
@@ -14,7 +14,7 @@ from conformance.scenarios.scenario import NotPossibleError, partial_trace, scen
 from conformance.scenarios.stage import Need
 from conformance.verdict.run import Run
 
-_WAYS: Final[tuple[Way, ...]] = ("velocity", "linear", "xml")
+_WAYS: Final[tuple[By, ...]] = ("velocity", "linear", "xml")
 
 
 @scenario(needs={Need.REST, Need.MOTION})

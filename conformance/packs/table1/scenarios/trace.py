@@ -2,15 +2,21 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
+from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.drive_trace import Trace
-from conformance.packs.table1.robot.letting_go import LetGo
+from conformance.packs.table1.robot.drive_trace import Trace, Turn
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.motion.trace import Drive
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
+
+# Of the hold time: by so much longer a velocity may be seen.
+_LONGER: Final = 0.4
 
 
 @dataclass(frozen=True)
@@ -19,17 +25,25 @@ class Driven:
 
     Attributes:
         drive: all commands and readings.
-        let_go: for each velocity that was not renewed, every measurement of how long it holds.
-        ends_s: time within which a velocity that is not renewed must end, s.
+        let_go: the velocities that were not renewed.
+        paused: two looks at the robot at rest after each of them, the first ones of the velocity after a pause.
         not_tested: why a requirement could not be tested, by its id.
         over_soap: readings of pose and velocity over SOAP, beside the looks.
     """
 
     drive: Trace
-    let_go: tuple[tuple[LetGo, ...], ...] = ()
+    let_go: tuple[Drive, ...] = ()
+    paused: tuple[tuple[Turn, Turn], ...] = ()
     not_tested: tuple[tuple[str, str], ...] = ()
-    ends_s: float = 0.0
     over_soap: tuple[Exchange, ...] = ()
+
+
+def longer_s(limits: Limits) -> float:
+    """Return for how long after its hold time a velocity may be seen at most, s.
+
+    Commands and odometry are delayed by part of the settle time; half as long again is no such delay.
+    """
+    return max(_LONGER * (limits.hold_s or 0.0), 0.5 * limits.settle_s, LONGEST_SAMPLE_S)
 
 
 def shown(requirement: str, *scenarios: Scenario) -> Rule:

@@ -1,6 +1,5 @@
 """Turning: at the highest speed, renewed also after rejected commands, along an arc; and velocities not renewed."""
 
-import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -9,13 +8,11 @@ from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
-from conformance.measures.samples import SEVERAL
-from conformance.packs.table1.robot import drive_rules
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART
+from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART, Turn, certain_s
 from conformance.packs.table1.robot.goals import make_room
-from conformance.packs.table1.robot.letting_go import LetGo, Way, certain_s, ends_by
+from conformance.packs.table1.robot.motion_map import COMMANDS, By, speeds_of, way_of
 from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
@@ -23,23 +20,25 @@ from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
-from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.trace import Driven, longer_s
+from conformance.scenarios.motion import trace as generic
+from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.scenarios.motion.trace import Command
+from conformance.scenarios.motion.velocities import SILENT, Part, left_alone
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
-# Shares of the hold time: renew a command after the first; until the second a robot still has time to hold it.
+# Of the hold time: so long after a command it is given again.
 _AGAIN: Final = 0.25
-_SOON: Final = 0.45
-# Share of the hold time after its end in which the suite does not read the robot, if it can come to rest in it.
-_BRIEF: Final = 0.2
-# Pause after the last velocity of longer runs, s: a robot must not show values from before a pause.
+# Of the hold time: for so long requests that command nothing are sent, at its beginning and just before its end.
+_MEANWHILE: Final = 0.08
+# After the last velocity of longer runs, so long: a robot must not show what it showed before a pause, s.
 _PAUSE_S: Final = 1.1
 # Multiple of the hold time for which a linear part is renewed.
 _RENEWED: Final = 1.4
-# Tries of a hold time's measurement that a stall of the suite or a late response spoilt.
+# How often it is measured how long a velocity holds beside requests that the robot takes although it had refused them.
 _ATTEMPTS: Final = 3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
@@ -49,19 +48,17 @@ _ASIDE: Final = 0.3
 _BESIDE: Final = 4
 _QUICK_S: Final = 0.02
 _STATES: Final = ("GetPose", "GetVelocity")
-# Time in which any robot sends several samples, s.
-_SAMPLES_S: Final = (SEVERAL + 1) * LONGEST_SAMPLE_S
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.LATE)
-def turn(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -> Driven:
+def turn(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices, refused: RefusedRequests) -> Driven:
     """Turn for about two seconds, in several ways; then let velocities end by themselves.
 
     Meanwhile requests are sent that were refused in the run or only read. A robot that cannot turn on the spot turns in
     its narrowest circle; one that cannot turn at all drives.
     """
     make_room(robot)
-    turning = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
+    turning = _Turning(robot, mapped_robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
         turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
     with partial_trace(lambda: turning.recorded):
@@ -74,10 +71,10 @@ def turn(robot: Robot, run: Run, soap: SoapServices, refused: RefusedRequests) -
 
 
 @scenario(needs={Need.REST, Need.MOTION})
-def further_axes(robot: Robot, run: Run, soap: SoapServices) -> Driven:
-    """Drive along each axis that a robot on two wheels does not have; do nothing if there is none."""
+def further_axes(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices) -> Driven:
+    """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
     further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
-    driving = _Turning(robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
+    driving = _Turning(robot, mapped_robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
         make_room(robot)
     with partial_trace(lambda: driving.recorded):
@@ -94,25 +91,26 @@ class _Turning:
     """
 
     robot: Robot
+    mapped: MappedDevice
     drive: Drive
     idle: list[Callable[[], object]] = field(default_factory=list)
     refused: deque[Refused] = field(default_factory=deque)
-    tries: list[tuple[LetGo, ...]] = field(default_factory=list)
+    drives: list[generic.Drive] = field(default_factory=list)
+    paused: list[tuple[Turn, Turn]] = field(default_factory=list)
     not_tested: list[tuple[str, str]] = field(default_factory=list)
     over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
     pause_s: float = 0.0  # for so long after a hold time the suite is silent at least
-    brief: bool = True  # whether the robot was at rest after each brief silence so far
-    taken: bool = False  # whether the robot has taken a request that it had refused before
-
-    @property
-    def _ends_s(self) -> float:
-        return ends_by(self.robot.limits, self.robot.settle_s)
+    seen: int | None = None  # how many readings of the odometry there were before the first velocity that was let go
+    taken: Command | None = None  # a request that the robot has taken although it had refused it before
 
     @property
     def recorded(self) -> Driven:
         """Return the record so far."""
-        recorded = Driven(self.drive.whole, tuple(self.tries), tuple(self.not_tested), self._ends_s)
+        # What came after the first velocity that was let go is no way of one drive: the pose was read elsewhere.
+        whole, end = self.drive.whole, self.seen
+        drive = replace(whole, odometry=whole.odometry[:end], measured=whole.measured[:end])
+        recorded = Driven(drive, tuple(self.drives), tuple(self.paused), tuple(self.not_tested))
         return replace(recorded, over_soap=tuple(self.over_soap))
 
     def read_over_soap(self, subscribers: SoapService, turn: int) -> None:
@@ -162,11 +160,9 @@ class _Turning:
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             self._ahead_from_rest(renewed=run.effort.name != "quick")
 
-    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, Way]]:
-        """Return what unrenewed() returns; one velocity suffices without a declared hold time."""
+    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, By]]:
+        """Return what unrenewed() returns."""
         robot = self.robot
-        if robot.limits.hold_s is None:
-            return [(bent, "velocity")]
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
         across = robot.drivable(ahead._replace(angular_z=-ahead.angular_z))
         return unrenewed(bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed)
@@ -232,96 +228,49 @@ class _Turning:
         expected = f"{ahead} as long as a PUT of the linear part renews it"
         drive.saw("safety/renewal", expected, seen, "ended", holds=lasts if in_time else None)
 
-    def let_go(self, turning: Velocity, by: Way = "velocity") -> None:
-        """Stop renewing a velocity, and watch how it ends; ``by``: what commands it last.
+    def let_go(self, turning: Velocity, by: By = "velocity") -> None:
+        """Command a velocity and then nothing any more, and watch how it ends; ``by``: what commands it last.
 
-        A measurement that a stall of the suite or a late response spoilt is made again. One that shows a robot that
-        does not come to rest is never made again: a watchdog that stops most velocities is none. Where the robot still
-        moved after a brief silence, so that a request may have stopped it, the measurement is made with a longer one.
+        Where the robot takes what it had refused before, the velocity is no longer the last command: so again.
         """
-        limits, tries = self.robot.limits, []
-        for _ in range(_ATTEMPTS if limits.hold_s else 1):
-            self.taken = False
-            let_go = self._watch(turning, by)
-            if let_go is None:
+        hold_s, drive = self.robot.limits.hold_s, self.drive
+        if hold_s is None:
+            return
+        self.seen = len(drive.trace.odometry) if self.seen is None else self.seen
+        part = Part(f"{turning} by {COMMANDS[by]}", speeds_of(turning), by=way_of(self.mapped.motion, by))
+        silent_s = hold_s + (self.pause_s or longer_s(self.robot.limits))
+        for _ in range(_ATTEMPTS):
+            self.taken, more = None, int(by in {"linear", "closing"})
+            drives = left_alone(
+                self.mapped, part, hold_s, more=more, refused=partial(self._send_idle, hold_s), gone=SILENT, brief=True,
+                silent_s=silent_s, beside=self._send_refused,
+            )  # fmt: skip
+            self.drives.extend(drives)
+            if self.taken is None:
                 break
-            if self.taken:
-                self.robot.put_velocity(STILL)
-                continue
-            tries.append(let_go)
-            if not let_go.rests(limits):
-                self.robot.put_velocity(STILL)
-                break
-            if let_go.early(limits) or let_go.late(limits):
-                if not let_go.is_void(limits):
-                    break
-            elif self.brief and not let_go.rested_alone(limits):
-                self.brief = False
-            elif limits.hold_s is None or (let_go.was_held(limits) and not let_go.is_stale(limits)):
-                break
-        if tries:
-            self.tries.append(tuple(tries))
+        drive.look()
+        drive.look()
+        self.paused.append((drive.trace.turns[-2], drive.trace.turns[-1]))
 
-    def _send_idle(self, until: float) -> None:
-        """Send requests that renew nothing while they still could, until a time, s of the run's clock; at least one."""
+    def _send_idle(self, hold_s: float) -> Command | None:
+        """Send requests that renew nothing for a part of the hold time, at least one; return what the robot took."""
+        clock = self.drive.clock
+        until = clock.now() + _MEANWHILE * hold_s
+        self.robot.velocity()
         for _ in range(len(self.idle)):
             send = self.idle.pop(0)
             self.idle.append(send)
             send()
-            if self.drive.clock.now() > until:
+            if clock.now() > until:
                 break
+        return self.taken
 
     def _send_refused(self) -> None:
         """Send the next request that was refused before; one that the robot takes now is not sent again."""
         if self.refused and self.robot.usual_s <= _QUICK_S:
-            one = self.refused.popleft()
+            one, sent = self.refused.popleft(), self.drive.clock.now()
             exchange = one.send()
             if one.acts and exchange.response.ok and not is_refused(exchange):
-                self.taken = True
+                self.taken = Command(sent, self.drive.clock.now(), {}, exchange)
             else:
                 self.refused.append(one)
-
-    def _watch(self, turning: Velocity, by: Way) -> LetGo | None:
-        """Command a velocity, and look until the robot rests or its time is over; return None if it is rejected.
-
-        With a declared hold time, the suite does not read the robot around the end of that time, because a velocity
-        must end by time and not by a request. A rejected command meanwhile must not renew it.
-        """
-        drive, clock, limits = self.drive, self.drive.clock, self.robot.limits
-        last = drive.trace.last_full
-        if last is None or last.velocity != turning or clock.now() > drive.holds_until:
-            drive.refresh(turning)
-        # Given again once: a robot that takes that for a repetition ends it clearly too early.
-        if (
-            by in {"xml", "closing"}
-            or limits.hold_s is None
-            or not self.tries
-            or clock.now() > drive.trace.full_sent + _SOON * limits.hold_s
-        ):
-            drive.keep(drive.trace.full_sent + _AGAIN * (limits.hold_s or 0.0) - clock.now())
-            drive.command(turning, xml=by == "xml", fresh=by == "closing")
-        last = drive.trace.last_full
-        if last is None or not drive_rules.answer_of(last).holds:
-            return None
-        full = last.sent
-        if by == "linear":
-            drive.command(turning, linear=True)
-        answered = drive.trace.commands[-1].answered
-        first, resumed, due = len(drive.trace.turns), None, None
-        ends = answered + self._ends_s
-        silent_from = math.inf if limits.hold_s is None else full + 0.95 * limits.hold_s
-        while True:
-            drive.glance() if drive.looks_long and resumed is None else drive.look()
-            if resumed is None:
-                self._send_refused()
-            let_go = LetGo(turning, full, answered, drive.trace.turns[first:], resumed, due, by)
-            if let_go.is_decided(limits, ends):
-                return let_go
-            if resumed is None and clock.now() > silent_from:
-                self._send_idle(full + (limits.hold_s or 0.0))
-                hold_s = limits.hold_s or 0.0
-                silent_s = (1 + _BRIEF) * hold_s if self.brief else let_go.longest(limits)
-                due = max(clock.now(), answered + max(silent_s, hold_s + self.pause_s))
-                clock.sleep(due - clock.now())
-                resumed = len(let_go.turns)
-                ends = max(ends, clock.now() + _SAMPLES_S)

@@ -2,7 +2,6 @@
 
 import math
 import random
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -13,7 +12,6 @@ from conformance.packs.table1.limits import DeclaredLimits, Limits, Noise
 from conformance.packs.table1.robot import windows
 from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import Pose, wrapped
-from conformance.packs.table1.robot.letting_go import LetGo
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 
@@ -107,109 +105,6 @@ def test_too_few_samples_say_nothing_but_one_that_fits_does():
     assert windows.verdict(_LIMITS, turns, STILL) is None
     assert windows.verdict(_LIMITS, turns, _FAST) is True
     assert windows.verdict(_LIMITS, [turn(0.0, 0.0, None)], _FAST) is None
-
-
-def let_go(holds: float, hz: float = 50, begins: float = 0.1, seed: int | None = None) -> LetGo:
-    """A velocity that was commanded at 0 and answered at 0.02, holds so long and ends within 0.2 s."""
-    true = []
-    for index in range(150):
-        left = 1 - max(0.0, 0.02 * index - holds) / 0.2
-        true.append(Velocity(*(max(0.0, left) * value for value in _FAST)))
-    return LetGo(_FAST, 0.0, 0.02, tuple([one for one in watched(true, hz, seed) if one.at >= begins]))
-
-
-@few
-@given(rates, st.floats(1.0, 1.15), seeds)
-def test_a_robot_that_holds_for_its_time_is_not_blamed(hz, holds, seed):
-    seen = let_go(holds, hz, seed=seed)
-    assert seen.early(_LIMITS) is None
-    assert seen.late(_LIMITS) is None
-    assert seen.rests(_LIMITS)
-
-
-@few
-@given(rates, st.floats(0.0, 0.3), seeds)
-def test_a_robot_that_does_not_hold_is_seen(hz, holds, seed):
-    assert let_go(holds, hz, seed=seed).early(_LIMITS)
-
-
-@few
-@given(rates, seeds)
-def test_a_robot_that_holds_for_far_longer_is_seen(hz, seed):
-    seen = let_go(2.1, hz, seed=seed)
-    assert seen.early(_LIMITS) is None
-    assert seen.late(_LIMITS)
-
-
-def test_half_as_long_again_is_too_long_where_samples_are_frequent():
-    assert let_go(1.5).late(_LIMITS)
-
-
-def in_silence(holds: float, hz: float = 50, seed: int | None = None) -> LetGo:
-    """The same, and nobody asked from 0.95 s on until it had to have begun to end."""
-    whole = let_go(holds, hz, seed=seed)
-    before = tuple(one for one in whole.turns if one.at < 0.95)
-    until = LetGo(_FAST, 0.0, 0.02, before).longest(_LIMITS) + 0.02
-    return LetGo(_FAST, 0.0, 0.02, before + tuple(one for one in whole.turns if one.at > until), len(before))
-
-
-@few
-@given(rates, st.floats(1.0, 1.15), seeds)
-def test_a_robot_that_ends_while_nobody_asks_is_not_blamed(hz, holds, seed):
-    seen = in_silence(holds, hz, seed)
-    assert (seen.early(_LIMITS), seen.late(_LIMITS), seen.is_void(_LIMITS)) == (None, None, False)
-    assert seen.rests(_LIMITS)
-
-
-@pytest.mark.parametrize("hz", [20, 50])
-def test_a_robot_that_ends_only_when_it_is_asked_is_seen(hz):
-    late = in_silence(1.9, hz).late(_LIMITS)
-    assert late is not None
-    assert late.at > 1.4
-
-
-@pytest.mark.parametrize(
-    ("shown", "odometry", "rested_s", "stale"),
-    [
-        (_FAST, STILL, 1.0, True),
-        (_FAST, STILL, 0.2, False),  # it may be smoothed
-        (_FAST, _FAST, 1.0, False),  # it has not ended: that is judged as a velocity that holds too long
-        (STILL, STILL, 1.0, False),
-    ],
-)
-def test_a_velocity_from_before_a_pause_is_stale_and_does_not_hold_too_long(shown, odometry, rested_s, stale):
-    before = tuple(turn(0.02 * index, 0.02 * index, _FAST) for index in range(1, 45))
-    first = replace(turn(1.0 + rested_s, 1.0 + rested_s, odometry), velocity=shown)
-    turns = (*before, first, *watched([STILL] * 9, 50))
-    seen = LetGo(_FAST, 0.0, 0.02, turns, len(before), 1.0 + rested_s)
-    assert (seen.stale_velocity(_LIMITS) is first) is stale
-    if stale:
-        assert seen.late(_LIMITS) is None
-
-
-@pytest.mark.parametrize(
-    ("pose", "stale"),
-    [(Pose(0.0, 0.0, 0.0), False), (Pose(0.06, 0.0, 0.0), False), (Pose(0.3, 0.0, 0.0), True), (Pose(0, 0, 0.5), True)],
-)
-def test_a_pose_that_differs_after_a_pause_is_stale(pose, stale):
-    before = tuple(turn(0.02 * index, 0.02 * index, _FAST) for index in range(1, 45))
-    first = turn(2.0, 2.0, STILL)
-    first = replace(first, odometry=replace(first.odometry, pose=pose))
-    seen = LetGo(_FAST, 0.0, 0.02, (*before, first, *watched([STILL] * 9, 50)), len(before), 2.0)
-    assert (seen.stale_pose(_LIMITS) is first) is stale
-    assert seen.is_stale(_LIMITS) is stale
-
-
-def test_readings_far_apart_say_nothing_of_the_hold_time():
-    assert not let_go(1.0).is_void(_LIMITS)
-    assert let_go(1.0, begins=0.4).is_void(_LIMITS)
-
-
-def test_a_velocity_that_was_not_looked_at_in_its_time_was_not_seen_to_hold():
-    assert let_go(1.0).was_held(_LIMITS)
-    assert let_go(1.0, begins=0.6).was_held(_LIMITS)
-    assert not let_go(1.0, begins=0.97).was_held(_LIMITS)
-    assert not let_go(0.0, begins=0.5).was_held(_LIMITS)
 
 
 def way(factor: float, seed: int, *, jump: int | None = None, hz: float = 10) -> set[str]:

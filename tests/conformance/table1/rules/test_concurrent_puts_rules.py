@@ -1,22 +1,19 @@
 """Rules on several clients that put at one moment, by traces made by hand."""
 
-from types import SimpleNamespace
-
 import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits
-from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
-from conformance.packs.table1.robot.drive_trace import Command, Turn
-from conformance.packs.table1.robot.robot import STILL, Velocity
+from conformance.packs.table1.robot.goal_trace import ConcurrentGoal, GoalRead
+from conformance.packs.table1.robot.motion_map import speeds_of
+from conformance.packs.table1.robot.robot import Velocity
 from conformance.packs.table1.rules.rest_resources import test_several_clients as rules
 from conformance.packs.table1.statement import Statement
-from conformance.scenarios.rule import Note
-from conformance.verdict.evidence import Case
+from conformance.scenarios.motion.trace import Command, Drive, Reading
+from conformance.verdict.run import Run
 
 _STATEMENT = Statement(declared=DeclaredLimits(settle_s=1.0, hold_s=3.0, tolerance_abs=0.02))
 _ONE, _OTHER = Velocity(linear_x=0.5, angular_z=-0.5), Velocity(linear_x=-0.5, angular_z=0.5)
-_MIXTURE, _NEITHER = Velocity(linear_x=0.5, angular_z=0.5), Velocity(linear_x=0.1)
 
 
 def _goal(*statuses, differs="", cancelled=("no goal",)):
@@ -41,28 +38,25 @@ def test_one_goal_of_several_clients_is_one_goal(goal, holds):
     assert [one.holds for one in rules.goal_concurrent.outcomes((goal,), {}.__getitem__)] == holds
 
 
-def _velocities(*reads, last=False, accepted=(_ONE, _OTHER)):
-    made = tuple(Turn(None, at, velocity, exchange()) for at, velocity in reads)
-    return ConcurrentVelocities(tuple(Command(one, 0.0, 0.1, exchange()) for one in accepted), 0.0, 0.1, made, last)
+def _velocities(ahead, turn, *, at=1.5, accepted=(_ONE, _OTHER)):
+    made = tuple(Command(0.0, 0.1, speeds_of(one), exchange()) for one in accepted)
+    read = tuple(
+        Reading(at + 0.02 * n, at + 0.02 * n, {}, None, exchange(), {"ahead": ahead, "turn": turn}) for n in range(9)
+    )
+    return Drive("", {}, made, read, None, ())
 
 
 @pytest.mark.parametrize(
-    ("put", "shown"),
+    ("drive", "shown"),
     [
-        (_velocities((0.2, STILL), (0.4, _OTHER)), True),
-        (_velocities((1.5, _MIXTURE)), False),
-        (_velocities((0.5, _MIXTURE)), None),  # the robot has not had its time
-        (_velocities((1.5, _NEITHER)), None),  # to be tried again
-        (_velocities((1.5, _NEITHER), last=True), False),
-        (_velocities((2.9, _NEITHER), last=True), None),  # the velocity may have ended
-        (_velocities((1.5, _NEITHER), (1.6, None), last=True), None),  # judged by the observers
-        (_velocities(accepted=(), last=True), None),
+        (_velocities(-0.5, 0.5), [True]),
+        (_velocities(0.5, 0.5), [False]),
+        (_velocities(0.5, 0.5, at=0.5), []),  # the robot has not had its time
+        (_velocities(0.0, 0.0), [False]),
+        (_velocities(0.0, 0.0, at=2.99), []),  # the velocity may have ended
+        (_velocities(0.0, 0.0, accepted=()), []),
     ],
 )
-def test_one_velocity_of_several_clients_is_reached(put, shown):
-    run = SimpleNamespace(statement=_STATEMENT)
-    outcomes = rules.one_velocity_is_reached.outcomes((put,), {"run": run}.__getitem__)
-    assert [one.holds for one in outcomes if isinstance(one, Case)] == ([] if shown is None else [shown])
-    undecided = put.last and not put.is_decided(_STATEMENT.limits)
-    assert any(isinstance(one, Note) for one in outcomes) == undecided
-    assert undecided == (put.last and bool(put.reads) and put.reads[-1].at == 2.9)
+def test_one_velocity_of_several_clients_is_reached(drive, shown):
+    found = rules.one_velocity_is_reached.outcomes((drive,), {"run": Run(statement=_STATEMENT)}.__getitem__)
+    assert [one.holds for one in found] == shown

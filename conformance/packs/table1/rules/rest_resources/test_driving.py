@@ -1,9 +1,14 @@
 """Rules on drives: the robot accepts and reaches velocities, and its pose follows them."""
 
-import itertools
 from collections.abc import Iterator
+from typing import Final
 
+from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.geometry import pose_of, wrapped
+from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
+from conformance.packs.table1.robot.motion_map import velocity_of
+from conformance.packs.table1.robot.robot import STILL, is_near
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven, shown
 from conformance.packs.table1.scenarios.turn import further_axes, turn
@@ -12,6 +17,13 @@ from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
+
+# Of a tolerance: by so much the velocity of a robot at rest may be off; and by so much its pose, m and rad.
+_OFF: Final = 1.5
+_PLACE_M: Final = 0.05
+_HEADING_RAD: Final = 0.1
+# For so long nothing is sent in a pause at least, s.
+_PAUSE_S: Final = 0.25
 
 velocity_put = shown("rest-resources/velocity-put", straight, velocity_walk)
 velocity_integers = shown("rest-resources/velocity-integers", turn)
@@ -37,7 +49,13 @@ velocity_odometry = shown("rest-resources/velocity-odometry", straight, turn, ve
 def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the velocity read first after a pause is not the one from before; once is chance."""
     limits = said_of(run).limits
-    stale = [reading for one in itertools.chain.from_iterable(trace.let_go) if (reading := one.stale_velocity(limits))]
+    stale = [
+        first
+        for first, then in trace.paused
+        if all(one.odometry and is_near(limits, one.odometry.velocity, STILL) for one in (first, then))
+        and first.velocity is not None
+        and not is_near(limits, first.velocity, STILL, _OFF)
+    ]
     if len(stale) > 1:
         expected = "the odometry's velocity, rest, in the first GET after a pause"
         seen = f"{stale[-1].velocity}; another velocity than the odometry's after {len(stale)} pauses"
@@ -48,12 +66,21 @@ def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
 def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the pose read first after a pause is the one that the resting robot has in the next GET."""
     limits = said_of(run).limits
-    readings = [one.stale_pose(limits) for one in itertools.chain.from_iterable(trace.let_go)]
-    stale = [one.odometry for one in readings if one is not None and one.odometry is not None]
+    room_m, room_rad = _PLACE_M + FARTHEST * limits.noise.position_m, _HEADING_RAD + FARTHEST * limits.noise.heading_rad
+    stale = []
+    for drive in trace.let_go:
+        for before, one, then in zip(drive.after, drive.after[1:], drive.after[2:], strict=False):
+            first, second = (read_as(each.exchange.response, ODOMETRY)[0] for each in (one, then))
+            rests = all(is_near(limits, velocity_of(each.speeds), STILL) for each in (one, then))
+            if one.sent - before.received < _PAUSE_S or first is None or second is None or not rests:
+                continue
+            pose, later = pose_of(first["pose"]["pose"]), pose_of(second["pose"]["pose"])
+            if pose.distance(later) > room_m or abs(wrapped(pose.yaw - later.yaw)) > room_rad:
+                stale.append((one, pose))
     if len(stale) > 1:
         expected = "the pose at which the robot rests, in the first GET after a pause"
-        seen = f"{stale[-1].pose}; another pose than the next GET's after {len(stale)} pauses"
-        yield Case(False, stale[-1].exchange, expected, seen, "after a pause")
+        seen = f"{stale[-1][1]}; another pose than the next GET's after {len(stale)} pauses"
+        yield Case(False, stale[-1][0].exchange, expected, seen, "after a pause")
 
 
 linear_put = shown("rest-resources/linear-put", turn, velocity_walk)

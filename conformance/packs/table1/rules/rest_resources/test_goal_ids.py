@@ -3,9 +3,8 @@
 from collections.abc import Iterator
 
 from conformance.documents.json_text import shown
-from conformance.packs.table1.robot.concurrent_puts import GoalRead
 from conformance.packs.table1.robot.goal import NEW
-from conformance.packs.table1.robot.goal_trace import Put
+from conformance.packs.table1.robot.goal_trace import GoalRead, Put
 from conformance.packs.table1.scenarios.goal_ids import goal_ids, goal_poses
 from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case

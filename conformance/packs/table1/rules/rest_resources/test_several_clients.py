@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator
 
-from conformance.packs.table1.robot.concurrent_puts import ConcurrentGoal, ConcurrentVelocities, GoalRead
 from conformance.packs.table1.robot.drive_rules import ECHO
-from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.goal import NEW, REPEATED
+from conformance.packs.table1.robot.goal_trace import ConcurrentGoal, GoalRead
 from conformance.packs.table1.robot.message_shapes import TWIST, read_as
+from conformance.packs.table1.robot.motion_map import motion_map_of, velocity_of
 from conformance.packs.table1.robot.robot import Velocity
 from conformance.packs.table1.scenarios.concurrent_puts import concurrent_goal, concurrent_goals, concurrent_velocities
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.rules.motion.test_motion import one_client
+from conformance.scenarios.motion.trace import Command, Drive
+from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
@@ -40,26 +42,16 @@ def one_goal_is_active(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
 
 
 @rule("rest-resources/concurrent-puts", on=(concurrent_velocities,))
-def one_velocity_is_reached(trace: tuple[ConcurrentVelocities, ...], run: Run) -> Iterator[Outcome]:
+def one_velocity_is_reached(trace: tuple[Drive, ...], run: Run) -> Iterator[Outcome]:
     """Judge that the robot reaches one client's velocity in all components."""
-    limits = said_of(run).limits
-    for one in trace:
-        for accepted in one.accepted:
-            yield from _echoed(accepted)
-        expected = f"the velocity of one client: {' or '.join(f'({each.velocity})' for each in one.accepted)}"
-        reached, missed = one.reached(limits), one.missed(limits)
-        if reached is not None:
-            yield Case(True, reached.velocity_exchange, expected)
-        elif missed is not None:
-            yield Case(False, missed.velocity_exchange, expected, f"the velocity ({missed.velocity})")
-        elif one.last and not one.is_decided(limits):
-            yield Note("a velocity that several clients put ended before it was seen to be reached")
+    yield from (case for drive in trace for accepted in drive.commands for case in _echoed(accepted))
+    yield from one_client.judge(trace, motion_map_of(said_of(run)))
 
 
-def _echoed(accepted: Command) -> Iterator[Case]:
+def _echoed(put: Command) -> Iterator[Case]:
     """Yield whether the velocity in the response, if any, is the one that was sent."""
-    twist, problem = read_as(accepted.exchange.response, TWIST)
-    if not problem:
-        echo = Velocity.of(twist)
-        same = all(abs(one - other) <= ECHO for one, other in zip(echo, accepted.velocity, strict=True))
-        yield Case(same, accepted.exchange, f"the accepted velocity, {accepted.velocity}", f"{echo}")
+    twist, problem = read_as(put.exchange.response, TWIST)
+    if put.accepted and not problem:
+        echo, velocity = Velocity.of(twist), velocity_of(put.targets)
+        same = all(abs(one - other) <= ECHO for one, other in zip(echo, velocity, strict=True))
+        yield Case(same, put.exchange, f"the accepted velocity, {velocity}", f"{echo}")

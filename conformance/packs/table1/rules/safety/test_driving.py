@@ -1,21 +1,26 @@
 """Rules on the safety of drives: a velocity holds for its time, ends by itself, can be renewed and stopped."""
 
-import itertools
 from collections.abc import Iterator, Sequence
 from typing import Final
 
 from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.drive_trace import JUDGED
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, GoalReached
-from conformance.packs.table1.robot.robot import STILL
+from conformance.packs.table1.robot.motion_map import motion_map_of, velocity_of
+from conformance.packs.table1.robot.robot import STILL, is_near
+from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
 from conformance.packs.table1.scenarios.standing import later
 from conformance.packs.table1.scenarios.straight import straight
-from conformance.packs.table1.scenarios.trace import Driven, shown
+from conformance.packs.table1.scenarios.trace import Driven, longer_s, shown
 from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
-from conformance.scenarios.rule import Note, NotTested, Outcome, rule
+from conformance.rules.motion import test_velocities as generic
+from conformance.rules.motion.test_velocities import held
+from conformance.scenarios.motion.trace import Drive
+from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
@@ -26,7 +31,8 @@ _ANSWERED_S: Final = 1.0
 _USUAL: Final = 4
 # Late responses that are the robot's fault.
 _LATE_RESPONSES: Final = 2
-_LATE = NotTested("responses came too late to measure how long a velocity holds")
+# Of a tolerance: by so much a velocity that holds may be off.
+_OFF: Final = 1.5
 
 
 # Zero velocity stops the robot before its watchdog would.
@@ -45,65 +51,51 @@ def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
 @rule("safety/hold", on=(turn, further_axes))
 def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity that is not renewed lasts for the hold time."""
-    limits = said_of(run).limits
-    if limits.hold_s is None:
-        yield Note("no hold time is declared: a velocity only has to last until it is reached")
-    for tries in trace.let_go:
-        last = tries[-1]
-        early = last.early(limits)
-        if last.is_spoilt(limits):
-            yield _LATE
-        elif early is None and limits.hold_s is not None and not last.was_held(limits):
-            late = "responses came too late to see a velocity in its hold time"
-            seen_after = any(tries[-1].was_held(limits) for tries in trace.let_go)
-            # The linear part is commanded after the whole velocity, and read one response later.
-            yield Note(f"{late} after {last.command}") if last.by == "linear" and seen_after else NotTested(late)
-        else:
-            seen = early or last.turns[0]
-            yield Case(
-                early is None,
-                seen.velocity_exchange,
-                f"{last.velocity} for {limits.hold_s or 0:g} s after {last.command}",
-                f"{seen.velocity} {seen.at - last.full:.2f} s after the command",
-                "ended early",
-            )
+    return held(_let_go(trace), motion_map_of(said_of(run)), JUDGED)
+
+
+@rule("safety/watchdog", on=(turn, further_axes))
+def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot comes to rest whenever a velocity is not renewed."""
+    yield from generic.watchdog.judge(_let_go(trace), motion_map_of(said_of(run)))
 
 
 @rule("safety/hold-ends", on=(turn, further_axes))
 def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that the robot begins to stop at the end of the hold time."""
     limits = said_of(run).limits
-    if limits.hold_s is None:
-        yield Note("no hold time is declared")
-        return
-    for tries in trace.let_go:
-        last = tries[-1]
-        late = last.late(limits)
-        if last.is_spoilt(limits):
-            yield _LATE
-            continue
-        seen = late or last.turns[-1]
+    for drive in _let_go(trace):
+        last = drive.commands[-1]
+        longest_s = (limits.hold_s or 0.0) + longer_s(limits) + 2 * _period_s(drive)
+        wanted = velocity_of(drive.wanted)
+        late = [
+            one
+            for one in drive.after
+            if one.sent > last.answered + longest_s
+            and one.speeds
+            and is_near(limits, velocity_of(one.speeds), wanted, _OFF)
+        ]
+        seen = (late or drive.after)[-1]
         yield Case(
-            late is None,
-            seen.velocity_exchange,
-            f"a robot that begins to stop {limits.hold_s:g} s after {last.command}, at the latest after "
-            f"{last.longest(limits):.2f} s",
-            f"{seen.velocity} {seen.at - last.answered:.2f} s after the command",
+            not late,
+            seen.exchange,
+            f"a robot that begins to stop {limits.hold_s:g} s after {drive.named}, by {longest_s:.2f} s at the latest",
+            f"{velocity_of(seen.speeds)} {seen.sent - last.answered:.2f} s after the command",
             "holds too long",
         )
 
 
-@rule("safety/watchdog", on=(turn, further_axes))
-def watchdog(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot comes to rest whenever a velocity is not renewed."""
-    for one in itertools.chain.from_iterable(trace.let_go):
-        yield Case(
-            one.rests(said_of(run).limits),
-            one.turns[-1].velocity_exchange,
-            f"rest within {trace.ends_s:.1f} s of {one.command}, {one.velocity}, which is not renewed",
-            str(one.turns[-1].velocity or ""),
-            "goes on",
-        )
+def _let_go(trace: Driven) -> tuple[Drive, ...]:
+    """Return the drives that were let go and whose commands were accepted; others are judged by their responses."""
+    return tuple(one for one in trace.let_go if one.after and all(command.accepted for command in one.commands))
+
+
+def _period_s(drive: Drive) -> float:
+    """Return the time from one odometry sample to the next, s."""
+    seen = [one for one in drive.under_way if one.stamp is not None]
+    stamps = {one.stamp for one in seen}
+    lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0
+    return min(lasted_s / max(1, len(stamps) - 1), LONGEST_SAMPLE_S)
 
 
 @rule("safety/cancel", on=(goal_life,))
