@@ -182,15 +182,15 @@ class ChecksPlugin:
 
         robot = self._robot()
         judge = robot.run.judge
-        judged = judge.counts(ids)
+        judged, recent = judge.counts(ids), robot.connection.recent
+        before = recent[-1] if recent else None
         try:
             with robot.run.limit.lifted(when=item.get_closest_marker("motion") is not None):
                 result: object = yield
         except Exception as error:  # noqa: BLE001 - whatever a robot makes of a check has to become a verdict
             record_exception(robot.run, robot.alive, ids, judged, error)
             result = None
-        recent = robot.connection.recent
-        if recent and recent[-1].kind is not None:
+        if recent and recent[-1].kind is not None and recent[-1] is not before:
             # The check may have put up with a request without a response.
             robot.alive()
         self._tell(item, robot.run)

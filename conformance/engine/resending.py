@@ -34,6 +34,7 @@ from conformance.transport.exchange import (
     Response,
     Unanswered,
 )
+from conformance.transport.pace import Hangs
 from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
@@ -148,7 +149,7 @@ def read_sequence(items: Iterable[dict[str, Any]]) -> list[Request]:
 def send_again(request: Request, connection: Connection) -> Attempt:
     """Send a request over a new connection and return the result."""
     where = urlsplit(request.url)
-    with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection)) as client:
+    with closing(HttpClient(f"{where.scheme}://{where.netloc}", connection, Hangs())) as client:
         try:
             if request.raw is not None:
                 if connection.credentials.awaits_challenge:

@@ -32,6 +32,7 @@ from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import Publishes
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Exchange, NoAnswer, NoAnswerError, Request
+from conformance.transport.pace import Hangs
 from conformance.transport.rosbridge import BridgeClient
 from conformance.verdict.run import Run
 
@@ -74,11 +75,14 @@ class RobotUnderTest:
     _history: HistoryWriter | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
+    # What answered when it was last asked whether the device responds.
+    _answered: tuple[str, str] = ("", "")
 
     def __post_init__(self) -> None:
         self.permission = Permission(self.run)
         self.refusals = RefusalListener(self.run, bool(self.connection.credentials), lambda: self.rest)
         self.connection.permit = self.permission.refusal
+        self.connection.endpoint_of = self._endpoint_of
 
     @property
     def soap(self) -> SoapServices:
@@ -199,7 +203,7 @@ class RobotUnderTest:
         run = self.run
         times: list[float] = []
         # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
-        for method, target in (("GET", path), ("GET", path), ("OPTIONS", path), ("GET", "/")):
+        for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
             try:
                 while len(times) < _FEWEST_LOOKS or (len(times) < _LOOKS and sum(times) < 1000 * _LOOKING_S):
                     exchange = client.send(method, target)
@@ -216,7 +220,7 @@ class RobotUnderTest:
                     return
                 self._tell(f"{name}: {method} {target}: {none}")
         # What hung here was not judged: the checks send it anew.
-        client.forget_hangs()
+        client.hangs.forget()
         if times:
             run.unreachable.pop(name, None)
             run.effort = run.effort.seen(statistics.median(times), min(times))
@@ -302,7 +306,7 @@ class RobotUnderTest:
         self.connection.recent.clear()
         for client, _ in self._answering():
             client.close()
-            client.forget_hangs()
+            client.hangs.forget()
         return goes_on
 
     def estimate(self, *, measured: bool = True) -> str:
@@ -333,7 +337,7 @@ class RobotUnderTest:
         until = time.monotonic() + within_s
         # Nothing is judged by these requests, and none of them made the robot stop.
         silent = self.connection.unheard(recent=deque(), sent=0, is_away=self._is_of_gateway)
-        clients = [(HttpClient(client.base_url, silent), path) for client, path in self._answering()]
+        clients = [(HttpClient(client.base_url, silent, Hangs()), path) for client, path in self._answering()]
         try:
             while not (responds := any(self._answers(client, path) for client, path in clients)):
                 if time.monotonic() > until:
@@ -344,15 +348,17 @@ class RobotUnderTest:
         return responds
 
     def _answers(self, client: HttpClient, path: str) -> bool:
-        client.forget_hangs()
-        # Several targets, so that an endpoint known to hang is no reason to call the robot dead.
-        for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
+        client.hangs.forget()
+        # Several targets, so that an endpoint known to hang is no reason to call the robot dead; first what answered.
+        targets = [("GET", path), ("OPTIONS", path), ("GET", "/")]
+        for method, target in sorted(targets, key=lambda one: one != self._answered):
             try:
                 client.send(method, target, fresh=True, timeout_s=min(self._grace_s, self.connection.timeout_s))
             except NoAnswerError as none:
                 if none.kind is NoAnswer.REFUSED or none.kind in OF_GATEWAY.values():
                     return False
                 continue
+            self._answered = (method, target)
             return True
         return False
 
@@ -367,6 +373,11 @@ class RobotUnderTest:
         """Return whether a gateway sent a response in the device's place: it sends the like to what worked before."""
         with self.run.limit.lifted():
             return self._is_of_gateway(exchange) and not self._responds(0.0)
+
+    def _endpoint_of(self, request: Request) -> str:
+        """Return the method and the operation of a request; for a request of none, what its path looks like."""
+        label = self._operation_of(request)
+        return f"{request.method} {label.partition(' ')[2]}" if label else request.endpoint
 
     def _operation_of(self, request: Request) -> str:
         """Return the label of the operation that a request is for, or an empty text."""

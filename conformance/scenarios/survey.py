@@ -220,7 +220,7 @@ class Surveyor:
         except (NotPossibleError, TimeIsOverError) as refused:
             raise PartialTraceError(self.trace) from refused
         except NoAnswerError as none:
-            if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN}:
+            if none.kind in {NoAnswer.TIMEOUT, NoAnswer.CIRCUIT_OPEN, NoAnswer.HURRIED}:
                 self.given_up.add(operation.label)
                 self.api.streams.add(operation.label)
             probe = replace(probe, unanswered=none.unanswered)

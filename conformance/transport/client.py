@@ -4,7 +4,7 @@ import itertools
 import math
 import ssl
 import time
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -41,17 +41,13 @@ from conformance.transport.exchange import (
     Unanswered,
     sendable,
 )
-from conformance.transport.pace import Pace, time_to_arrive
+from conformance.transport.pace import HANGS, Hangs, Pace, time_to_arrive
 from conformance.transport.passage import Heard, Passage, Recorder
 from conformance.transport.reach import Trust
 
 Headers = tuple[tuple[str, str], ...]
 # Called with method and URL; returns an empty text if the request may be sent, else why not.
 Permit = Callable[[str, str], str]
-# An endpoint that let this many deadlines pass within this time, s, is not called until the time is over. A hang thus
-# costs two deadlines in it, and a link that failed twice in a long run does not count.
-_HANGS = 2
-_HANGS_WITHIN_S = 60.0
 _CHALLENGE = 401
 # Times that a request is sent in all if it met the end of a kept connection.
 _ATTEMPTS = 2
@@ -87,6 +83,8 @@ class Connection:
         resent: number of requests sent again because the server had closed the kept connection (RFC 9112 9.3.1).
         acted_at: when a request with an unsafe method was last sent or answered, s of the monotonic clock.
         pace: how fast the robot responds.
+        hangs: which endpoints did not respond, and how long the run waits for them.
+        endpoint_of: returns what hangs if a request does: method and path without values.
         endless: whether a body that does not end is a response, of which only the beginning is read.
         resends: whether any request is sent again that met the end of a kept connection, also one that may act twice.
         recent: the last requests, in the order in which they were answered or given up.
@@ -108,6 +106,8 @@ class Connection:
     resent: int = 0
     acted_at: float = -math.inf
     pace: Pace = field(default_factory=Pace)
+    hangs: Hangs = field(default_factory=Hangs)
+    endpoint_of: Callable[[Request], str] = lambda request: request.endpoint
     endless: bool = False
     resends: bool = False
     recent: deque[Sending] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -179,9 +179,10 @@ class HttpClient:
     Args:
         base_url: URL of the interface; its path is prepended to the path of every request.
         connection: deadline, token, rate limit and listeners.
+        hangs: what did not respond before; None: to any client of the connection.
     """
 
-    def __init__(self, base_url: str, connection: Connection) -> None:
+    def __init__(self, base_url: str, connection: Connection, hangs: Hangs | None = None) -> None:
         if names_user(base_url):
             raise ValueError(IN_URL)
         self.base_url = base_url.rstrip("/")
@@ -192,7 +193,7 @@ class HttpClient:
         self.port = parts.port or (443 if parts.scheme == "https" else 80)
         self.prefix = parts.path
         self.authority = parts.netloc.rsplit("@", 1)[-1]
-        self._hangs: defaultdict[str, list[float]] = defaultdict(list)
+        self._hangs = hangs
         self._recorded = 0
         self._authorized = connection.may_authorize(self.base_url)
         self.tls = connection.tls(authorized=self._authorized) if parts.scheme == "https" else None
@@ -207,6 +208,11 @@ class HttpClient:
     def close(self) -> None:
         """Close all open connections."""
         self._connections.close()
+
+    @property
+    def hangs(self) -> Hangs:
+        """What did not respond before."""
+        return self.connection.hangs if self._hangs is None else self._hangs
 
     def url(self, path: str) -> str:
         """Return the URL of a path below the base URL, as requests have it."""
@@ -257,13 +263,9 @@ class HttpClient:
             return self._drafted(
                 method, target, tuple(pair for pair in sent if pair[0] != "Connection"), request, drafts
             )
-        endpoint = request.endpoint if self._hangs else ""
-        if sum(time.monotonic() - at < _HANGS_WITHIN_S for at in self._hangs.get(endpoint, ())) >= _HANGS:
-            hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
-            problem = f"the request was not sent, because {hung} did not respond {_HANGS} times"
-            raise NoAnswerError(Unanswered(request, problem, NoAnswer.CIRCUIT_OPEN))
-        deadline = timeout_s or self.connection.timeout_s
-        started = time.monotonic()
+        self.put_off(request)
+        whole = timeout_s or self.connection.timeout_s
+        deadline, started = self.hangs.within_s(whole), time.monotonic()
         try:
             response = self._exchange(request, target, sent, deadline, fresh=fresh)
             if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
@@ -274,9 +276,15 @@ class HttpClient:
         except _SilenceError as none:
             self.connection.note(method)
             if none.kind is NoAnswer.TIMEOUT:
-                self._hangs[request.endpoint].append(time.monotonic())
                 self.connection.pace.took(time.monotonic() - started, len(body))
+                endpoint = self.connection.endpoint_of(request)
+                if deadline < whole:
+                    self.hangs.hurried.add(endpoint)
+                    none.kind = NoAnswer.HURRIED
+                else:
+                    self.hangs.hung(endpoint, whole)
             raise self._unanswered(request, str(none), none.kind) from none
+        self.hangs.answered(response.elapsed_ms / 1000)
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
         exchange = Exchange(request, response)
         number = self._recorded
@@ -316,9 +324,17 @@ class HttpClient:
             listener.unanswered(unanswered)
         return NoAnswerError(unanswered)
 
-    def forget_hangs(self) -> None:
-        """Send again to operations that did not respond."""
-        self._hangs.clear()
+    def put_off(self, request: Request) -> None:
+        """Raise NoAnswerError if a request is not sent, because its endpoint did not respond before."""
+        if not self.hangs:
+            return
+        endpoint = self.connection.endpoint_of(request)
+        hung = endpoint.replace(f"{self.scheme}://{self.authority}", "", 1)
+        problem = f"the request was not sent, because {hung} did not respond"
+        if endpoint in self.hangs.hurried:
+            raise NoAnswerError(Unanswered(request, f"{problem} in the time that was left", NoAnswer.HURRIED))
+        if self.hangs.is_put_off(endpoint):
+            raise NoAnswerError(Unanswered(request, f"{problem} {HANGS} times", NoAnswer.CIRCUIT_OPEN))
 
     def _fields(self, method: str, headers: Headers, body: bytes, *, close: bool) -> Headers:
         names = {name.lower() for name, _ in headers}

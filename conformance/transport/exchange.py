@@ -209,6 +209,8 @@ class NoAnswer(StrEnum):
     MALFORMED = "malformed"
     # The endpoint has hung before, so nothing was sent.
     CIRCUIT_OPEN = "circuit-open"
+    # Too much time was lost with what hangs, so it was not waited for until the deadline: that shows nothing.
+    HURRIED = "hurried"
     # A gateway responded in the place of a device that is away.
     BAD_GATEWAY = "502"
     UNAVAILABLE = "503"

@@ -127,12 +127,13 @@ def talk(
         pause_s: length of a pause, s; it ends early when bytes are received.
 
     Raises:
-        NoAnswerError: the connection cannot be opened.
+        NoAnswerError: the connection cannot be opened, or the endpoint did not respond before.
         NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
     within_s = (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     deadline = time.monotonic() + within_s
     request = shown(client, octets)
+    client.put_off(request)
     client.connection.take_slot(*((method, _url(client, target)) for method, target in requests_in(octets)))
     started, sent_s, first_s = time.perf_counter(), time.monotonic(), 0.0
     number = client.connection.number()

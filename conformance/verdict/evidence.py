@@ -254,6 +254,9 @@ class Judge:
         evidence = self.evidence.get(requirement)
         if evidence is None:
             return holds
+        if isinstance(exchange, Unanswered) and exchange.kind is NoAnswer.HURRIED:
+            self.skip(requirement, exchange.problem)
+            return holds
         cases = (sum(one.seen for one in operations) if operations else 0) or 1
         evidence.cases += cases
         evidence.parts[part] = evidence.parts.get(part, 0) + cases

@@ -16,6 +16,7 @@ _KINDS = {
     NoAnswer.TLS: CauseKind.NO_RESPONSE,
     NoAnswer.TIMEOUT: CauseKind.HANG,
     NoAnswer.CIRCUIT_OPEN: CauseKind.HANG,
+    NoAnswer.HURRIED: CauseKind.HANG,
     NoAnswer.BAD_GATEWAY: CauseKind.NO_RESPONSE,
     NoAnswer.UNAVAILABLE: CauseKind.NO_RESPONSE,
     NoAnswer.GATEWAY_TIMEOUT: CauseKind.HANG,

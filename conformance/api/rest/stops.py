@@ -25,6 +25,7 @@ from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.representation import flattened
 from conformance.transport.client import HttpClient, is_drafting
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, NotPermittedError
+from conformance.transport.pace import Hangs
 from conformance.transport.passage import Heard
 
 #: How the note on a device that may still move begins.
@@ -131,12 +132,12 @@ def _unheard(client: HttpClient) -> Iterator[_Refusals]:
         "is_away": lambda _exchange: False,
         "request_rate": None,
         "timeout_s": min(connection.timeout_s, deadline_s),
+        "hangs": Hangs(),
     }
     kept = {name: getattr(connection, name) for name in changed}
     for name, value in changed.items():
         setattr(connection, name, value)
     client.close()
-    client.forget_hangs()
     try:
         yield refusals
     finally:

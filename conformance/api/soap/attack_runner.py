@@ -169,6 +169,6 @@ def outcome(send: Callable[[], Exchange]) -> Attempt:
     try:
         return send()
     except NoAnswerError as none:
-        if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS, NoAnswer.CIRCUIT_OPEN}:
+        if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS, NoAnswer.CIRCUIT_OPEN, NoAnswer.HURRIED}:
             raise
         return none.unanswered

@@ -5,7 +5,9 @@ import time
 import pytest
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import NoAnswerError, Outgoing
+from conformance.transport.parallel import crowd
+from conformance.transport.raw import talk
 
 _DEADLINE = 0.4
 
@@ -68,11 +70,37 @@ def test_a_hanging_endpoint_costs_its_deadline_twice_at_most(listening):
 
 def test_an_endpoint_that_hung_a_while_ago_is_asked_again(listening, monkeypatch):
     client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
-    monkeypatch.setattr("conformance.transport.client._HANGS_WITHIN_S", 0.0)
+    monkeypatch.setattr("conformance.transport.pace._HANGS_WITHIN_S", 0.0)
     for _ in range(3):
         with pytest.raises(NoAnswerError, match="within") as error:
             client.send("GET", "/slow/17")
         assert error.value.kind == "timeout"
+
+
+def test_what_does_not_answer_is_not_waited_for_whole_deadlines_without_an_end(listening, monkeypatch):
+    monkeypatch.setattr("conformance.transport.pace._HURRIED_S", _DEADLINE / 2)
+    client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
+    client.connection.hangs.hung("GET http://other/", 61.0)
+    for told in ("no response within 0.2 s", "not sent, because GET /slow/\\* did not respond in the time"):
+        with pytest.raises(NoAnswerError, match=told) as error:
+            client.send("GET", "/slow/17")
+        assert error.value.unanswered.kind == "hurried"
+    # A slow device gets more time.
+    client.connection.hangs.answered(_DEADLINE)
+    with pytest.raises(NoAnswerError, match=r"no response within 0\.4 s") as error:
+        client.send("GET", "/other")
+    assert error.value.unanswered.kind == "timeout"
+
+
+def test_what_hung_is_sent_by_no_client_of_the_run(listening):
+    client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
+    for _ in range(2):
+        with pytest.raises(NoAnswerError, match="within"):
+            client.send("GET", "/slow")
+    with pytest.raises(NoAnswerError, match="not sent"):
+        talk(client, b"GET /slow HTTP/1.1\r\nHost: robot\r\n\r\n")
+    ((attempt,),) = crowd(client, [[Outgoing("GET", "/slow")]], _DEADLINE)
+    assert attempt.kind == "circuit-open"
 
 
 @pytest.mark.parametrize(

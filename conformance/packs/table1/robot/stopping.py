@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BO
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
-from conformance.transport.pace import Pace
+from conformance.transport.pace import Hangs, Pace
 
 # Time for which a cancellation is repeated, s: a robot with a queue of missions starts the next one.
 _CANCEL_S: Final = 3.0
@@ -64,7 +64,7 @@ def leave_at_rest(api: RestInterface) -> str:
         # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
         # nothing is late.
         timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
-        connection = api.client.connection.unheard(timeout_s=timeout_s, pace=Pace(math.inf))
+        connection = api.client.connection.unheard(timeout_s=timeout_s, pace=Pace(math.inf), hangs=Hangs())
         client = HttpClient(api.client.base_url, connection)
         try:
             return _Stiller(client, _slowest(api)).bring(_LAST_S, _LAST_S)
