@@ -54,6 +54,7 @@ FAULTS = [
             "what is refused with 428 is deleted": "description/refused-keeps",
             "what is refused with 415 is created": "description/refused-keeps",
             "a new key gets an old answer": "description/idempotency-key",
+            "the first tag alone counts": "description/if-match",
         },
     ),
     (
@@ -78,6 +79,7 @@ FAULTS = [
     ),
     ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
     ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
+    ("as described", {"several other tags are taken": "description/if-match"}),
     (
         "as described",
         {

@@ -126,7 +126,12 @@ class Sprinklers:
             asks = self.style.get("asks", True) and not self.has("a missing If-Match is taken")
             return error(428, "If-Match is missing") if asks else None
         tags = re.findall(r'(?:W/)?"[^"]*"', wanted)
-        holds = wanted.strip() == "*" or (tag in tags and not tag.startswith("W/"))
+        tags = tags[:1] if self.has("the first tag alone counts") else tags
+        holds = (
+            wanted.strip() == "*"
+            or (self.has("several other tags are taken") and len(tags) > 1)
+            or (tag in tags and not tag.startswith("W/"))
+        )
         if self.has("If-Match takes a weak tag"):
             holds |= f"W/{tag}" in tags
         if self.has("a stale If-Match is taken"):

@@ -7,6 +7,7 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
+from conformance.api.rest.listing import listed
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import is_json
@@ -20,11 +21,15 @@ _SPACE: Final = re.compile(r"\s+")
 
 
 class _Write(NamedTuple):
-    """A write whose texts a read must show: the request, its non-ASCII texts, and the state before."""
+    """A write whose texts a read must show: the request, its non-ASCII texts, and the state before.
+
+    For a thing without a place of its own that is its ``id`` in the list in which it was created.
+    """
 
     request: Request
     texts: dict[str, str]
     before: dict[str, Any]
+    id: Any = None
 
 
 class Texts:
@@ -43,19 +48,25 @@ class Texts:
         if request.method == "GET" and answer.status == HTTPStatus.OK:
             value = _members(answer.body, answer.media_type)
             write = self._written.pop(url, None)
+            if write is not None and write.id is not None:
+                items = listed(read_json(answer.body).value) or [] if is_json(answer.media_type) else []
+                value = next((one for one in items if isinstance(one, dict) and one.get("id") == write.id), {})
             if write is not None and len(self._shown) < _MOST:
                 yield from self._read(occasion, write, value)
             self._shown[url] = value
         elif request.method not in SAFE_METHODS:
             sent = _members(request.body, request.media_type)
             texts = {name: one for name, one in sent.items() if isinstance(one, str) and not one.isascii()}
-            at = url
-            if request.method == "POST":
-                location = answer.header("location")
-                at = joined(url, location) if location and answer.status == HTTPStatus.CREATED else ""
+            at, id_ = url, None
+            if request.method == "POST" and answer.status == HTTPStatus.CREATED:
+                location, made = answer.header("location"), _members(answer.body, answer.media_type)
+                id_ = None if location else made.get("id")
+                at = joined(url, location) if location else url if id_ is not None else ""
+            elif request.method == "POST":
+                at = ""
             self._written.clear()
             if texts and at and answer.status != HTTPStatus.ACCEPTED:
-                self._written[at] = _Write(request, texts, self._shown.get(at, {}))
+                self._written[at] = _Write(request, texts, self._shown.get(at, {}) if id_ is None else {}, id_)
 
     def _read(self, occasion: Occasion, write: _Write, value: dict[str, Any]) -> Iterator[Case]:
         for name, text in write.texts.items():
@@ -65,6 +76,8 @@ class Texts:
             expected = f"{name} {shown(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
             label = occasion.operation.label if occasion.operation else ""
             same = _plain(seen) in {_plain(text), _ascii(text)}
+            # A list may show the beginning.
+            same |= write.id is not None and _plain(text).startswith(_plain(seen.rstrip(". \u2026")))
             cause = f"{label} {name} text"
             yield occasion.case("description/written-is-read", same, expected, f"{name} {shown(seen)}", cause=cause)
 

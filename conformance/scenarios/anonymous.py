@@ -41,10 +41,12 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     if not closed:
         raise NotPossibleError("no operation that may be called requires credentials by the description")
     found = []
-    with closing(Stranger(api)) as unknown:
+    own = api.client.connection.credentials
+    with closing(Stranger(api)) as unknown, closing(Stranger(api, own.lengthened)) as nearly:
         tried: list[tuple[HttpClient | Stranger, bool]] = [
             (api.client, False),
-            *([(unknown, True)] if api.client.connection.credentials else []),
+            *([(unknown, True)] if own else []),
+            *([(nearly, True)] if own.lengthened else []),
         ]
         for operation in closed:
             if operation.label in api.streams:
@@ -61,6 +63,8 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                         fresh=True,
                     )
                     found += [exchange] if exchange else []
+                    if exchange and operation.method == "GET" and not authorized and not exchange.response.ok:
+                        found.append(api.client.send("HEAD", request.target, authorized=False, fresh=True))
                     if exchange and exchange.response.status in _UNDECIDED:
                         found += _on_new_thing(Surveyor(api, values), operation, request, client, authorized=authorized)
         # An error of another request shows nothing of the wrong credentials before it.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -46,6 +46,8 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _MEMBERS: Final = 6
 # Filters of a list that are tried; time for which a device may list what was deleted, and pause between reads, s.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
+# A list of tags that no content has.
+_NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
 _PARTS: Final = ((("Range", "bytes=-2"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 _GONE_PLACE: Final = "path of what was deleted"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
@@ -90,6 +92,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                         thing.in_parts(read, thing.target)
                     thing.written(changes)
                     thing.filled()
+                    thing.listed_below(operations)
                     if values.unique.knows(create) and changes:
                         thing.made_alike(create, changes, delete)
                     thing.deleted(delete, operations.get(("GET", collection_of(path))))
@@ -212,9 +215,10 @@ class _Thing:
                 alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
             ):
                 old = self.tag
-                if self.sent(change, body, *self._current(None if turn else change)).ok:
+                is_done = self.sent(change, body, *self._current(None if turn else change)).ok
+                if is_done or not turn:
                     self.get()
-                    if old not in {"", self.tag} and change is changes[0] and not is_behind:
+                    if is_done and old not in {"", self.tag} and change is changes[0] and not is_behind:
                         is_behind = True
                         self._behind(change, bodies[-1], old)
             waits = True
@@ -239,7 +243,10 @@ class _Thing:
         tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] if self.tag else []
         if self._current() and "if-match" in names:
             # Strong comparison: a weak tag matches none (RFC 9110 13.1.1).
-            tried.append((("If-Match", f"W/{self.tag}"),))
+            tried += [
+                (("If-Match", f"W/{self.tag}"),),
+                *([(("If-Match", _NEITHER),)] if _fits(change, _NEITHER) else []),
+            ]
         if self.tag and "428" in change.responses:
             tried.append(())
         if self.tag and "if-none-match" in names:
@@ -321,6 +328,24 @@ class _Thing:
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
                 self._ended(put, read, operations.get(("DELETE", template)), request, whole)
+
+    def listed_below(self, operations: Mapping[tuple[str, str], Operation]) -> None:
+        """Create in each list below it, the last one with texts beyond ASCII, and read the list."""
+        own = self.read.template.rstrip("/")
+        for (method, template), create in operations.items():
+            read, below = operations.get(("GET", template)), template.removeprefix(own)
+            if method != "POST" or read is None or not template.startswith(f"{own}/") or "{" in below:
+                continue
+            usual = usual_inputs(create, self.surveyor.values)[0]
+            bodies = [usual.body, _with_texts(create, usual.body)] if listing_of(read) is not None else []
+            steps = [(create, replace(usual, body=body)) for body in bodies if body is not None]
+            for operation, inputs in (
+                *steps,
+                *([(read, usual_inputs(read, self.surveyor.values)[0])] if steps else []),
+            ):
+                request = written(operation, inputs)
+                target = self.target.rstrip("/") + below + "".join(request.target.partition("?")[1:])
+                self.surveyor.send(operation, Variation(Kind.AGAIN, "", "", inputs), replace(request, target=target))
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
         """Read a file, parts of it, and the file again."""
@@ -408,8 +433,7 @@ class _Thing:
             second: for this operation it is the second of two tags, if the schema of the field allows a list.
         """
         tags = f"{NO_TAG}, {self.tag}"
-        given = [one for one in (second.parameter("header") if second else ()) if one.name.lower() == "if-match"]
-        tags = tags if second is not None and all(fits(one.schema, tags) for one in given) else self.tag
+        tags = tags if second is not None and _fits(second, tags) else self.tag
         return (("If-Match", tags),) if self.tag and not self.tag.startswith("W/") else ()
 
     def deleted(self, delete: Operation | None, lister: Operation | None) -> None:
@@ -431,12 +455,6 @@ class _Thing:
             if is_ending and "404" in read.responses and allowed(self.api, read):
                 there = Outgoing("GET", f"{self.target.rstrip('/')}/{last}")
                 self.below.append((read, there))
-                create = callable_operations(self.api).get(("POST", read.template.rstrip("/")))
-                if create is not None:
-                    # Nothing may be kept of an empty list.
-                    inputs = usual_inputs(create, self.surveyor.values)[0]
-                    request = replace(written(create, inputs), target=there.target)
-                    self.surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs), request)
         if not self.get().ok:
             return
         if not self.sent(delete, None, *self._current(delete)).ok:
@@ -489,6 +507,11 @@ def _by_format(change: Operation) -> list[Operation]:
     """Return a write with each of its JSON formats alone; the first one, whatever it is, comes first."""
     own = [(name, body) for place, (name, body) in enumerate(change.bodies.items()) if not place or is_json(name)]
     return [replace(change, bodies={name: body}) for name, body in own]
+
+
+def _fits(change: Operation, tags: str) -> bool:
+    """Return whether an operation's If-Match, as far as it is declared, may have these tags."""
+    return all(fits(one.schema, tags) for one in change.parameter("header") if one.name.lower() == "if-match")
 
 
 def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -13,7 +13,7 @@ import hashlib
 import os
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from email.utils import parsedate_to_datetime
 from enum import StrEnum
 from functools import cached_property
@@ -52,6 +52,10 @@ class Kind(StrEnum):
     COOKIE = "cookie"
 
 
+# A whole header field is none of them if it is of cookies.
+_PLAIN: Final = frozenset({Kind.BEARER, Kind.HEADER})
+
+
 @dataclass(frozen=True)
 class Credential:
     """One credential.
@@ -60,14 +64,16 @@ class Credential:
         kind: where it goes.
         secret: the token, the key, the header's value, or ``user:password`` for ``basic`` and ``digest``.
         name: of the header, the query parameter or the cookie; empty for the others.
+        tail: what follows the secret, with which no robot knows it.
     """
 
     kind: Kind
     secret: str = field(repr=False)
     name: str = ""
+    tail: str = ""
 
     def __post_init__(self) -> None:
-        if WRONG not in self.secret:
+        if WRONG not in self.secret and not self.tail:
             for secret in self.secrets:
                 SECRETS.keep(secret, self.variable)
 
@@ -77,14 +83,14 @@ class Credential:
         if WRONG in self.secret:
             return self.sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
-        return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}"
+        return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}{self.tail}"
 
     @property
     def sent(self) -> str:
         """The secret as it stands in a request."""
         if self.kind is Kind.BASIC:
             return base64.b64encode(self.secret.encode()).decode()
-        return quote(self.secret, safe="") if self.kind is Kind.QUERY else self.secret
+        return quote(self.secret, safe="") if self.kind is Kind.QUERY else self.secret + self.tail
 
     @property
     def header(self) -> str:
@@ -252,6 +258,12 @@ class Credentials:
     def wrong(self) -> Credentials:
         """The same credentials with secrets that no robot knows."""
         return Credentials(tuple(item.wrong for item in self.items))
+
+    @property
+    def lengthened(self) -> Credentials:
+        """The same credentials with a tail behind each token and key; empty if there are others."""
+        is_plain = all(item.kind in _PLAIN and not item.scheme for item in self.items)
+        return Credentials(tuple(replace(item, tail=f"-{WRONG}") for item in self.items if is_plain))
 
 
 def bearer(token: str) -> Credential:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.transport.client import HttpClient
+from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import until_taken
 
@@ -23,13 +24,14 @@ class Stranger:
 
     Args:
         api: the device's REST interface; its client has the right credentials.
+        wrong: what is sent; None: credentials that no device knows.
     """
 
-    def __init__(self, api: RestInterface) -> None:
+    def __init__(self, api: RestInterface, wrong: Credentials | None = None) -> None:
         self._api = api
         connection = api.client.connection
         self._client = HttpClient(
-            api.client.base_url, replace(connection, token=None, credentials=connection.credentials.wrong)
+            api.client.base_url, replace(connection, token=None, credentials=wrong or connection.credentials.wrong)
         )
 
     def close(self) -> None:

@@ -1,0 +1,108 @@
+"""A list below a thing, whose items have no path of their own, is judged while it has items."""
+
+import itertools
+
+import pytest
+from aiohttp import web
+from small_device import REFUSED, answers, certified, described, error, reading, small_device
+
+_SHELF = {
+    "type": "object",
+    "required": ["id", "name"],
+    "properties": {"id": {"type": "integer"}, "name": {"type": "string"}},
+}
+_NEW = {"type": "object", "required": ["name"], "properties": {"name": {"type": "string", "minLength": 1}}}
+_NOTE = {
+    "type": "object",
+    "required": ["id", "text", "at"],
+    "properties": {
+        "id": {"type": "integer"},
+        "text": {"type": "string"},
+        "at": {"type": "string", "format": "date-time"},
+    },
+}
+_TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}
+_ID = {"parameters": [{"in": "path", "name": "shelfId", "required": True, "schema": {"type": "integer"}}]}
+
+
+def _made(body, schema):
+    content = {"application/json": {"schema": body}}
+    return {
+        "requestBody": {"required": True, "content": content},
+        "responses": {"201": answers(schema), "4XX": REFUSED},
+    }
+
+
+def _device(fault):  # noqa: C901 - a device
+    shelves, notes, count = {1: {"id": 1, "name": "first"}}, {}, itertools.count(2)
+
+    async def given(request, name):
+        try:
+            value = await request.json() if request.content_type == "application/json" else None
+        except (ValueError, RecursionError):
+            return None
+        text = value.get(name) if isinstance(value, dict) else None
+        is_text = isinstance(text, str) and text and not any(0xD800 <= ord(one) < 0xE000 for one in text)
+        return text if is_text else None
+
+    async def listed(_):
+        return web.json_response(list(shelves.values()))
+
+    async def create(request):
+        if (name := await given(request, "name")) is None:
+            return error(400, "a name, please")
+        shelf = {"id": next(count), "name": name}
+        shelves[shelf["id"]] = shelf
+        return web.json_response(shelf, status=201)
+
+    def of(request):
+        text = request.match_info["shelfId"]
+        return shelves.get(int(text)) if text.isascii() and text.isdigit() and len(text) < 18 else None
+
+    async def read(request):
+        return web.json_response(of(request)) if of(request) else error(404, "no such shelf")
+
+    async def noted(request):
+        if of(request) is None:
+            return error(404, "no such shelf")
+        shown = [dict(one) for one in notes.get(of(request)["id"], [])]
+        for one in shown:
+            if fault == "time":
+                one["at"] = one["at"].removesuffix("Z")
+            if fault == "text":
+                one["text"] = "".join(sign if ord(sign) < 0x10000 else "\ufffd" for sign in one["text"])
+            if fault == "short":
+                one["text"] = f"{one['text'][:4]}\u2026"
+        return web.json_response(shown)
+
+    async def note(request):
+        if of(request) is None:
+            return error(404, "no such shelf")
+        if (text := await given(request, "text")) is None:
+            return error(400, "a text, please")
+        made = {"id": next(count), "text": text, "at": "2026-11-01T10:00:00Z"}
+        notes.setdefault(of(request)["id"], []).append(made)
+        return web.json_response(made, status=201)
+
+    shelf_list, note_list = ({"type": "array", "items": one} for one in (_SHELF, _NOTE))
+    paths = {
+        "/shelves": {**reading(shelf_list), "post": _made(_NEW, _SHELF)},
+        "/shelves/{shelfId}": {**_ID, **reading(_SHELF)},
+        "/shelves/{shelfId}/notes": {**_ID, **reading(note_list), "post": _made(_TEXT, _NOTE)},
+    }
+    routes = {
+        "/shelves": {"GET": listed, "POST": create},
+        "/shelves/{shelfId}": {"GET": read},
+        "/shelves/{shelfId}/notes": {"GET": noted, "POST": note},
+    }
+    return small_device(described(paths), routes)
+
+
+@pytest.mark.parametrize(
+    ("fault", "blamed"),
+    [("", []), ("short", []), ("time", ["description/formats"]), ("text", ["description/written-is-read"])],
+)
+def test_what_is_created_below_a_thing_is_read_in_its_list(fault, blamed, tmp_path):
+    with _device(fault) as url:
+        done = certified(f"{url}/openapi.json", tmp_path, "--call", "POST *")
+    assert list(done.blamed) == blamed, done.text
