@@ -68,11 +68,6 @@ def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = N
         seconds: the duration.
         cpus: the processors that the loader may use; None for all.
     """
-
-    def pin() -> None:
-        if cpus:
-            os.sched_setaffinity(0, cpus)
-
     script = f"wrk.method = {json.dumps(call.method)}\n"
     if call.body:
         script += f"wrk.body = {json.dumps(call.body)}\nwrk.headers['Content-Type'] = {json.dumps(call.content_type)}\n"
@@ -81,7 +76,8 @@ def load(call: Call, connections: int, seconds: float, cpus: set[int] | None = N
         lua.flush()
         url = f"http://{call.host}:{call.port}{call.target}"
         command = ["wrk", "-t1", f"-c{connections}", f"-d{max(1, round(seconds))}s", "-s", lua.name, url]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, preexec_fn=pin)
+        pinned = ["taskset", "-c", ",".join(map(str, cpus or os.sched_getaffinity(0))), *command]
+        done = subprocess.run(pinned, check=True, capture_output=True, text=True)
     return Load(**json.loads(done.stdout.splitlines()[-1]))
 
 

@@ -147,12 +147,6 @@ def roaas_load(*options: Any) -> dict[str, Any]:
     return found
 
 
-def median_of(found: dict[str, Any]) -> dict[str, Any]:
-    """Return the comparison of SOAP and REST at the median in a latency.json."""
-    entry: dict[str, Any] = next(entry for entry in found["comparisons"] if entry["quantile"] == "p50")
-    return entry
-
-
 def matching(patterns: Iterable[str], faults: Iterable[str]) -> list[str]:
     """Return the faults whose names match a pattern; print the names where none does."""
     names = [name for name in faults if any(fnmatch(name, pattern) for pattern in patterns)]

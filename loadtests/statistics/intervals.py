@@ -24,6 +24,7 @@ from loadtests.statistics.rounds import (
     in_rounds,
     widened_difference,
     widened_ratio,
+    widening,
 )
 
 RESAMPLES = 2000
@@ -113,8 +114,8 @@ def resample(units: Sequence[Unit], name: str, seed: int, stream: int = 0) -> Re
         times = _times(rng.integers(0, outer, (_AT_ONCE, outer)), outer)
         found.append(sample.statistic_ms(_within(times, sample.repeats, rng) if nested else times, name))
     whole = sample.statistic_ms(np.ones((1, sample.size)), name)[:, 0]
-    widening = rounds.widening * (1.0 if nested else birge_ratio(rounds))
-    return Replicates(whole, np.concatenate(found, axis=-1), rounds, outer - 1, widening)
+    wider = widening(rounds.correlation) * (1.0 if nested else birge_ratio(rounds))
+    return Replicates(whole, np.concatenate(found, axis=-1), rounds, outer - 1, wider)
 
 
 def _times(chosen: Ints, number: int) -> Floats:
@@ -142,7 +143,7 @@ def birge_ratio(rounds: Rounds) -> float:
     if len(within) < 2:  # noqa: PLR2004 -- one run has nothing to be compared with
         return 1.0
     means = np.array([values.mean() for values in within])
-    errors = np.array([values.var(ddof=1) / len(values) for values in within]) * rounds.widening**2
+    errors = np.array([values.var(ddof=1) / len(values) for values in within]) * widening(rounds.correlation) ** 2
     errors = np.maximum(errors, 1e-18)
     centre = float((means / errors).sum() / (1 / errors).sum())
     return max(1.0, math.sqrt(float(((means - centre) ** 2 / errors).sum()) / (len(within) - 1)))
@@ -256,5 +257,5 @@ def pooled_interval(parts: Sequence[Compared]) -> Interval | None:
     ratio = math.exp(float(np.mean([math.log(part.ratio) for part in parts])))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.exp(np.mean([np.log(one.values[1] / one.values[0]) for one in known], axis=0))
-    degrees, widening = sum(one.degrees for one in known), max(one.widening for one in known)
-    return replace(known[0], degrees=degrees, widening=widening).interval(ratios, ratio)
+    degrees, wider = sum(one.degrees for one in known), max(one.widening for one in known)
+    return replace(known[0], degrees=degrees, widening=wider).interval(ratios, ratio)

@@ -129,11 +129,6 @@ class Rounds:
     correlation: float | None
     influence: Floats
 
-    @property
-    def widening(self) -> float:
-        """Return by how much the remaining correlation widens an interval, 1 or more."""
-        return widening(self.correlation)
-
 
 def widening(correlation: float | None) -> float:
     """Return by how much the correlation of each value with the next widens an interval, 1 or more."""
