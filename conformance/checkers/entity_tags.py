@@ -113,7 +113,7 @@ class EntityTags:
             return
         key = (url, tag, answer.media_type, answer.header("content-encoding") or "", fields_of(occasion))
         if key in self._named:
-            other = _difference(self._named[key], answer)
+            other = difference(self._named[key], answer)
             expected = f"another entity tag than {tag} for another content"
             yield occasion.case(_TAGS, not other, expected, other, cause=f"{label_of(occasion.operation)} one tag")
         elif len(self._named) < _MOST and len(answer.body) < _LARGEST:
@@ -292,7 +292,7 @@ def _declares(operation: Operation | None, *, with_status: bool) -> bool:
     return (with_status and "412" in operation.responses) or "if-match" in named
 
 
-def _difference(one: Response, other: Response) -> str:
+def difference(one: Response, other: Response) -> str:
     """Return how two contents differ, as a noun phrase; empty if they say the same."""
     if one.body == other.body:
         return ""

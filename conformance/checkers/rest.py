@@ -1,11 +1,13 @@
 """All checkers of REST, over the exchanges of a run one after another."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import conditional, declared, fields, problem
 from conformance.checkers.changes import Changes
+from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import EntityTags
 from conformance.checkers.identities import Identities, Uniques
@@ -43,7 +45,7 @@ class RestCheckers:
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
         # These know what the run has shown so far.
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
-        self._untouched = Untouched(contract)
+        self._untouched, self._codings = Untouched(contract), Codings()
         self._over_time = (
             conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
@@ -73,6 +75,11 @@ class RestCheckers:
         occasion = Occasion(self._contract, attempt, context)
         for check in _ANY:
             yield from check(occasion)
+        plain = yield from self._codings(occasion)
+        if plain is None:
+            return
+        # All others judge what the content says.
+        occasion = replace(occasion, exchange=plain)
         for checker in self._over_time:
             yield from checker(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:

@@ -16,7 +16,7 @@ _READS = 8
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 
 
-def reads(api: RestInterface) -> list[Call]:
+def reads(api: RestInterface, most: int = _READS) -> list[Call]:
     """Return valid requests for operations that read, the optional ones last: a few show how a server speaks HTTP.
 
     Those that the survey found to answer 2xx come first, of these the ones that never took a second. A response that
@@ -29,7 +29,7 @@ def reads(api: RestInterface) -> list[Call]:
         (item for item in found if item.label not in api.streams),
         key=lambda item: (item.optional, item.label not in api.working, item.label in api.slow, len(item.parameters)),
     )
-    return [api.working.get(item.label) or readable(api, item) for item in ranked[:_READS]]
+    return [api.working.get(item.label) or readable(api, item) for item in ranked[:most]]
 
 
 def _wsdl_path(api: RestInterface) -> str:
@@ -68,14 +68,14 @@ def _with(call: Call, names: list[str], text: str) -> Call:
     return call
 
 
-def answered(api: RestInterface, *ids: str) -> list[Call]:
-    """Send each of reads(), and return those with status 200: a robot may lack an extension.
+def answered(api: RestInterface, *ids: str, most: int = _READS) -> list[Call]:
+    """Send each of reads(), at most so many, and return those with status 200: a robot may lack an extension.
 
     What can be deleted is left out if there is anything else: a robot's own goal may end between two requests. If there
     is nothing at all, add a note to the requirements.
     """
     deletable = {item.template for item in operations_of(api.run.contract) if item.method == "DELETE"}
-    all_found = [call for call in reads(api) if call.send(api).response.status == HTTPStatus.OK]
+    all_found = [call for call in reads(api, most) if call.send(api).response.status == HTTPStatus.OK]
     found = [call for call in all_found if call.operation.template not in deletable] or all_found
     for id_ in ids if not found else ():
         api.run.judge.note(id_, "no operation that only reads got status 200")

@@ -3,7 +3,7 @@
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import answered
+from conformance.api.rest.applicable import answered, reads
 from conformance.api.rest.formats import quality
 from conformance.api.rest.interface import RestInterface
 from conformance.verdict.evidence import Judge
@@ -50,6 +50,25 @@ def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
         taken = exchange.response.ok and exchange.response.media_type == media_type
         expected = f"status 200 with {media_type} when Accept is {media_type}; charset=utf-8"
         expect(judge, "http/accept-parameters", exchange).that(taken, expected)
+
+
+# Accept-Encoding as clients send it, and as they exclude codings; after every other one the content is read without.
+_CODINGS = ("gzip, br", "identity;q=0, gzip", "gzip;q=0", "identity", "br", "*")
+# Resources of which the largest are chosen; how many these are, beside the smallest.
+_CHOICE, _LARGE = 24, 4
+
+
+@pytest.mark.requirement("http/content-coding", "http/accept-encoding")
+def test_content_codings(api: RestInterface) -> None:
+    """Read large contents and a small one with and without codings; checkers judge these responses, like all others."""
+    found = [call for call in reads(api, _CHOICE) if call.operation.label not in api.slow]
+    ranked = sorted(found, key=lambda call: len(call.send(api).response.body), reverse=True)
+    for call in api.run.effort.subsample([*ranked[:_LARGE], *ranked[_LARGE:][-1:]], 2):
+        for number, coding in enumerate(_CODINGS):
+            if number % 2 == 0:
+                call.send(api)
+            call.send(api, ("Accept-Encoding", coding))
+        call.send(api)
 
 
 _PRECONDITIONS = "http/preconditions"
