@@ -195,7 +195,7 @@ def _requirements(statement: Statement, policy: Policy, known: Known) -> Iterato
         problems.append("not known: the installed suite has no such ledger")
     there = sum(1 for _ in outcomes_of(run))
     text = f"all {count} requirements of the {'suite' if same else f'set {name}'}"
-    text += "" if same else f", and {there - count} that the installed suite does not know" if there > count else ""
+    text += "" if same else f", and {there - count} beyond it" if there > count else ""
     yield Point(
         "requirements",
         not problems,

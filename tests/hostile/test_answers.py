@@ -39,6 +39,8 @@ def test_the_clients_of_the_suite_end(number: int, *, endless: bool) -> None:
             with suppress(NoAnswerError, UnreadableError):
                 response = client.send("GET", f"/{number}").response
                 read(response.media_type or "application/json", response.body, {"type": "object"})
+        client.close()
+        client = HttpClient(f"http://127.0.0.1:{port}", Connection(timeout_s=_SECONDS, endless=endless))
         if not endless:
             request = head(client, "GET", f"/{number}")
             read_one(client, request, talk(client, request, answers=1), "GET")

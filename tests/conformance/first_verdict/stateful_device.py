@@ -172,7 +172,7 @@ class StatefulDevice:
         wanted = request.headers.get("If-Match", "")
         if not wanted:
             return error(428, "If-Match")
-        if wanted not in {"*", f'"{self.count}"'}:
+        if not {"*", f'"{self.count}"'} & {one.strip() for one in wanted.split(",")}:
             return error(412, "the counter has changed")
         self.count = given
         return _shown({"count": self.count}, ETag=f'"{self.count}"')

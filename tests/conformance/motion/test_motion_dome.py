@@ -28,4 +28,4 @@ def test_a_right_camera_that_takes_ways_is_not_blamed(tmp_path):
 def test_an_element_that_the_message_has_not_is_named(tmp_path):
     done, _ = _judged(None, tmp_path, dome.MAP.replace('ProfileToken = "main", Position', 'Profile = "main", Position'))
     assert done.returncode == 2
-    assert "POST /PTZPort/AbsoluteMove: AbsoluteMove has no Profile, but ProfileToken, Position, Speed" in done.stderr
+    assert "POST /PTZPort/AbsoluteMove: AbsoluteMove has no Profile, but Position, ProfileToken, Speed" in done.stderr
