@@ -1,6 +1,7 @@
 """A feeder with settings, bins and recipes over SOAP: right in several styles, or with one fault."""
 
 import itertools
+import re
 import threading
 import time
 from dataclasses import dataclass, field
@@ -89,6 +90,14 @@ class Feeder(Device):
     writes: int = 0
     reads: int = 0
     due: list[tuple[float, dict[str, str]]] = field(default_factory=list)
+
+    @property
+    def schema(self) -> etree.XMLSchema:
+        """The schema that validates requests, without some of the facets if that is the fault."""
+        names = [name for name in ("maxInclusive", "maxLength") if f"no {name}" in self.faults]
+        return etree.XMLSchema(
+            etree.fromstring(re.sub(f'<xs:({"|".join(names) or "-"}) value="[^"]*"/>', "", self.xsd))
+        )
 
     def respond(self, octets: bytes) -> tuple[int, bytes]:
         """Answer, and note what was refused."""

@@ -370,6 +370,19 @@ def _is_outside(value: int, simple: Simple) -> bool:
     )
 
 
+def beyond(simple: Simple, text: str) -> Iterator[str]:
+    """Yield texts that a facet may forbid: next to a bound, with a character too many or too few for ``text``."""
+    if simple.builtin in NUMBERS:
+        step = Decimal(1 if simple.builtin in INTEGERS else "0.001")
+        for bound, sign in ((simple.minimum, -1), (simple.maximum, 1)):
+            # An exclusive bound is itself forbidden.
+            yield from () if bound is None else (f"{bound:f}", f"{bound + sign * step:f}")
+    elif not simple.enumeration:
+        if simple.max_length is not None and simple.max_length < _LONGEST:
+            yield (text or "a").ljust(simple.max_length + 1, text[-1:] or "a")
+        yield from (text[: max((simple.min_length or 1) - 1, 0)], text[:-1], text + text[-1:], text + "~")
+
+
 def unreadable(simple: Simple) -> tuple[str, ...]:
     """Return texts that are invalid for the type; empty for types on which parsers disagree."""
     if simple.enumeration:
@@ -399,7 +412,7 @@ def plain(simple: Simple) -> str:
         "time": "12:00:00Z",
         "duration": "PT1S",
         "anyURI": "urn:example:a",
-        "base64Binary": "AAAA",
+        "base64Binary": "+/8A",
         "hexBinary": "00FF",
         "gYear": "2026",
         "gYearMonth": "2026-01",

@@ -126,14 +126,17 @@ class DescribedMessages:
                 kept = with_text(kept, path, text)
         return declared, made if self.found.types.invalid(parse(kept.written())) else kept
 
-    def invented(self, declared: Element, node: Node) -> list[str]:
-        """Return the names of values that only the device can know: texts, and numbers that are ids."""
+    def invented(self, declared: Element, node: Node, *, named: bool = False) -> list[str]:
+        """Return the names of values that only the device can know: texts, and numbers that are ids.
+
+        ``named``: with those of [values], which the device may know no more.
+        """
         return [
             node.at(path).name
             for path, simple in simple_leaves(declared, node)
             if not simple.enumeration
             and (simple.builtin in TEXTS or (simple.builtin in INTEGERS and _ID.search(node.at(path).name)))
-            and node.at(path).name not in self.values
+            and (named or node.at(path).name not in self.values)
         ]
 
     def _made(
@@ -150,11 +153,11 @@ class DescribedMessages:
         fault = ""
         for optional in (False, True):
             node = ordinary(declared, optional=optional)
-            invented = self.invented(declared, node)
+            unsure = self.invented(declared, node, named=True)
             for path, simple in simple_leaves(declared, node):
                 name = node.at(path).name
-                values = self.values.get(name) or (given.get(name.lower()) if name in invented else None)
-                if not values and name in invented and simple.patterns:
+                values = (given.get(name.lower()) if name in unsure else None) or self.values.get(name)
+                if not values and name in unsure and simple.patterns:
                     values = [str(sample({"type": "string", "pattern": f"^(?:{simple.patterns[0]})$"}))]
                 if values:
                     node = with_text(node, path, str(values[turn % len(values)]))

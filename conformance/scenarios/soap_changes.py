@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import islice
@@ -70,13 +71,14 @@ class _Changes:
         for act in in_order(self.caller.acts.values(), self.caller.asks):
             if act.role in {Role.OTHER, Role.ENDS}:
                 continue
-            try:
+            with suppress(NotPossibleError):
+                if act.role is Role.REMOVES:
+                    # Not called: the thing may be the one that is read and changed.
+                    self.acts.append((act, *self.caller.messages.usual(act.operation)))
+                    continue
                 declared, node, kind = usual_message(self.caller, act)
-            except NotPossibleError:
-                continue
-            # What removes needs a thing to remove.
-            if kind is Kind.USUAL and (self.caller.probes[-1].succeeded or act.role is Role.REMOVES):
-                self.acts.append((act, declared, node))
+                if kind is Kind.USUAL and self.caller.probes[-1].succeeded:
+                    self.acts.append((act, declared, node))
 
     def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED) -> SoapProbe:
         """Send a message to an operation."""
@@ -210,12 +212,13 @@ class _Changes:
         self._refuse(act, declared, _varied(node, free, _THINGS), 0)
         self._read(lists, node, times=2)
         for id_ in reversed(made):
-            self._remove(remove[0], remove[2], id_)
+            self.remove(remove[0], remove[2], id_)
             self._read(lists, node, times=2)
         time.sleep(SETTLES_S)
         self._read(lists, node, times=2)
 
-    def _remove(self, act: Act, node: Node, id_: str) -> None:
+    def remove(self, act: Act, node: Node, id_: str) -> None:
+        """Remove a thing by its id."""
         paths = [path for path in node.paths() if not node.at(path).children]
         named = [path for path in paths if REFERS.search(node.at(path).name)] or paths
         if named:
@@ -282,6 +285,9 @@ def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
     steps |= {act.label: changes.create(act, declared, node) for act, declared, node in changes.by_role(Role.CREATES)}
     api.run.limit.in_turns(steps, 1.0)
     changes.read_often()
+    for act, _, node in changes.by_role(Role.REMOVES):
+        for id_ in {text for texts in changes.caller.known(act).values() for text in texts}:
+            changes.remove(act, node, id_)
     return tuple(changes.caller.probes)
 
 

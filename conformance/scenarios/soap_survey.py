@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.mutations import STRANGE, invalid_ones, mutations
+from conformance.api.soap.mutations import STRANGE, facets, invalid_ones, mutations
 from conformance.api.soap.roles import LAST, REFERS, Act, Role, acts_of, in_order, texts_of
 from conformance.commandline.device_options import advice
 from conformance.documents.multipart import root_of
@@ -175,6 +175,9 @@ class Caller:
                 for name, simple in act.makes.items():
                     for key in act.keys(name, simple):
                         self.made[key] = [*told.get(name, ()), *self.made.get(key, ())]
+                if node and act.role is Role.REMOVES:
+                    gone = {node.at(path).text for path in node.paths()}
+                    self.made = {key: [text for text in texts if text not in gone] for key, texts in self.made.items()}
                 if act.role is Role.READS:
                     self.current |= {name: texts[0] for name, texts in told.items() if len(texts) == 1}
 
@@ -292,7 +295,9 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
         for kind in _FORBIDDEN
         for one in effort.draw([each for each in tried if each.kind == kind], _MOST, f"{caller.api.run.seed}/{kind}")
     ]
-    for wrong in invalid_ones(drawn, caller.messages.found.types):
+    types = caller.messages.found.types
+    near = list(invalid_ones(facets(declared, node), types)) if declared and node else []
+    for wrong in (*invalid_ones(drawn, types), *effort.subsample(near, _MOST)):
         if time.monotonic() < until and act.label not in caller.lost:
             message = caller.messages.message(port, operation, wrong.made[0])
             caller.send(port, operation, Kind.INVALID, wrong.what, message)
@@ -314,9 +319,10 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
 def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None, Kind]:
     """Send valid messages until one is accepted; return the declaration, the last message and its kind.
 
-    Where the device refuses a value that the suite invented, it is asked with values that it gave, and last with one
-    of a thing that is created for it. That it refuses such a value is no fault: the message is recorded as tried. What
-    ends or removes a thing gets only what the suite created.
+    Where the device refuses a value that the suite invented, or that [values] has, it is asked with values that it
+    gave, and last with one of a thing that is created for it. That it refuses one that it gave or that was invented is
+    no fault: the message is recorded as tried. What ends or removes a thing gets what the suite created, and only
+    without that a value of [values].
 
     Raises:
         NotPossibleError: no message can be made; it says what is needed.
@@ -325,32 +331,42 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
     current = caller.current if act.role is Role.WRITES else {}
     declared, node = messages.usual(act.operation, current=current)
     invented = messages.invented(declared, node) if declared and node else []
-    names = {name.lower() for name in invented if REFERS.search(name)} or {name.lower() for name in invented}
-    kind, is_last = Kind.TRIED if invented else Kind.USUAL, bool(invented) and act.role in LAST
-    for turn in range(_TRIED + 2 if invented else 1):
+    unsure = messages.invented(declared, node, named=True) if declared and node else []
+    names = {name.lower() for name in unsure if REFERS.search(name)} or {name.lower() for name in unsure}
+    kind, is_last = Kind.TRIED if invented else Kind.USUAL, bool(unsure) and act.role in LAST
+    for turn in range(_TRIED + 2 if unsure else 1):
         if act.label in caller.lost:
             break
         is_new = turn > _TRIED and caller.renew(act)
         known = caller.known(act)
-        if (turn > _TRIED and not is_new) or (is_last and (not turn or not any(known.get(name) for name in names))):
+        has = any(known.get(name) for name in names)
+        if (turn > _TRIED and not is_new) or (is_last and (not has if turn else has or invented)):
             continue
         if turn:
             node = messages.usual(act.operation, 0 if is_new else turn - 1, known)[1]
+            kind = kind if tried and not invented else Kind.TRIED
         if node in tried:
             continue
         tried.append(node)
         octets = messages.message(act.port, act.operation, node)
-        probe = caller.send(act.port, act.operation, kind, "a valid message", octets)
+        probe = caller.send(act.port, act.operation, Kind.TRIED if turn else kind, "a valid message", octets)
         if probe.succeeded:
             kind, caller.probes[-1] = Kind.USUAL, replace(probe, kind=Kind.USUAL)
             caller.learn(probe, node)
             break
+    else:
+        node = tried[0] if tried and kind is Kind.USUAL else node
     if not tried and is_last:
         raise NotPossibleError(
             f"the suite ends and removes only what it created, and created nothing for {act.operation.name}: allow the "
             f"operation that creates it{advice(' by --call')}, or name a value in [values]"
         )
     return declared, node, kind
+
+
+def mandatory(port: SoapPort, text: str = "1") -> Node:
+    """Return a header block that no device knows, and that must be understood."""
+    return Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), text),))
 
 
 def _odd(
@@ -366,11 +382,9 @@ def _odd(
         "an Envelope of an unknown namespace",
         caller.messages.message(port, operation, node, space=STRANGE),
     )
-    block = Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), "1"),))
-    yield (
-        Kind.UNDERSTAND,
-        "a header block that must be understood",
-        caller.messages.message(port, operation, node, block),
-    )
+    # An xs:boolean in SOAP 1.2 (Part 1, 5.2.3); 0 or 1 in SOAP 1.1.
+    for text in ("1", "true") if port.is_12 else ("1",):
+        says = f"a header block that must be understood ({text})"
+        yield Kind.UNDERSTAND, says, caller.messages.message(port, operation, node, mandatory(port, text))
     head, rest = caller.messages.message(port, operation, node).split(b"\n", 1)
     yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

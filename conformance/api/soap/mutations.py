@@ -97,6 +97,15 @@ def _values(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
             yield Mutation(kind, f"{text!r} at {base.at(path).name}", (with_text(base, path, text),))
 
 
+def facets(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
+    """Yield mutations by values that a facet of the type may forbid, of elements and of attributes."""
+    for path, declared in [((), element), *declarations(element, base)]:
+        kind, node = declared.type, base.at(path)
+        simple = kind if isinstance(kind, Simple) else kind.text
+        for text in lexical.beyond(simple, node.text) if simple else ():
+            yield Mutation("facet", f"{text[:60]!r} at {node.name}", (with_text(base, path, text),))
+
+
 def _wrapped(simple: Simple, text: str) -> tuple[str, ...]:
     """Return what becomes the same value where only the lower 32 bits of an integer are kept."""
     return (str(int(text) + 2**32),) if simple.builtin in lexical.INTEGERS else ()

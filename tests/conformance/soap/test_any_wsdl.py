@@ -4,6 +4,7 @@ import contextlib
 import json
 import re
 import sys
+from decimal import Decimal
 from itertools import count
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from conformance.api.call_rules import CallRules
 from conformance.contract.pack import Contract
 from conformance.documents.wsdl import WsdlError, read_services
 from conformance.documents.wsdl_pack import write_soap_pack
+from conformance.documents.xsd_shapes import Simple, beyond
 from conformance.rules.soap import test_soap
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError
@@ -107,6 +109,16 @@ def _on_faults(change):
 
 def _on_success(change):
     return lambda _, *answer: change(*answer) if answer[0] == 200 else answer
+
+
+def test_facets_are_broken_by_little():
+    """A bound on both sides, a length, and a pattern that the value matches but for one character."""
+    number, text = Simple("int", minimum=Decimal(1), maximum=Decimal(9)), Simple("token", max_length=4)
+    assert set(beyond(number, "3")) == {"1", "0", "9", "10"}
+    assert {"mappp", "map~"} <= set(beyond(text, "map"))
+    assert {"1234", "123455", "12345~"} <= set(beyond(Simple("token", patterns=("[0-9]{5}",)), "12345"))
+    assert "0.049" in set(beyond(Simple("double", minimum=Decimal("0.05")), "1"))
+    assert not set(beyond(Simple("string", enumeration=("a",)), "a"))
 
 
 def _taking(pattern, device):

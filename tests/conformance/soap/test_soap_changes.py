@@ -30,8 +30,12 @@ _FAULTS = (
         "rate whole": ("written-is-read", "rate '"),
         "second delete does nothing": ("deleted-is-gone", "which was removed"),
     },
-    {"escaped twice": ("written-is-read", "label '"), "stale at times": ("written-is-read", "mode '")},
-    {"lost after refusal": ("written-is-read", "SetSettings")},
+    {
+        "escaped twice": ("written-is-read", "label '"),
+        "stale at times": ("written-is-read", "mode '"),
+        "no maxInclusive": ("invalid-refused", "'8.001' at "),
+    },
+    {"lost after refusal": ("written-is-read", "SetSettings"), "no maxLength": ("invalid-refused", "p' at Title")},
     {"fails at times": ("valid-accepted", "GetSettings"), "mode burst refused": ("valid-accepted", "SetSettings")},
 )
 
@@ -75,6 +79,19 @@ def test_faults_are_found_by_the_requirement_that_they_break(tmp_path):
         if said not in "".join(one["message"] for one in outcome.requirement(f"soap/{name}")["failures"])
     ]
     assert missed == []
+
+
+def test_an_id_of_the_user_is_read_and_not_removed(tmp_path):
+    """With an id in [values] as much is judged as without it: what is removed is what was created."""
+    device, statement = feeder(), tmp_path / "values.toml"
+    device.recipes["r900000"] = "the user's"
+    statement.write_text('[values]\nRecipeId = ["r900000"]\n', encoding="utf-8")
+    allowed = ("--call", "*", "--call", "POST /feederPort/DeleteRecipe")
+    with serving(device) as url:
+        outcome = certified(f"{url}/feeder.wsdl", tmp_path / "out", str(statement), *allowed)
+    assert (outcome.exit_code, outcome.blamed) == (0, {}), outcome.text
+    assert device.recipes == {"r900000": "the user's"}
+    assert outcome.requirement("soap/deleted-is-gone")["verdict"] == "pass"
 
 
 def test_operations_whose_names_say_nothing_are_judged_as_before(tmp_path):
