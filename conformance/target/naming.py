@@ -169,7 +169,8 @@ def what_is_judged(source: str | None, statement: Path | None, options: DeviceOp
     contract = Contract.load(options.pack)
     if source and not is_url(source) and is_url(source, bridge=True):
         if not options.ros_play:
-            raise StatementError(f"{source} is a rosbridge: give --ros-play, or a statement with its map for --ros")
+            ways = "`roaas certify --ros-play` judges it, or `roaas certify --ros` by a statement with its map"
+            raise StatementError(f"{source} is a rosbridge: {ways}")
         statement, source = usual_map(source, options.ros_domain_id or 0, options.out), None
     if statement and (bridge := bridge_in(statement)):
         # Nothing else of a web API can be asked of a WebSocket.

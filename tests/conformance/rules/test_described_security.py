@@ -47,9 +47,12 @@ def test_what_requires_credentials_is_sent_without_them_and_with_wrong_ones(tmp_
         trace = anonymous_requests.play(RestInterface(run, client), Values())
         client.close()
     # After wrong credentials come right ones, so that the device does not count the wrong ones.
-    assert seen == [(one, "/closed") for method in methods for one in (method, method, "GET")]
+    methods_of = {"GET": ["GET", "HEAD", "GET", "GET", "GET", "GET"], "POST": ["POST", "POST", "GET", "POST", "GET"]}
+    expected = [(one, "/closed") for method in methods for one in methods_of[method]]
+    assert seen == [*expected, ("GET", "/roaas-is-not-there")]
     sent = [dict(one.request.headers).get("Authorization") for one in trace]
-    assert sent[::2] == [None] * len(methods)
+    wrong = ["Bearer roaas-not-this-one", "Bearer $ROAAS_TOKEN-roaas-not-this-one"]
+    assert sent == [None, None, *wrong, *[None, *wrong] * (len(methods) - 1)]
     assert "$ROAAS_TOKEN" not in sent
 
 
