@@ -165,10 +165,10 @@ def test_an_action_follows_its_script(players, client):
         )
 
     assert not goal().accepted
-    result = done(goal().get_result_async())
-    deadline = time.monotonic() + 20
-    while len(heard) < len(feedback) and time.monotonic() < deadline:  # its feedback has a way of its own
+    accepted, deadline = goal(), time.monotonic() + 20
+    while len(heard) < len(feedback) and time.monotonic() < deadline:  # a client with the result drops later feedback
         executor.spin_once(0.2)
+    result = done(accepted.get_result_async())
     assert (result.status, list(result.result.sequence), heard) == (
         GoalStatus.STATUS_SUCCEEDED,
         [0, 1, 1],
