@@ -16,6 +16,8 @@ from conformance.documents.openapi import SAFE, Operation, is_json, operations_o
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
+# Plain names of identifiers that belong to one thing alone.
+_IDS: Final = frozenset({"id", "uuid", "guid"})
 # Identifiers of a run that are remembered.
 _REMEMBERED: Final = 50_000
 # Statuses that refuse a creation with a taken value; refused bodies that are remembered, and octets of each.
@@ -97,6 +99,8 @@ class Uniques:
         self._unique: dict[str, set[str]] = defaultdict(set)
         # Members of which two creations had the same value before that was seen.
         self._shared: dict[str, set[str]] = defaultdict(set)
+        # The last bodies by which things were created.
+        self._bodies: dict[str, list[dict[str, Any]]] = defaultdict(list)
         # Members of things by collection and identifier, as they were read since one of them was changed.
         self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
 
@@ -114,6 +118,8 @@ class Uniques:
             self._created(occasion, path)
         elif method in {"PUT", "PATCH", "DELETE"} and answer.ok:
             self._read[above].clear()
+        elif method == "GET" and answer.ok and is_json(answer.media_type) and self._bodies.get(path):
+            yield from self._listed(occasion, operation, self._bodies[path])
         elif method == "GET" and answer.ok and self._unique[above] and occasion.context.plain:
             value = read_json(answer.body).value if is_json(answer.media_type) else None
             now = {name: one for name, one in represented(value, self._unique[above]).items() if _is_plain(one)}
@@ -126,6 +132,7 @@ class Uniques:
             return
         refused, made = self._refused[path], self._made[path]
         if occasion.response.status == HTTPStatus.CREATED:
+            self._bodies[path] = [*self._bodies[path], body][-_FEW:]
             for one in refused:
                 other = [name for name in {*body, *one} if body.get(name) != one.get(name)]
                 is_taken = len(other) == 1 and (other[0], str(one.get(other[0]))) in made
@@ -135,6 +142,20 @@ class Uniques:
             made |= {(name, str(one)) for name, one in body.items() if _is_plain(one) and len(made) < _REMEMBERED}
         elif occasion.response.status in _TAKEN and occasion.is_valid:
             self._refused[path] = [*refused, body][-_FEW:]
+
+    @staticmethod
+    def _listed(occasion: Occasion, operation: Operation, bodies: list[dict[str, Any]]) -> Iterator[Case]:
+        """Judge whether two things, which a list shows as two creations made them, have two identifiers."""
+        own = dict[str, dict[str, Any]]()
+        for item in listed(read_json(occasion.response.body).value) or []:
+            names = [name for name in item if plain_name(name) in _IDS] if isinstance(item, dict) else []
+            body = next((one for one in bodies if names and one and one.items() <= item.items()), None)
+            if body is None or names[0] in body:
+                continue
+            id_ = shown(item[names[0]])
+            holds, expected = own.setdefault(id_, body) == body, f"another {names[0]} for each created thing"
+            found, cause = f"{names[0]} {id_} of two things that were created", f"{operation.label} two"
+            yield occasion.case("description/created-is-there", holds, expected, found, cause=cause)
 
     def _judged(
         self, occasion: Occasion, operation: Operation, above: str, last: str, now: dict[str, Any]

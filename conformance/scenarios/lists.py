@@ -44,6 +44,8 @@ _TWICE: Final = 2
 _STEADY: Final = 3
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
+# Further members by which a list is sorted while it is read page after page.
+_SORTS: Final = 2
 # Fewest items that make pages to compare.
 _FEWEST: Final = 2
 # Offsets beyond the end of a list, as far as the schema allows.
@@ -113,13 +115,18 @@ def _pages_of(reader: Reader) -> Iterator[Paged]:
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield one value of the sort with its member, and one of a filter that leaves several items."""
+    """Yield values of the sort with their members, and one of a filter that leaves several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
         ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
         best = max(ranks, key=ranks.__getitem__, default="")
-        if ranks.get(best, 0) >= _FEWEST:
-            yield {listing.sort.name: best}, listing.sortings[best].member
+        # A cursor has to tell items apart that have one value: by each member, some may.
+        others = {one.member: text for text, one in listing.sortings.items()} if listing.cursor is not None else {}
+        others.pop(listing.sortings[best].member if best else "", None)
+        for text in (best, *islice(others.values(), _SORTS)):
+            if ranks.get(text, 0) < _FEWEST:
+                continue
+            yield {listing.sort.name: text}, listing.sortings[text].member
     for name, parameter in listing.filters.items():
         there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
         chosen = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]

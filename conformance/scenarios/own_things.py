@@ -330,7 +330,7 @@ class _Thing:
                 self._ended(put, read, operations.get(("DELETE", template)), request, whole)
 
     def listed_below(self, operations: Mapping[tuple[str, str], Operation]) -> None:
-        """Create in each list below it, the last one with texts beyond ASCII, and read the list."""
+        """Create in each list below it, the last one with texts beyond ASCII, then both at once, and read the list."""
         own = self.read.template.rstrip("/")
         for (method, template), create in operations.items():
             read, below = operations.get(("GET", template)), template.removeprefix(own)
@@ -339,13 +339,15 @@ class _Thing:
             usual = usual_inputs(create, self.surveyor.values)[0]
             bodies = [usual.body, _with_texts(create, usual.body)] if listing_of(read) is not None else []
             steps = [(create, replace(usual, body=body)) for body in bodies if body is not None]
-            for operation, inputs in (
-                *steps,
-                *([(read, usual_inputs(read, self.surveyor.values)[0])] if steps else []),
-            ):
+            steps += [(read, usual_inputs(read, self.surveyor.values)[0])] if steps else []
+            sent = list[Outgoing]()
+            for operation, inputs in steps:
                 request = written(operation, inputs)
                 target = self.target.rstrip("/") + below + "".join(request.target.partition("?")[1:])
-                self.surveyor.send(operation, Variation(Kind.AGAIN, "", "", inputs), replace(request, target=target))
+                sent.append(replace(request, target=target))
+                if operation is read and len(sent) > 2:  # noqa: PLR2004 - two creations at once
+                    send_together([[(self.api.client, one) for one in sent[:-1]]])
+                self.surveyor.send(operation, Variation(Kind.AGAIN, "", "", inputs), sent[-1])
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
         """Read a file, parts of it, and the file again."""
@@ -515,13 +517,14 @@ def _fits(change: Operation, tags: str) -> bool:
 
 
 def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the queries of a list that choose a thing by one of its members, with as many items as may be."""
+    """Yield the queries of a list that choose a thing by a member, or sort all, with as many items as may be."""
     limit, own = listing.limit, members_of(thing)
     most = flat(limit.schema).get("maximum") if limit is not None else None
     many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
     found = [(one, own.get(name)) for name, one in listing.filters.items()]
-    usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)]
-    yield from ({one.name: value, **many} for one, value in usable[:_FILTERS])
+    usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)][:_FILTERS]
+    usable += [(listing.sort, text) for text in islice(listing.sortings, 1) if listing.sort is not None]
+    yield from ({one.name: value, **many} for one, value in usable)
 
 
 def _with_texts(create: Operation, body: Any) -> Any:

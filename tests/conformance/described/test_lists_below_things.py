@@ -1,5 +1,6 @@
 """A list below a thing, whose items have no path of their own, is judged while it has items."""
 
+import asyncio
 import itertools
 
 import pytest
@@ -80,8 +81,10 @@ def _device(fault):  # noqa: C901 - a device
             return error(404, "no such shelf")
         if (text := await given(request, "text")) is None:
             return error(400, "a text, please")
-        made = {"id": next(count), "text": text, "at": "2026-11-01T10:00:00Z"}
-        notes.setdefault(of(request)["id"], []).append(made)
+        kept = notes.setdefault(of(request)["id"], [])
+        made = {"id": len(kept) + 1 if fault == "number" else next(count), "text": text, "at": "2026-11-01T10:00:00Z"}
+        await asyncio.sleep(0.1 if fault == "number" else 0)
+        kept.append(made)
         return web.json_response(made, status=201)
 
     shelf_list, note_list = ({"type": "array", "items": one} for one in (_SHELF, _NOTE))
@@ -100,7 +103,13 @@ def _device(fault):  # noqa: C901 - a device
 
 @pytest.mark.parametrize(
     ("fault", "blamed"),
-    [("", []), ("short", []), ("time", ["description/formats"]), ("text", ["description/written-is-read"])],
+    [
+        ("", []),
+        ("short", []),
+        ("time", ["description/formats"]),
+        ("text", ["description/written-is-read"]),
+        ("number", ["description/created-is-there"]),
+    ],
 )
 def test_what_is_created_below_a_thing_is_read_in_its_list(fault, blamed, tmp_path):
     with _device(fault) as url:
