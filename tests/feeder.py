@@ -70,6 +70,7 @@ _APPLIED = {
     "refused applied": ("Rate", "Label"),
     "refused label applied": ("Label",),
     "refused rate applied": ("Rate",),
+    "mandatory label applied": ("Label",),
 }
 
 
@@ -101,6 +102,8 @@ class Feeder(Device):
 
     def respond(self, octets: bytes) -> tuple[int, bytes]:
         """Answer, and note what was refused."""
+        if "utf-16 lost" in self.faults and octets[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+            octets = octets.decode("utf-16").replace("utf-16", "ascii", 1).encode("ascii", "replace")
         with self.lock:
             status, body = super().respond(octets)
             if status != 200:
@@ -117,7 +120,8 @@ class Feeder(Device):
         except etree.XMLSyntaxError:
             return
         for fault, names in _APPLIED.items():
-            for name in names if fault in self.faults else ():
+            is_one = fault in self.faults and (b"Strange" in octets or "mandatory" not in fault)
+            for name in names if is_one else ():
                 self.settings[name] = sent.get(name, self.settings[name])
 
     def answer(self, name: str, payload: Any) -> str | None:

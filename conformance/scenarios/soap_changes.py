@@ -20,10 +20,10 @@ from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, in
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
 from conformance.documents.xml import Node
-from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Element, Simple, bounds, is_alike
+from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Element, Simple, bounds, is_alike, number_in
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
-from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, usual_message
+from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, mandatory, usual_message
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
@@ -45,6 +45,7 @@ _READS: Final = (20, 60)
 _ROUNDS: Final = (6, 30)
 # Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
 _TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
+_BEYOND_ASCII: Final = 3
 # An operation with the declaration of its request, and a message that it accepts.
 _Message = tuple[Act, Element | None, Node | None]
 
@@ -80,9 +81,9 @@ class _Changes:
                 if kind is Kind.USUAL and self.caller.probes[-1].succeeded:
                     self.acts.append((act, declared, node))
 
-    def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED) -> SoapProbe:
-        """Send a message to an operation."""
-        octets = self.caller.messages.message(act.port, act.operation, node)
+    def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED, *blocks: Node) -> SoapProbe:
+        """Send a message to an operation, with further header blocks."""
+        octets = self.caller.messages.message(act.port, act.operation, node, *blocks)
         return self.caller.send(act.port, act.operation, kind, says, octets)
 
     def by_role(self, role: Role) -> list[tuple[Act, Element, Node]]:
@@ -120,8 +121,38 @@ class _Changes:
                 self._read(readers, made, times=2)
             yield
         self._read(readers, made, times=_READS[not self._is_quick])
+        for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
+            plain = self.send(act, other, "a message with other values")
+            if plain.succeeded and self._wait(readers, other, free):
+                self.send(act, node, "the first values")
+                self.caller.send(act.port, act.operation, kind, says, octets, charset)
+                self._wait(readers, other, free)
         self._others(act, node, free, readers)
         self.send(act, _as_it_was(node, leaves, began), "the values that were there before")
+
+    def _forms(
+        self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]]
+    ) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
+        """Yield messages in other forms: what is special, its kind, the plain message, its octets, their encoding."""
+        made = _varied(node, free, _BEYOND_ASCII)
+        whole = self.caller.messages.whole(act.port, act.operation, made)
+        for charset, kind in (("utf-16", Kind.VARIED), ("iso-8859-1", Kind.TRIED)):  # XML 1.0, 2.2: UTF-16 is no choice
+            head = f'<?xml version="1.0" encoding="{charset}"?>'
+            octets = (head + whole.written().decode()).encode(charset, "xmlcharrefreplace")
+            yield f"a message in {charset}", kind, made, octets, charset
+        made = _varied(node, free, 1)
+        yield (
+            "comments within texts",
+            Kind.TRIED,
+            made,
+            self._styled(act, made, XmlStyle(text="comment inside")),
+            "utf-8",
+        )
+        made = other = _varied(node, free, 0)
+        for path, simple in free:
+            other = with_text(other, path, _rewritten(simple, other.at(path).text))
+        octets = self.caller.messages.message(act.port, act.operation, other)
+        yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
 
     def _wait(self, readers: list[_Message], made: Node, free: list[tuple[tuple[int, ...], Simple]]) -> bool:
         """Read until what was written is read, or a device should have taken it; return whether anything was."""
@@ -158,6 +189,9 @@ class _Changes:
         tried = [one for one in tried if one.kind in {"lexical", "missing", "unknown"}]
         for wrong in islice(invalid_ones(tried, self.caller.messages.found.types), 1):
             self.send(act, wrong.made[0], wrong.what, Kind.INVALID)
+        if turn % 2:
+            says = "a header block that must be understood"
+            self.send(act, node, says, Kind.UNDERSTAND, mandatory(act.port))
 
     def _others(
         self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]], readers: list[_Message]
@@ -303,9 +337,10 @@ def _single(probe: SoapProbe) -> dict[str, str]:
 def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -> Node:
     """Return a message with other values, by turn."""
     for path, simple in free:
-        node = with_text(
-            node, path, _other(simple, node.at(path).text, turn, REFERS.search(node.at(path).name) is None)
-        )
+        name = node.at(path).name
+        # A name may be that of the thing itself; where it refers to another one, it is refused, and then left alone.
+        is_free = name.lower().endswith("name") or REFERS.search(name) is None
+        node = with_text(node, path, _other(simple, node.at(path).text, turn, is_free))
     return node
 
 
@@ -329,6 +364,14 @@ def _other(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa:
         fits = (simple.min_length or 0) <= len(made) <= (simple.max_length or len(made))
         return made if fits else text
     return text
+
+
+def _rewritten(simple: Simple, text: str) -> str:
+    """Return the same value in another form of its type (XML Schema Part 2, 3.2.2 and 3.2.5)."""
+    if simple.builtin == "boolean":
+        return {"true": "1", "false": "0"}.get(text, text)
+    number = number_in(text) if simple.builtin in FLOATS and not simple.patterns else None
+    return text if number is None else f"{number:E}"
 
 
 def _as_it_was(node: Node, leaves: list[tuple[tuple[int, ...], Simple]], began: dict[str, str]) -> Node:

@@ -204,13 +204,16 @@ class Caller:
                     return True
         return False
 
-    def send(self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes) -> SoapProbe:
+    def send(
+        self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes, charset: str = "utf-8"
+    ) -> SoapProbe:
         """Send octets to a port.
 
         Raises:
             PartialTraceError: the device does not respond any more, or the time is over.
         """
-        path, fields = target_of(port), fields_of(port, operation)
+        path = target_of(port)
+        fields = tuple((name, text.replace("utf-8", charset)) for name, text in fields_of(port, operation))
         probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
         losses = self.api.run.losses
         try:

@@ -36,6 +36,8 @@ _FAULTS = (
         "no maxInclusive": ("invalid-refused", "'8.001' at "),
     },
     {"lost after refusal": ("written-is-read", "SetSettings"), "no maxLength": ("invalid-refused", "p' at Title")},
+    {"utf-16 lost": ("written-is-read", "label '")},
+    {"mandatory label applied": ("refused-keeps", "label '")},
     {"fails at times": ("valid-accepted", "GetSettings"), "mode burst refused": ("valid-accepted", "SetSettings")},
 )
 
