@@ -116,7 +116,7 @@ def mapped_robot(interfaces: Interfaces) -> MappedDevice:
     api = interfaces.rest
     if api is None:
         raise NotPossibleError("the device has no REST interface")
-    found = MappedDevice(api, motion_map_of(said_of(api.run), xml_root_of(Robot(api))))
+    found = MappedDevice(api, motion_map_of(said_of(api.run), xml_root_of(Robot(api))), looks=False)
     api.stop_device = None  # the pack stops the robot by itself
     return found
 

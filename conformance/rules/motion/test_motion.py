@@ -244,10 +244,7 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     accepted = [one for one in drive.commands if one.accepted]
     if motion.velocity is None or not accepted:
         return
-    begin, end = (
-        accepted[-1].answered + motion.velocity.settle_s,
-        accepted[-1].sent + (motion.velocity.hold_s or math.inf),
-    )
+    begin, end = drive.settled(motion.velocity.settle_s), accepted[-1].sent + (motion.velocity.hold_s or math.inf)
     seen = [one for one in drive.under_way if begin <= one.sent and one.received <= end]
     found = {name: measured(seen, name, motion) for name in motion.velocity.axes}
     lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0

@@ -49,7 +49,8 @@ def _settle(mapped: MappedDevice) -> None:
     mapped.bring_home()
     velocity = mapped.motion.velocity
     if velocity is not None:
-        mapped.clock.sleep(velocity.settle_s - STAYS_S)  # a velocity that is read may come so late
+        # A velocity that is read may come so late; by positions, coming to rest takes a part of that.
+        mapped.clock.sleep(velocity.settle_s - (STAYS_S if mapped.motion.state.axes else 0.0))
         mapped.come_to_rest()
 
 

@@ -24,7 +24,7 @@ from conformance.scenarios.motion.templates import (
     quaternion_of,
     seconds_of,
 )
-from conformance.scenarios.motion.trace import Command, Leg, Reading, Resting, middle_of
+from conformance.scenarios.motion.trace import Command, Leg, Reading, middle_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velocity, Way, names_in
 from conformance.transport.client import is_drafting
@@ -52,12 +52,12 @@ class MappedDevice:
         motion: its map.
         clock: by which it is watched.
         binding: how its calls become requests; None: JSON over HTTP.
-        looks: whether to read where it is, which moves need; to stop it, nothing need be known.
+        looks: whether to read where it is, which moves need, and its noise; else it is what the map declares.
 
     Attributes:
         home: where it is brought between scenarios: near where it was at first, well within its limits.
         room: how far its velocities take it.
-        resting: what it shows at rest.
+        resting: what it shows at rest, at least what the map declares.
         rests: whether it was seen at rest since it was last commanded.
 
     Raises:
@@ -81,13 +81,11 @@ class MappedDevice:
             api.preparation = Preparation(motion, self.binding, self._exchange, clock)
         self.ready: Preparation = api.preparation
         self._answer: Any = None
-        self._read_at, self._last = 0.0, Position()
-        self.resting, self.rests = Resting(), False
+        self._read_at, self._last, self.rests = 0.0, Position(), False
         here = self.where() if looks else {}
         self.home = {name: motion.state.axes[name].well_inside(value) for name, value in here.items()}
-        if looks:
-            self.resting = at_rest(self.watch(self.clock.now() + STAYS_S), motion)
-            self.room.noise = self.resting.axes
+        self.resting = at_rest(self.watch(self.clock.now() + STAYS_S) if looks else (), motion)
+        self.room.noise = self.resting.axes
         api.stop_device = self.leave_at_rest
 
     @property
@@ -308,11 +306,12 @@ class MappedDevice:
             self.drive({})
         return command
 
-    def saw_rest(self, readings: Sequence[Reading]) -> None:
-        """Note whether the last ones of some readings show the device at rest."""
+    def saw_rest(self, readings: Sequence[Reading]) -> bool:
+        """Note and return whether the last ones of some readings show the device at rest."""
         last = [one for one in readings[-2 * SEVERAL :] if one.values or one.speeds]
         stays = not self.motion.state.axes or all(self.is_near(one.values, last[0].values) for one in last)
         self.rests = len(last) == 2 * SEVERAL and stays and not fastest(last, self.motion)
+        return self.rests
 
     def watch(self, until: float, is_over: Callable[[list[Reading]], object] = lambda _: False) -> list[Reading]:
         """Read until a time, s of the clock, and once more after it, or until ``is_over``."""
@@ -331,14 +330,14 @@ class MappedDevice:
         )
 
     def where(self) -> Position:
-        """Return where the device is by the median of several readings.
+        """Return where the device is by the median of several readings; empty if the map has no positions.
 
         Raises:
             NotPossibleError: it cannot be read. A device that nobody sees is not moved.
             NoAnswerError: there is no response.
         """
-        seen = [self.read() for _ in range(SEVERAL)]
-        if self.motion.state.axes and not all(one.values for one in seen):
+        seen = [self.read() for _ in range(SEVERAL if self.motion.state.axes else 0)]
+        if not all(one.values for one in seen):
             places = ", ".join(axis.at for axis in self.motion.state.axes.values())
             came = seen[-1].exchange.came
             raise NotPossibleError(f"{self.motion.state.read} got {came}, without numbers at {places}")
@@ -447,7 +446,8 @@ class MappedDevice:
         until = self.clock.now() + (rests_s if within_s is None else within_s)
         while True:
             before = self.where()
-            seen = self.watch(self.clock.now() + STAYS_S)
+            # Positions show a slow motion in a while only, measured velocities in several readings.
+            seen = self.watch(self.clock.now() + STAYS_S, *(() if self.motion.state.axes else (self.saw_rest,)))
             stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
             if stays and not fastest(seen, self.motion):
                 self.rests = True

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from conformance.measures.samples import SEVERAL
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
+from conformance.scenarios.motion.measuring import steady_since
 from conformance.scenarios.motion.moves import need_positions, recorded
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
 from conformance.scenarios.motion.velocities import MEASURED_S
@@ -79,19 +79,20 @@ def several_drivers(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
 
 
 def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
-    """Command velocities from several clients at the same moment, one from each, and watch."""
+    """Command velocities from several clients at the same moment, one from each, and watch until one is reached."""
     settle_s = mapped.drives.settle_s
     # Nothing renews it: where the hold time is shorter than the time to settle, nothing can be measured.
     lasts_s = min(mapped.drives.hold_s or settle_s + MEASURED_S, settle_s + MEASURED_S)
     several = with_room(mapped, several, lasts_s + settle_s)
     commands = _at_once(mapped, mapped.drives, several)
-    due, at_once = commands[-1].answered + settle_s, all(axis.at for axis in mapped.drives.axes.values())
+
+    def reached(so_far: list[Reading]) -> float | None:
+        found = (steady_since(so_far, one.targets, mapped.motion, mapped.resting) for one in commands if one.accepted)
+        return next((since for since in found if since is not None), None)
 
     def is_over(so_far: list[Reading]) -> bool:
-        # What the device measures shows in a few readings.
-        told = at_once and sum(one.sent >= due for one in so_far) > 2 * SEVERAL
-        return told or mapped.room.is_over(several, so_far, settle_s)
+        return reached(so_far) is not None or mapped.room.is_over(several, so_far, settle_s)
 
     seen = mapped.watch(commands[-1].answered + lasts_s, is_over)
-    end = mapped.drive({})
-    return Drive("velocities of several clients", {}, tuple(commands), tuple(seen), end, ())
+    end, since = mapped.drive({}), reached(seen)
+    return Drive("velocities of several clients", {}, tuple(commands), tuple(seen), end, (), since=since)
