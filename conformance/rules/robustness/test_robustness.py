@@ -9,7 +9,7 @@ from http import HTTPStatus
 
 from conformance.api.rest.variations import Kind
 from conformance.rules.told_once import Fault, told_once
-from conformance.scenarios.estimate import TimedAgain, timed_again
+from conformance.scenarios.estimate import GROWN_MS, GROWN_TIMES, TimedAgain, timed_again
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
@@ -20,8 +20,8 @@ from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 
 _ON = (survey, generated_requests, neighbours, own_things)
-# A response time has grown if its median is this many times, and this many ms, above that of the first requests.
-_TIMES, _MS, _FEWEST = 3.0, 50.0, 15
+# A response time grows if the median of the last requests is above that of the first ones; so many each.
+_FEWEST = 15
 # A body this many times as long may take longer.
 _MORE = 1.5
 
@@ -128,7 +128,7 @@ def _at_the_end(timed: TimedAgain) -> Case:
     before, after = timed.first.response.elapsed_ms, min(timed.times)
     more = len(timed.last.response.body) > _MORE * len(timed.first.response.body)
     return Case(
-        more or after <= _TIMES * before or after - before <= _MS,
+        more or not timed.has_grown,
         timed.last,
         "a response time that does not grow during the run",
         f"{before:.1f} ms at the beginning, at least {after:.1f} ms at the end",
@@ -142,6 +142,6 @@ def _steady(last: Exchange, times: Sequence[float], number: int) -> Case:
     """Judge the response times of one request, ms: the medians of each ``number`` of them must not grow throughout."""
     parts = [statistics.median(times[start : start + number]) for start in range(0, len(times) - number + 1, number)]
     first, middle, end = parts[0], parts[len(parts) // 2], parts[-1]
-    grown = parts == sorted(set(parts)) and end > _TIMES * first and end - first > _MS
+    grown = parts == sorted(set(parts)) and end > GROWN_TIMES * first and end - first > GROWN_MS
     told = f"{first:.1f} ms at the beginning, {middle:.1f} ms in the middle, {end:.1f} ms at the end"
     return Case(not grown, last, f"a response time that does not grow over {len(times)} requests", told)

@@ -4,15 +4,17 @@ The figures were measured on an idle machine with devices whose every other oper
 """
 
 import json
+import random
 
 import pytest
 
 from conformance.documents.openapi import operations_of
-from conformance.scenarios.estimate import Estimate, estimate
+from conformance.scenarios.estimate import Estimate, estimate, timed_often
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import empty_statement
 from conformance.target.describing import described_contract
 from conformance.transport.client import Connection
+from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -79,3 +81,20 @@ def test_the_sentence_has_two_digits_and_a_unit():
     )
     assert "about 350 requests and takes about 11 s" in Estimate(349).text(30.0)
     assert Estimate(349).text().endswith("depends on the device's response time.")
+
+
+def _took(ms):
+    return Exchange(Request("GET", "http://robot/state"), Response(200, (), b"{}", ms))
+
+
+def test_response_times_that_vary_by_themselves_have_not_grown():
+    for seed in range(300):
+        drawn = random.Random(seed)  # noqa: S311 - no secret
+        timed = timed_often("GET /state", _took(1.0), lambda drawn=drawn: _took(drawn.uniform(0.0, 150.0)))
+        assert not timed.has_grown
+
+
+def test_response_times_that_have_grown_are_seen():
+    timed = timed_often("GET /state", _took(10.0), iter([_took(80.0)] * 30).__next__)
+    assert timed.has_grown
+    assert len(timed_often("GET /state", _took(10.0), iter([_took(11.0)] * 30).__next__).times) == 5
