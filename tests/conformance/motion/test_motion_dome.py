@@ -21,7 +21,7 @@ def test_a_right_camera_is_not_blamed(tmp_path):
 
 
 def test_a_right_camera_that_takes_ways_is_not_blamed(tmp_path):
-    missing = _NOT_DECLARED | {"new-target", "last-of-many", "one-client", "repeated"}
+    missing = _NOT_DECLARED | {"new-target", "last-of-many", "repeated"}
     passed_but(missing, lambda: _judged(Body(dome.LIMITS), tmp_path, dome.RELATIVE))
 
 
