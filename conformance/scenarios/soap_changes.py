@@ -99,7 +99,7 @@ class _Changes:
         keys = {name for one, _, _ in readers for name in one.sent}
         leaves = [(path, simple) for path, simple in simple_leaves(declared, node) if path]
         free = [one for one in leaves if node.at(one[0]).name.lower() not in keys]
-        turns, lasting, made = _TURNS[not self._is_quick], 0, node
+        turns, lasting, refusals, made = _TURNS[not self._is_quick], 0, 0, node
         for turn in range(turns):
             if time.monotonic() > until:
                 break
@@ -116,10 +116,14 @@ class _Changes:
                 lasting += 1
                 time.sleep(_LASTS_S)
                 self._read(readers, made)
-            if turn < _REFUSALS and sent:
-                self._refuse(act, declared, _varied(made, free, turn + 1), turn)
+            elif sent and refusals < _REFUSALS:
+                # What a refusal changes is soon seen; other values were kept for longer by now.
+                self._refuse(act, declared, _varied(made, free, turn + 1), refusals)
+                refusals += 1
                 self._read(readers, made, times=2)
+            left_s = time.monotonic()
             yield
+            until += time.monotonic() - left_s
         self._read(readers, made, times=_READS[not self._is_quick])
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
             plain = self.send(act, other, "a message with other values")
