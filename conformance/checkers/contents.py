@@ -179,7 +179,7 @@ def _digests(occasion: Occasion) -> Iterator[Case]:
     is_whole = occasion.request.method == "GET" and answer.status == HTTPStatus.OK
     for name in ("Content-Digest", "Repr-Digest", "Digest") if is_whole else ("Content-Digest",):
         for algorithm, text in _DIGEST.findall(answer.header(name) or ""):
-            said, own = _decoded(text), _HASHES[algorithm.lower()](answer.body).digest()
+            said, own = _decoded(text), _HASHES[algorithm.lower()](answer.octets).digest()
             expected = f"the digest of the content in {name}"
             found, cause = f"{algorithm} of something else", f"{label_of(occasion.operation)} {name}"
             yield occasion.case(_DIGESTS, said == own, expected, found, cause=cause)

@@ -1,7 +1,6 @@
 """All checkers of REST, over the exchanges of a run one after another."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
@@ -75,11 +74,9 @@ class RestCheckers:
         occasion = Occasion(self._contract, attempt, context)
         for check in _ANY:
             yield from check(occasion)
-        plain = yield from self._codings(occasion)
-        if plain is None:
-            return
-        # All others judge what the content says.
-        occasion = replace(occasion, exchange=plain)
+        yield from self._codings(occasion)
+        if not attempt.response.content.is_plain:
+            return  # all others judge what the content says
         for checker in self._over_time:
             yield from checker(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:

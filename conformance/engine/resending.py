@@ -96,7 +96,8 @@ def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
 
     for finding in findings:
         if isinstance(finding.exchange, Exchange):
-            response = replace(finding.exchange.response, body=SECRETS.masked_bytes(finding.exchange.response.body))
+            response = finding.exchange.response
+            response = replace(response, octets=SECRETS.masked_bytes(response.octets))
             finding.exchange = replace(finding.exchange, response=response)
         if finding.exchange is not None:
             finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request))

@@ -169,7 +169,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
 
 
 def _came(response: Response) -> Came:
-    return Came(response.status, response.headers, Octets.of(response.body), response.http_version, response.cut)
+    return Came(response.status, response.headers, Octets.of(response.octets), response.http_version, response.cut)
 
 
 class Began(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="began"):

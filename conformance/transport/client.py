@@ -285,7 +285,7 @@ class HttpClient:
                     self.hangs.hung(endpoint, whole)
             raise self._unanswered(request, str(none), none.kind) from none
         self.hangs.answered(response.elapsed_ms / 1000)
-        self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.body))
+        self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.octets))
         exchange = Exchange(request, response)
         number = self._recorded
         if self.connection.is_away(exchange):

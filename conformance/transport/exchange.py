@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Final, NamedTuple, Self
 from urllib.parse import quote
 
+from conformance.transport.codings import Content, content_of
 from conformance.transport.shell_command import bytes_command, shell_command
 
 # Methods that change nothing (RFC 9110 9.2.1), so they may be sent again without permission.
@@ -18,6 +19,7 @@ IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
 # A path segment that contains this, or is longer than this, is a value and no name.
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
+_PARTIAL: Final = 206
 # The first element in a SOAP Body names the operation: the operations of a service share one URL.
 _SOAP_OPERATION = re.compile(rb"<(?:[\w.-]+:)?Body[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
 _SOAP_HEAD = 4096
@@ -142,7 +144,7 @@ class Response:
     Attributes:
         status: status code.
         headers: (name, value) pairs in the order and case as received.
-        body: body after transfer decoding and before content decoding.
+        octets: content after transfer decoding and before content decoding.
         elapsed_ms: time from the first byte sent to the last byte received, ms.
         http_version: ``HTTP/1.1`` or ``HTTP/1.0``.
         received_s: when the last byte was received, s on the monotonic clock; 0 if unknown.
@@ -151,11 +153,22 @@ class Response:
 
     status: int
     headers: tuple[tuple[str, str], ...]
-    body: bytes
+    octets: bytes
     elapsed_ms: float
     http_version: str = "HTTP/1.1"
     received_s: float = field(default=0.0, compare=False)
     cut: str = ""
+
+    @cached_property
+    def content(self) -> Content:
+        """The content with its coding. No Accept-Encoding allows a server any coding (RFC 9110 12.5.3)."""
+        is_whole = not self.cut and self.status != _PARTIAL
+        return content_of(self.octets, self.header("content-encoding"), is_whole=is_whole)
+
+    @cached_property
+    def body(self) -> bytes:
+        """The content without its coding, as every reader of a representation needs it."""
+        return self.content.octets
 
     @cached_property
     def _by_name(self) -> dict[str, list[str]]:

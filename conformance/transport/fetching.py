@@ -9,7 +9,6 @@ import os
 import ssl
 import threading
 import time
-import zlib
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from queue import Empty, SimpleQueue
@@ -21,6 +20,7 @@ from click.globals import push_context
 
 from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
+from conformance.transport.codings import content_of
 from conformance.transport.connections import explained
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Request, Response
@@ -34,8 +34,6 @@ _MOST_IN_ALL: Final = 256 * 1024 * 1024
 _MOST_SECONDS: Final = 300.0
 _PIECE: Final = 1024 * 1024
 _ACCEPT: Final = "application/json, application/yaml, */*"
-_GZIP: Final = frozenset({"gzip", "x-gzip", "deflate"})
-_EITHER_FORM: Final = 47  # zlib finds out by itself whether it is gzip's or zlib's
 
 
 class Fetcher:
@@ -213,25 +211,21 @@ class _Guard(httpx.BaseTransport):
 
 
 def _decoded(response: httpx.Response) -> bytes:
-    """Return the content of a response, unpacked at most as far as one document may be long.
+    """Return the content of a response without its coding.
 
     Raises:
-        ValueError: it is longer, or packed in a way that the request did not accept.
+        ValueError: it is longer than one document may be, or cannot be decoded.
     """
-    coding = response.headers.get("content-encoding", "identity").strip().lower()
-    if coding not in {*_GZIP, "identity", ""}:
-        raise ValueError(f"the server sent Content-Encoding {coding[:40]!r}, which the request did not accept")
-    unpacker, octets = zlib.decompressobj(_EITHER_FORM) if coding in _GZIP else None, bytearray()
+    octets = bytearray()
     for piece in response.iter_raw(_PIECE):
-        try:
-            octets += unpacker.decompress(piece, _MOST_OCTETS + 1) if unpacker else piece
-        except zlib.error as error:
-            raise ValueError(f"the server sent Content-Encoding {coding}, and no such content: {error}") from error
+        octets += piece
         if len(octets) > _MOST_OCTETS:
             raise ValueError(f"it has more than {_MOST_OCTETS:,} bytes")
-    if unpacker and not unpacker.eof:
-        raise ValueError(f"the server sent Content-Encoding {coding}, and its content ends too early")
-    return bytes(octets)
+    content = content_of(bytes(octets), response.headers.get("content-encoding"), is_whole=True)
+    if not content.is_plain:
+        why = content.fault or f"content that cannot be decoded here, or that has more than {_MOST_OCTETS:,} bytes"
+        raise ValueError(f"the server sent Content-Encoding {content.coding[:40]!r}, and {why}")
+    return content.octets
 
 
 def _worded(error: httpx.TransportError, seconds: float) -> str:

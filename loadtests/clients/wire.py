@@ -19,6 +19,7 @@ import gevent.socket
 import httptools
 from gevent.hub import Waiter, get_hub
 
+from conformance.transport.codings import content_of
 from conformance.transport.credentials import Credentials, UsernameToken
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.failures import CallError, Declared, Reply, connect_error, require_good
@@ -47,6 +48,7 @@ class Answer:
     """A response, and when it arrived.
 
     Attributes:
+        body: without its content coding.
         received_ns: when the last byte was read.
         octets: size of headers and body.
     """
@@ -160,7 +162,9 @@ class Connection:
         if failure is not None:
             raise failure
         status = self._parser.get_status_code()
-        answer = Answer(status, self._headers, b"".join(self._body), self._received, self._octets)
+        coding = (self._headers.get(b"content-encoding") or b"").decode("latin-1")
+        body = content_of(b"".join(self._body), coding, is_whole=True).octets
+        answer = Answer(status, self._headers, body, self._received, self._octets)
         if self._drop_after:
             self.close()
         return answer

@@ -5,6 +5,7 @@ Prints `ready PORT`. With --tls CERT KEY it speaks https; --host ::1 takes IPv6.
 
 import argparse
 import asyncio
+import gzip
 import json
 import os
 import ssl
@@ -122,6 +123,8 @@ class Robot:
         timing = "" if self.options.silent else "Server-Timing: app;dur=0.015\r\n"
         location = "Location: http://elsewhere.invalid/robot/pose/\r\n" if 300 <= status < 400 else ""
         head = f"{timing}{location}Server: toy/1\r\n" + (f"Content-Type: {kind}\r\n" if kind else "")
+        if form == "gzip":
+            content, head = gzip.compress(content), f"{head}Content-Encoding: gzip\r\n"
         if form == "garbage":
             writer.write(b"hello\r\n\r\n")
         elif form == "cut":

@@ -166,7 +166,7 @@ def _judge_head_length(api: RestInterface, judge: Judge, call: Call, accept: str
         got = call.send(api, ("Accept", accept)).response
         exchange = call.send(api, ("Accept", accept), method="HEAD")
         after = call.send(api, ("Accept", accept)).response
-        lengths |= {len(got.body), len(after.body)}
+        lengths |= {len(got.octets), len(after.octets)}
         said = exchange.response.header("content-length")
         same = got.status == exchange.response.status == after.status
         right = said is None or (said.isdigit() and min(lengths) <= int(said) <= max(lengths))

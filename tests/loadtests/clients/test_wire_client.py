@@ -25,7 +25,7 @@ def connect(toy, timeout=60.0, tls=None):
     return Connection(Endpoint.parse(toy.url), timeout, tls)
 
 
-@pytest.mark.parametrize("form", ["", "chunked", "old"])
+@pytest.mark.parametrize("form", ["", "chunked", "gzip", "old"])
 def test_answers_are_read_in_every_framing(toy, form):
     connection = connect(toy("--form", form))
     for _ in range(3):
@@ -33,7 +33,7 @@ def test_answers_are_read_in_every_framing(toy, form):
         assert answer.status == 200
         assert b'"covariance"' in answer.body
         assert answer.body.endswith(b"}")
-        assert answer.octets > len(answer.body)
+        assert form == "gzip" or answer.octets > len(answer.body)
         assert answer.headers[b"server-timing"] == b"app;dur=0.015"
     assert connection.connects == (3 if form == "old" else 1), "a connection is kept wherever the robot keeps it"
 

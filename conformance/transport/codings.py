@@ -1,0 +1,58 @@
+"""Content codings (RFC 9110 8.4.1): the content of a response as it was before the server coded it."""
+
+import zlib
+from typing import Final, NamedTuple
+
+_GZIP: Final = frozenset({"gzip", "x-gzip"})
+# zlib's arguments for gzip data with its checksum, for zlib's data, and for the bare data that some servers send as
+# deflate (RFC 9110 8.4.1.2); octets of decoded content that are read.
+_GZIP_BITS, _DEFLATE_BITS, _LARGEST = 31, (15, -15), 1 << 25
+
+
+class Content(NamedTuple):
+    """The content of a response.
+
+    Attributes:
+        octets: decoded, or as received where that cannot be done.
+        coding: the value of Content-Encoding in lower case; empty without a coding.
+        is_plain: whether the octets are the content without a coding.
+        fault: what is wrong with the coded octets, a noun phrase, or empty.
+    """
+
+    octets: bytes
+    coding: str
+    is_plain: bool
+    fault: str = ""
+
+
+def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Content:
+    """Return the content of a response that has these octets and this Content-Encoding.
+
+    Content of another coding than gzip and deflate, of more than 32 MiB, or that is a part of one is not decoded.
+    """
+    coding = (encoding or "").strip().lower()
+    coding = "" if coding == "identity" else coding
+    if not coding or not octets:
+        return Content(octets, coding, is_plain=True)
+    found, fault = None, ""
+    for bits in (_GZIP_BITS,) if coding in _GZIP else _DEFLATE_BITS if coding == "deflate" else ():
+        if is_whole and found is None:
+            found, fault = _unpacked(octets, bits)
+    return Content(octets if found is None else found, coding, found is not None, fault if coding in _GZIP else "")
+
+
+def _unpacked(octets: bytes, bits: int) -> tuple[bytes | None, str]:
+    """Return what was packed, or None if it is too much or none; and what is wrong with it, or an empty text."""
+    left, found = octets, bytearray()
+    while left:  # several members of gzip are one content (RFC 1952 2.2)
+        unpacker = zlib.decompressobj(bits)
+        try:
+            found += unpacker.decompress(left, _LARGEST - len(found) + 1)
+        except zlib.error as error:
+            return None, f"{len(left)} bytes after the end of the gzip data" if found else f"no gzip data ({error})"
+        if len(found) > _LARGEST:
+            return None, ""
+        if not unpacker.eof:
+            return None, f"{len(octets)} bytes of gzip data that end before their checksum"
+        left = unpacker.unused_data
+    return bytes(found), ""
