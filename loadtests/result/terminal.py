@@ -37,7 +37,7 @@ def summary(document: dict[str, Any]) -> str:
             f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
             f"{_ms(response['p99'])}"
         )
-    lines += _counts(document["counts"])
+    lines += _counts(document["counts"], document["plan"])
     lines += _stages(document["stages"])
     lines += _medians(document)
     lines += _against(document.get("against"))
@@ -55,13 +55,16 @@ def summary(document: dict[str, Any]) -> str:
     return "\n".join(map(inert, lines)) + "\n"
 
 
-def _counts(counts: Mapping[str, Any]) -> list[str]:
+def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any]) -> list[str]:
     """Return what became of the requests as a table."""
     offered, achieved, seconds = counts["asked_rate"], counts["achieved_rate"] or 0.0, counts["seconds"]
     kinds = ", ".join(f"{number:,} {kind}" for kind, number in counts["failed"].items())
+    asked = f"{offered:,.1f}/s for {seconds:.1f} s" if offered else "by users that wait"
+    if offered and plan["rate"] and offered < 0.99 * plan["rate"]:
+        asked += f": nothing was due in the gaps between {plan['blocks']:,} blocks"
     late = f", {counts['waiting_at_end']:,} of them when the time was over" if counts["waiting_at_end"] else ""
     rows = [
-        ("asked", counts["asked"], f"{offered:,.1f}/s for {seconds:.1f} s" if offered else "by users that wait"),
+        ("asked", counts["asked"], asked),
         ("sent", counts["sent"], ""),
         ("answered", counts["answered"], f"{achieved:,.1f}/s{late}"),
         ("failed", sum(counts["failed"].values()), kinds),
