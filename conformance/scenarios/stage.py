@@ -19,7 +19,6 @@ class Stage(StrEnum):
     SETTLING = "settling"
     STANDSTILL = "standstill"
     RESTING = "resting"
-    STAYS = "stays"
     INPUT = "input"
     ACTING = "acting"
     EFFECT = "effect"

@@ -17,8 +17,7 @@ from conformance.packs.table1.robot.motion_map import motion_map_of, xml_root_of
 from conformance.packs.table1.robot.probe import RosProbe
 from conformance.packs.table1.robot.refused_requests import RefusedRequests
 from conformance.packs.table1.robot.robot import Robot
-from conformance.packs.table1.robot.standstill import Standstill
-from conformance.packs.table1.robot.stopping import bring_to_rest
+from conformance.packs.table1.robot.stopping import await_rest
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.scenario import NotPossibleError
@@ -49,20 +48,6 @@ def probe(run: Run, connection: Connection) -> Iterator[RosProbe]:
 def senders() -> list[DeliverySender]:
     """Return the senders of the run's deliveries: later scenarios record what arrives after their batches."""
     return []
-
-
-@pytest.fixture(scope="session")
-def _standstills() -> list[Standstill]:
-    """Return the Standstill of the run, once it is known that the robot has a REST interface."""
-    return []
-
-
-@pytest.fixture
-def standstill(api: RestInterface, _standstills: list[Standstill]) -> Standstill:
-    """Return the attempts of the run that must leave the robot at rest."""
-    if not _standstills:
-        _standstills.append(Standstill(api))
-    return _standstills[0]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -122,17 +107,13 @@ def mapped_robot(interfaces: Interfaces) -> MappedDevice:
 
 
 @pytest.fixture(autouse=True)
-def _looked_at(
-    _standstills: list[Standstill], _lists_read: list[Callable[..., None]], _beats: list[Beats]
-) -> Iterator[None]:
-    """Look after each check whether an earlier attempt moves the robot, for deliveries that it has accepted, and more.
+def _looked_at(_lists_read: list[Callable[..., None]], _beats: list[Beats]) -> Iterator[None]:
+    """Look after each check for deliveries that the robot has accepted, and more.
 
     Here nothing is between two requests whose responses are compared.
     """
     yield
     with suppress(NoAnswerError):  # the next check meets that as well
-        for standstill in _standstills:
-            standstill.look()
         for read in _lists_read:
             read()
         for beats in _beats:
@@ -147,18 +128,13 @@ def _beats(interfaces: Interfaces, _described: None) -> list[Beats]:
 
 
 @pytest.fixture
-def robot(request: pytest.FixtureRequest, api: RestInterface, standstill: Standstill) -> Robot:
+def robot(request: pytest.FixtureRequest, api: RestInterface) -> Robot:
     """Return the robot; for a scenario that moves the robot, at rest.
 
     Raises:
         NotPossibleError: the robot cannot be brought to rest.
     """
-    if not request.node.get_closest_marker("motion") or standstill.lasts:
-        return Robot(api)
-    standstill.watch()
-    phase = request.node.get_closest_marker("phase")
-    attempts = phase is not None and phase.args == (Stage.STANDSTILL,)
-    reason = standstill.begin() if attempts else bring_to_rest(api)
-    if reason:
-        raise NotPossibleError(reason)
+    if request.node.get_closest_marker("motion"):
+        phase = request.node.get_closest_marker("phase")
+        await_rest(api, settled=phase is not None and phase.args == (Stage.STANDSTILL,))
     return Robot(api)

@@ -30,10 +30,10 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
     if quiet.home:
         places = [place for place in places if off(place, quiet.home, motion)]
     elsewhere = next(filter(None, (off(place, quiet.where, motion) for place in places)), "")
-    return elsewhere or fastest(seen, motion)
+    return elsewhere or fastest(seen, motion) or quiet.beside
 
 
-def _nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:
+def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:
     """Judge that attempts of some kinds moved nothing: together, or, where the device moved, each alone."""
     tried = [one for one in trace.tried if one.kind in kinds]
     together = _moved(trace, motion)
@@ -58,14 +58,16 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
     """Judge attempts that were made again, one at a time, because the device moved after all of them."""
     for quiet in trace.alone:
         moved = _moved(quiet, motion)
+        last = ([one for one in quiet.tried if one.exchange and not is_refusal(one.exchange)] or list(quiet.tried))[-1:]
         for one in quiet.tried:
-            if one.kind in kinds and moved is not None:
+            # Of several, the last that it did not refuse has moved it, or else the last one.
+            if one.kind in kinds and moved is not None and not (moved and one not in last):
                 yield Case(not moved, one.exchange, f"rest after {one.what}", observed=moved, cause=one.kind)
-    if len(trace.alone) < len(trace.tried):
+    if trace.idle is None:
         yield NotTested("the device moved after several attempts, and did not come back for each of them alone")
 
 
-def _refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
+def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
     """Judge whether attempts are refused, with one of the statuses if any are given; over SOAP by a fault."""
     for one in tried:
         soap = one.exchange is not None and is_soap(one.exchange)
@@ -87,15 +89,15 @@ def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: Mo
         return
     if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")
-    yield from _refused(one for one in trace.tried if one.kind == "beyond")
+    yield from refused(one for one in trace.tried if one.kind == "beyond")
 
 
 @rule("motion/refused-still", on=(attempts_at_rest,))
 def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target beyond the limits, or an invalid one, moves nothing."""
-    yield from _nothing_moved(trace, motion, "beyond", "invalid")
+    yield from nothing_moved(trace, motion, "beyond", "invalid", "unactuated")
     together = _moved(trace, motion)
-    alone = len(trace.alone) == len(trace.tried) and not any(_moved(one, motion) for one in trace.alone)
+    alone = trace.idle is not None and not any(_moved(one, motion) for one in trace.alone)
     if together and alone and not _moves_anyway(trace, motion):
         # It moves now and then, or after several of them; which one it was, nobody can say.
         last = next((one.exchange for one in reversed(trace.tried) if one.exchange is not None), None)
@@ -105,7 +107,7 @@ def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/incomplete-still", on=(attempts_at_rest,))
 def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether an incomplete request moves nothing."""
-    yield from _nothing_moved(trace, motion, "incomplete")
+    yield from nothing_moved(trace, motion, "incomplete")
 
 
 @rule("motion/unauthorised-still", on=(attempts_at_rest,))
@@ -113,8 +115,8 @@ def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
     tried = [one for one in trace.tried if one.kind == "unauthorised"]
     # 423 and 428 refuse a client without the lease (RFC 4918 11.3, RFC 6585 3).
-    yield from _refused(tried, 401, 403, 423, 428)
-    yield from _nothing_moved(trace, motion, "unauthorised")
+    yield from refused(tried, 401, 403, 423, 428)
+    yield from nothing_moved(trace, motion, "unauthorised")
 
 
 @rule("motion/fresh", on=ALL)

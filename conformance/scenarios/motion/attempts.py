@@ -2,45 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
+from conformance.measures.samples import SEVERAL
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
 from conformance.scenarios.motion.moves import beyond
 from conformance.scenarios.motion.resting import fastest
-from conformance.scenarios.motion.trace import Quiet, Tried
-from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.motion.trace import Quiet, Reading, Tried
+from conformance.scenarios.scenario import (
+    NotDeclaredError,
+    NotPossibleError,
+    PartialTraceError,
+    partial_trace,
+    scenario,
+)
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import NoAnswerError, Outgoing
 from conformance.transport.raw import PartialRequest
 
 # Longest wait for the effect of an attempt at rest, beside the time to settle, s.
 _EFFECT_S: Final = 2.0
+# Parts of a body to send, each with how many bytes Content-Length promises beyond the whole (None: chunked, without
+# the last chunk), and whether the connection ends by a reset.
+_PARTS: Final = ((0.5, 0, True), (1.0, 10, True), (1.0, 10, False), (1.0, None, True))
 # Time that a server has to read the sent part of a request, s.
 _READ_S: Final = 0.03
+
+
+# What makes some attempts, and yields each when it is made.
+Attempts = Callable[[], Iterable[Tried]]
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def attempts_at_rest(mapped: MappedDevice) -> Quiet:
     """At rest, send what must move nothing, and watch. If the device moves, try each again alone, and then nothing."""
     _settle(mapped)
-    tries = list(_tries(mapped))
-    quiet = _quiet(mapped, tries)
+    return tried_at_rest(mapped, list(_tries(mapped)), partial(_settle, mapped), _effect_s(mapped))
+
+
+def tried_at_rest(
+    mapped: MappedDevice,
+    several: Sequence[Attempts],
+    settle: Callable[[], object],
+    effect_s: float,
+    beside: Callable[[], str] = str,
+) -> Quiet:
+    """Make attempts at rest, read after each, and watch. If the device moves, make some at a time again, then none.
+
+    Args:
+        mapped: the device.
+        several: make the attempts; those of one function are made again together, until one has moved the device.
+        settle: brings the device to rest.
+        effect_s: for how long the device is watched after the last attempt, s.
+        beside: returns what an attempt has changed beside the motion, empty if nothing; called after each watch.
+
+    Raises:
+        PartialTraceError: the device does not come to rest again, or there is no response.
+    """
+    quiet = _quiet(mapped, several, settle, effect_s, beside)
     if not _moved(mapped, quiet):
         return quiet
     alone: list[Quiet] = []
     try:
-        for one in tries:
-            _settle(mapped)
-            alone.append(_quiet(mapped, [one]))
-        _settle(mapped)
-        quiet = replace(quiet, idle=_quiet(mapped, []))
-        mapped.bring_home()
-    except (NoAnswerError, NotPossibleError) as error:
-        raise PartialTraceError(replace(quiet, alone=tuple(alone))) from error
+        for each in several:
+            settle()
+            alone.append(_quiet(mapped, [each], None, effect_s, beside))
+        settle()
+        quiet = replace(quiet, idle=_quiet(mapped, [], None, effect_s, beside))
+        settle()
+    except (NoAnswerError, NotPossibleError, PartialTraceError) as error:
+        raise PartialTraceError(replace(quiet, alone=tuple(alone))) from error.__cause__ or error
     return replace(quiet, alone=tuple(alone))
 
 
@@ -54,11 +90,35 @@ def _settle(mapped: MappedDevice) -> None:
         mapped.come_to_rest()
 
 
-def _quiet(mapped: MappedDevice, tries: list[Callable[[], Tried]]) -> Quiet:
-    where = mapped.where()
-    tried = tuple(one() for one in tries)
-    readings = mapped.watch(mapped.clock.now() + _effect_s(mapped))
-    return Quiet(where, tried, tuple(readings), home=mapped.home if mapped.motion.goto else {})
+def _quiet(
+    mapped: MappedDevice,
+    several: Sequence[Attempts],
+    settle: Callable[[], object] | None,
+    effect_s: float,
+    beside: Callable[[], str],
+) -> Quiet:
+    """Make attempts, and watch. One that moves the device at once: ``settle``, or without that make no further one."""
+    where, tried, readings = mapped.where(), list[Tried](), list[Reading]()
+    home = mapped.home if mapped.motion.goto else {}
+    with partial_trace(lambda: Quiet(where, tuple(tried), tuple(readings), home=home)):
+        for one in itertools.chain.from_iterable(each() for each in several):
+            tried.append(one)
+            seen = _glance(mapped)
+            readings += seen
+            if fastest(seen, mapped.motion):
+                if settle is None:
+                    break
+                settle()
+        readings += mapped.watch(mapped.clock.now() + effect_s)
+        return Quiet(where, tuple(tried), tuple(readings), home=home, beside=beside())
+
+
+def _glance(mapped: MappedDevice) -> list[Reading]:
+    """Read the device once, and where it seems to move, as often as it takes to tell."""
+    seen = [mapped.read(at_once=True)]
+    while len(seen) < SEVERAL and fastest(seen[-1:] * SEVERAL, mapped.motion):
+        seen.append(mapped.read())
+    return seen
 
 
 def _effect_s(mapped: MappedDevice) -> float:
@@ -74,11 +134,11 @@ def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
         return mapped.is_near(here, quiet.where) or bool(quiet.home and mapped.is_near(here, quiet.home))
 
     elsewhere = any(one.values and not rests(one.values) for one in quiet.readings)
-    return elsewhere or bool(fastest(quiet.readings, mapped.motion))
+    return elsewhere or bool(fastest(quiet.readings, mapped.motion) or quiet.beside)
 
 
-def _tries(mapped: MappedDevice) -> Iterator[Callable[[], Tried]]:
-    """Yield functions that make one attempt each, with moves and with velocities."""
+def _tries(mapped: MappedDevice) -> Iterator[Attempts]:
+    """Yield functions that make attempts of one kind each, with moves and with velocities."""
     move, velocity = mapped.motion.goto, mapped.motion.velocity
     if not (move or velocity):
         raise NotDeclaredError("the map has neither [motion.goto] nor [motion.velocity]")
@@ -88,7 +148,7 @@ def _tries(mapped: MappedDevice) -> Iterator[Callable[[], Tried]]:
         yield from _tries_of(_Sender(mapped, velocity, velocity.axes, "a velocity"))
 
 
-def _tries_of(sender: _Sender) -> Iterator[Callable[[], Tried]]:
+def _tries_of(sender: _Sender) -> Iterator[Attempts]:
     if sender.given.beyond_limits == "refused":
         for name, _, value in beyond(sender.axes):
             yield partial(sender.send, "beyond", f"{name} {value:g}, beyond its limit", {name: value})
@@ -107,8 +167,7 @@ def _tries_of(sender: _Sender) -> Iterator[Callable[[], Tried]]:
     if sender.given.body is not None:
         if not sender.is_form(away):  # nearly every text is a form
             yield partial(sender.send_broken, away)
-        for promised in (10, None):
-            yield partial(sender.vanish, away, promised)
+        yield partial(sender.vanish, away)
 
 
 @dataclass(frozen=True)
@@ -135,25 +194,32 @@ class _Sender:
         """Return whether a command is written as a form."""
         return "form" in self.mapped.request_of(self.given, values).media_type
 
-    def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Tried:
+    def send(self, kind: str, what: str, values: dict[str, Any], *, authorized: bool = True) -> Iterator[Tried]:
         """Send a command."""
         made = self.mapped.request_of(self.given, values, authorized=authorized)
         exchange = self.mapped.send(made, authorized=authorized)
-        return Tried(kind, what, exchange, self.mapped.has_failed(exchange))
+        yield Tried(kind, what, exchange, self.mapped.has_failed(exchange))
 
-    def send_broken(self, values: dict[str, Any]) -> Tried:
+    def send_broken(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send a command whose body is not in its syntax."""
         made = self.mapped.request_of(self.given, values)
         exchange = self.mapped.send(replace(made, body=made.body + b"}"))
         what = f"{self.what} whose body is not {self.mapped.binding.syntax}"
-        return Tried("invalid", what, exchange, self.mapped.has_failed(exchange))
+        yield Tried("invalid", what, exchange, self.mapped.has_failed(exchange))
 
-    def vanish(self, values: dict[str, Any], promised: int | None) -> Tried:
-        """Send a command of which some bytes are missing, and close the connection."""
-        made = self.mapped.request_of(self.given, values)
-        whole = None if promised is None else len(made.body) + promised
-        client = self.mapped.api.client
-        request = PartialRequest(client, made.method, made.target, sent=made.body, promised=whole, headers=made.headers)
-        self.mapped.clock.sleep(_READ_S)
-        request.vanish(reset=promised is None)
-        return Tried("incomplete", f"{self.what} of which some bytes were not sent", None)
+    def vanish(self, values: dict[str, Any]) -> Iterator[Tried]:
+        """Send parts of a command, and close their connections."""
+        return vanished(self.mapped, self.mapped.request_of(self.given, values), self.what)
+
+
+def vanished(mapped: MappedDevice, made: Outgoing, what: str) -> Iterator[Tried]:
+    """Send parts of a request, and close their connections; ``what`` it commands, as a noun phrase."""
+    begun = []
+    for share, lacking, _ in _PARTS:
+        body, promised = made.body[: int(share * len(made.body))], None if lacking is None else len(made.body) + lacking
+        connection = mapped.api.client, made.method, made.target
+        begun.append(PartialRequest(*connection, sent=body, promised=promised, headers=made.headers))
+    mapped.clock.sleep(_READ_S)
+    for request, (*_, reset) in zip(begun, _PARTS, strict=True):
+        request.vanish(reset=reset)
+    yield Tried("incomplete", f"{what} of which some bytes were not sent", None)

@@ -120,14 +120,15 @@ class MappedDevice:
         """How long a move lasts, s; 0: as long as the way takes."""
         return self.moves.seconds if "seconds" in names_in([self.moves.send, self.moves.body]) else 0.0
 
-    def read(self) -> Reading:
-        """Read the state, and the state of the last accepted move.
+    def read(self, *, at_once: bool = False) -> Reading:
+        """Read the state, and the state of the last accepted move; unless ``at_once``, a while after the last reading.
 
         Raises:
             NoAnswerError: there is no response.
         """
         state = self.motion.state
-        self.clock.sleep(self._read_at + _PACE_S - self.clock.now())
+        if not at_once:
+            self.clock.sleep(self._read_at + _PACE_S - self.clock.now())
         self._read_at = sent = self.clock.now()
         exchange, document = self.get(state.read)
         values = positions_at(document, {name: one.at for name, one in state.axes.items() if not one.read}, state.axes)

@@ -213,7 +213,7 @@ class Tried:
     """One attempt that must move nothing.
 
     Attributes:
-        kind: beyond, invalid, incomplete or unauthorised.
+        kind: beyond, invalid, unactuated, incomplete or unauthorised; a pack may have others.
         what: as a noun phrase.
         exchange: request and response; None: the connection was closed before a response could come.
         failed: whether the content of a 2xx says that it failed.
@@ -232,10 +232,11 @@ class Quiet:
     Attributes:
         where: where the device was, by axis.
         tried: the attempts.
-        readings: after the last of them.
-        alone: the same, one attempt at a time, if the device moved after all of them.
+        readings: after each of them, and for a while after the last one.
+        alone: the same, some attempts at a time up to the one that moved it, if the device moved in all of them.
         idle: the same without any attempt, after those.
         home: the target near which it rests, by axis; empty: it takes no positions.
+        beside: what an attempt has changed beside the motion; empty: nothing.
     """
 
     where: dict[str, float]
@@ -244,6 +245,7 @@ class Quiet:
     alone: tuple[Quiet, ...] = ()
     idle: Quiet | None = None
     home: dict[str, float] = field(default_factory=dict)
+    beside: str = ""
 
 
 def is_refusal(exchange: Exchange) -> bool:

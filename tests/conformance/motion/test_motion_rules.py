@@ -135,11 +135,14 @@ _STILL, _MOVES, _UNREAD = [0.0] * 9, [0.0, 0.1, 0.2, 0.3, 0.3], [None] * 9
     [
         (_quiet(_STILL), [True]),
         (_quiet(_UNREAD), ["NotTested"]),
-        (_quiet(_MOVES, ("beyond", "invalid"), alone=(_quiet(_MOVES), _quiet(_STILL, ("invalid",)))), [False, True]),
+        (
+            _quiet(_MOVES, ("beyond", "invalid"), (_quiet(_MOVES), _quiet(_STILL, ("invalid",))), _quiet(_STILL, ())),
+            [False, True],
+        ),
         # It did not come back for the second attempt: that one is not judged.
         (_quiet(_MOVES, ("beyond", "invalid"), alone=(_quiet(_STILL),)), [True, "NotTested"]),
         # It moves now and then: each alone moves nothing, and yet it moved.
-        (_quiet(_MOVES, alone=(_quiet(_STILL),)), [True, False]),
+        (_quiet(_MOVES, alone=(_quiet(_STILL),), idle=_quiet(_STILL, ())), [True, False]),
         (_quiet(_MOVES, alone=(_quiet(_MOVES),), idle=_quiet(_STILL, ())), [False]),
         # It also moves while nothing is sent.
         (_quiet(_MOVES, alone=(_quiet(_MOVES),), idle=_quiet(_MOVES, ())), ["NotTested"]),

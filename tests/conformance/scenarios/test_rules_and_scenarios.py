@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from conformance.packs.table1.scenarios.standing import later
+from conformance.packs.table1.scenarios.trace import shown
 from conformance.scenarios.collecting import is_imported
 from conformance.scenarios.plan import Step, ordered, told
 from conformance.scenarios.rule import Note, NotTested, record, rule
@@ -38,7 +38,7 @@ def test_a_scenario_is_played_once_and_judged_by_each_rule():
 
 
 def test_a_rule_is_collected_where_it_stands_and_not_where_it_is_imported():
-    made_elsewhere = later("safety/cancel-stays")
+    made_elsewhere = shown("safety/stop", counting)
     assert not is_imported(is_two, __name__)
     assert not is_imported(made_elsewhere, __name__)
     assert is_imported(is_two, "another")

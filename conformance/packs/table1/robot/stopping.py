@@ -8,8 +8,18 @@ from conformance.api.rest.interface import RestInterface
 from conformance.documents.json_text import read_json
 from conformance.observe.clock import WALL_CLOCK, Patience, poll
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, body_of, read_as
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, GOAL_PATH, JSON_BODY, POSE, STILL, VELOCITY, Velocity
+from conformance.packs.table1.robot.robot import (
+    ACCEPT_JSON,
+    GOAL_PATH,
+    JSON_BODY,
+    POSE,
+    STILL,
+    VELOCITY,
+    Robot,
+    Velocity,
+)
 from conformance.packs.table1.statement import said_of
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
 from conformance.transport.pace import Hangs, Pace
@@ -39,6 +49,20 @@ def bring_to_rest(api: RestInterface) -> str:
     still = _Stiller(api.client, _slowest(api))
     limits = said_of(api.run).limits
     return still.bring(_CANCEL_S, limits.settle_s + _GRACE_S + 8 * api.run.effort.usual_ms / 1000)
+
+
+def await_rest(api: RestInterface, *, settled: bool) -> None:
+    """Bring a robot to rest; ``settled``: it gets the time to begin what it was told just before.
+
+    Raises:
+        NotPossibleError: it does not come to rest.
+    """
+    begun_by = api.client.connection.acted_at + Robot(api).settle_s
+    if settled:
+        halt(api)
+        WALL_CLOCK.sleep(begun_by - WALL_CLOCK.now())
+    if reason := bring_to_rest(api):
+        raise NotPossibleError(reason)
 
 
 def halt(api: RestInterface) -> None:

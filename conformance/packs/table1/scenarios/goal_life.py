@@ -21,31 +21,26 @@ from conformance.packs.table1.robot.goal import (
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
 from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.standstill import Standstill
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
-from conformance.verdict.evidence import Case
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
 # A look that takes longer lets a velocity end before it is read, s.
 _LOOK_S: Final = 0.1
-# How long the robot must stay where it is after a cancelled goal, s.
-_STAYS_S: Final = 1.3
 _STEP_S: Final = 0.02
 _TIMES: Final = 3
 # A heading that differs from a goal's, rad.
 _OTHER_RAD: Final = 1.0
-_AFTER: Final = "the goal was cancelled"
 
 
-@scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.AT_REST, stage=Stage.STANDSTILL)
-def goal_life(robot: Robot, standstill: Standstill) -> GoalLife:
+@scenario(needs={Need.REST, Need.MOTION}, leaves=Leaves.AT_REST, stage=Stage.MOTION)
+def goal_life(robot: Robot) -> GoalLife:
     """Do all that clients do with a goal, put another in its place, and cancel that."""
     player = _Player(robot)
     with partial_trace(lambda: player.life):
-        player.play(standstill)
+        player.play()
     return player.life
 
 
@@ -56,7 +51,7 @@ class _Player:
     robot: Robot
     life: GoalLife = field(default_factory=GoalLife)
 
-    def play(self, standstill: Standstill) -> None:
+    def play(self) -> None:
         """Play the scenario."""
         robot = self.robot
         self._no_goal()
@@ -95,13 +90,6 @@ class _Player:
         await_motion(robot)
         if not self._cancel(back):
             meanwhile(robot, ID, lambda _, pose, __: self._cancel(pose))
-        standstill.attempted(
-            "safety/cancel-stays",
-            _AFTER,
-            lambda: _cancel_again(robot, second),
-            seconds=_STAYS_S * robot.watchfulness,
-            goal=True,
-        )
 
     def _no_goal(self) -> None:
         """Read and cancel the goal while the robot has none."""
@@ -227,15 +215,6 @@ def cancel(robot: Robot) -> Cancelled:
         # It may yet begin what the goal had commanded, or be about to turn the other way: until it has had its time.
         robot.clock.sleep(answered + robot.settle_s - robot.clock.now())
     return Cancelled(exchange, read, gone, drive.trace, late)
-
-
-def _cancel_again(robot: Robot, body: dict[str, Any]) -> tuple[Case, ...]:
-    """Command a velocity, put a goal in its place, and cancel it."""
-    robot.put_velocity(slow_turn(robot))
-    put_goal(robot, body)
-    await_motion(robot)
-    cancel(robot)
-    return ()
 
 
 def slow_turn(robot: Robot) -> Velocity:

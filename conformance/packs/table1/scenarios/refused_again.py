@@ -27,11 +27,11 @@ from conformance.packs.table1.robot.invalid_bodies import elsewhere
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
 from conformance.packs.table1.robot.refused_requests import NO_FRAME, Refused, RefusedRequests, is_refused, send_known
-from conformance.packs.table1.robot.robot import GOAL_PATH, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
 from conformance.packs.table1.robot.soap_services import send_delivery
-from conformance.packs.table1.robot.standstill import read_rest
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.packs.table1.robot.xml_commands import put_as_xml
+from conformance.packs.table1.scenarios.attempts import GOAL
 from conformance.packs.table1.scenarios.goal_life import await_motion, put_new
 from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import NoOccasionError, PartialTraceError, scenario
@@ -201,7 +201,16 @@ class _Player:
         pairs = zip(chosen, exchanges, strict=True)
         if any(one.acts and exchange.response.ok and not self._is_wrong(one) for one, exchange in pairs):
             bring_to_rest(self.api)
-        return read_rest(Drive(self.robot), _AFTER, goal=True)
+        return self._read(_AFTER)
+
+    def _read(self, after: str) -> Case:
+        """Read whether the robot is at rest, without a goal."""
+        drive = Drive(self.robot)
+        still, seen = drive.sees(STILL)
+        if still is False:
+            return Case(still, drive.trace.turns[-1].velocity_exchange, f"rest after {after}", seen, "moves")
+        goal, exchange = self.robot.goal()
+        return Case(goal is None, exchange, f"rest after {after}", "" if goal is None else GOAL, "moves")
 
     def _alone(self, chosen: list[Refused]) -> Iterator[Case]:
         """Send each request that would act with a look of its own; yield the readings that show an effect."""
@@ -209,7 +218,7 @@ class _Player:
             if one.acts:
                 bring_to_rest(self.api)
                 exchange = self._send(one)
-                seen = read_rest(Drive(self.robot), one.what, goal=True)
+                seen = self._read(one.what)
                 if not seen.holds and (is_refused(exchange) or self._is_wrong(one)):
                     yield replace(seen, exchange=exchange, cause=one.what)
 

@@ -8,8 +8,8 @@ from toy_server import serving
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, Robot, Velocity
-from conformance.packs.table1.robot.standstill import Standstill, watch_rest
+from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, STILL, Robot, Velocity
+from conformance.packs.table1.robot.stopping import await_rest
 from conformance.packs.table1.scenarios.goal_life import cancel
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
@@ -61,13 +61,19 @@ def _told():
         client.close()
 
 
+def _rests(robot: Robot) -> bool:
+    drive = Drive(robot)
+    drive.keep(_SETTLE_S)
+    return all(robot.near(turn.velocity, STILL) for turn in drive.trace.turns)
+
+
 def test_an_attempt_is_not_begun_before_the_last_command_has_had_its_time():
     with _told() as (api, robot):
-        assert Standstill(api).begin() == ""
-        assert watch_rest(Drive(robot), "an attempt", _SETTLE_S).holds
+        await_rest(api, settled=True)
+        assert _rests(robot)
 
 
 def test_what_a_cancelled_goal_had_commanded_does_not_come_back():
     with _told() as (_, robot):
         assert cancel(robot).gone
-        assert watch_rest(Drive(robot), "the goal was cancelled", _SETTLE_S).holds
+        assert _rests(robot)

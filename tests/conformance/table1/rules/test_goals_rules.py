@@ -19,7 +19,6 @@ from conformance.packs.table1.robot.goal_trace import (
     SpecialGoal,
 )
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.robot.standstill_trace import rest
 from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
 from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
 from conformance.packs.table1.rules.rest_resources import test_goal_life as life
@@ -28,6 +27,7 @@ from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain
 from conformance.packs.table1.statement import Statement
+from conformance.verdict.evidence import Case
 
 _RUN = {"run": SimpleNamespace(statement=Statement())}
 
@@ -173,7 +173,7 @@ def test_how_a_goal_ended_is_told_with_its_id(last, fault):
 
 @pytest.mark.parametrize(("found", "holds"), [("", [True]), ("an active goal", [False]), ("0.1 m/s", [])])
 def test_a_refused_request_sets_no_goal(found, holds):
-    trace = RefusedAgain(rests=(rest("requests", exchange(), found),))
+    trace = RefusedAgain(rests=(Case(not found, exchange(), "rest after requests", found),))
     assert _holds(refused.goal_refused_again, trace) == holds
 
 

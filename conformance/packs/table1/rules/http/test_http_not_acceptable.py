@@ -4,26 +4,10 @@ from collections.abc import Iterator
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY
 from conformance.packs.table1.scenarios.not_acceptable import NotAcceptable, not_acceptable
-from conformance.packs.table1.scenarios.standing import later
-from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case
 
 Puts = tuple[NotAcceptable, ...]
-
-
-@rule("http/not-acceptable-undone", on=(not_acceptable,))
-def not_acceptable_undone(trace: Puts) -> Iterator[Outcome]:
-    """Judge that the robot is at rest after a PUT that it answered 406.
-
-    Motion may be the effect of an earlier attempt: it is judged when each attempt has been repeated alone.
-    """
-    rests = [one.rest for one in trace if one.rest is not None]
-    if not rests:
-        yield Note("no PUT of a velocity or a goal is answered 406")
-    yield from (rest for rest in rests if rest.holds)
-
-
-not_acceptable_undone_later = later("http/not-acceptable-undone")
 
 
 @rule("rest-resources/velocity-converges", on=(not_acceptable,))

@@ -11,7 +11,6 @@ from conformance.packs.table1.robot.robot import STILL, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.standing import later
 from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven, longer_s, shown
 from conformance.packs.table1.scenarios.turn import further_axes, turn
@@ -143,6 +142,3 @@ def not_taken_up(trace: GoalReached, run: Run) -> Iterator[Outcome]:
     """Judge that the robot does not resume an old velocity when it has reached a goal."""
     if trace.turned is not None:
         yield from outcomes("safety/watchdog", trace.turned, said_of(run).limits)
-
-
-cancel_stays = later("safety/cancel-stays")

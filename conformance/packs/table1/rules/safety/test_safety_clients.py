@@ -1,37 +1,21 @@
-"""Clients that vanish in the middle of a request, and clients that never complete one."""
+"""Clients that never complete a request."""
 
-from collections.abc import Iterator
 from contextlib import closing
 from typing import Final
 
 import pytest
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
-from conformance.packs.table1.scenarios.standing import later
-from conformance.packs.table1.scenarios.vanished_clients import vanished_clients
-from conformance.scenarios.rule import Outcome, rule
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
 from conformance.transport.raw import PartialRequest
-from conformance.verdict.evidence import Case, Judge
+from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
 # Usual response time that is assumed at least, s: scheduling on a busy machine is no failure.
 _USUAL_S: Final = 1.0
 # Tries: a network may delay one response, but a robot that waits for other requests never responds to the third.
 _TRIES: Final = 3
-
-
-@rule("safety/client-vanished", on=(vanished_clients,))
-def client_vanished(trace: tuple[Case, ...]) -> Iterator[Outcome]:
-    """Judge that the robot is at rest after requests of which some bytes did not arrive.
-
-    Motion may be the effect of an earlier attempt: it is judged when each attempt has been repeated alone.
-    """
-    return (rest for rest in trace if rest.holds)
-
-
-client_vanished_later = later("safety/client-vanished")
 
 
 @pytest.mark.phase("reading")

@@ -2,32 +2,18 @@
 
 from collections.abc import Iterator
 from http import HTTPStatus
-from typing import Final
 
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.robot.standstill_trace import GOAL
-from conformance.packs.table1.scenarios.invalid_velocities import invalid_velocities
+from conformance.packs.table1.scenarios.attempts import GOAL
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain, refused_again
-from conformance.packs.table1.scenarios.standing import later
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.evidence import Case
 
-_VELOCITY: Final = "strict-input/velocity-refused"
 
-
-@rule(_VELOCITY, on=(invalid_velocities,))
-def velocity_refused(trace: tuple[Case, ...]) -> Iterator[Outcome]:
-    """Judge that the robot is at rest after each invalid velocity."""
-    yield from trace
-
-
-velocity_refused_later = later(_VELOCITY)
-
-
-@rule(_VELOCITY, on=(refused_again,))
+@rule("strict-input/velocity-refused", on=(refused_again,))
 def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot stays at rest, without a goal, when what it has refused is sent again."""
     yield from trace.rests

@@ -1,0 +1,69 @@
+"""Rules on what must leave the robot at rest: the generic ones on attempts, by the requirements of the contract."""
+
+from collections.abc import Iterator
+
+from conformance.packs.table1.robot.motion_map import motion_map_of
+from conformance.packs.table1.scenarios.attempts import attempts
+from conformance.packs.table1.statement import said_of
+from conformance.rules.motion.test_motion_attempts import incomplete_still, nothing_moved, refused, refused_still
+from conformance.scenarios.motion.trace import Quiet
+from conformance.scenarios.rule import NotClaimed, Note, Outcome, rule
+from conformance.verdict.evidence import Case
+from conformance.verdict.run import Run
+
+
+@rule("safety/limits-refused", on=(attempts,))
+def limits_refused(trace: Quiet) -> Iterator[Outcome]:
+    """Judge that a velocity beyond the limits is rejected with 4xx."""
+    return refused(one for one in trace.tried if one.kind == "beyond")
+
+
+@rule("safety/refused-keeps", on=(attempts,))
+def refused_keeps(trace: Quiet, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot stays at rest after each rejected velocity."""
+    yield from refused_still.judge(trace, motion_map_of(said_of(run)))
+
+
+@rule("safety/limits-hold", on=(attempts,))
+def limits_hold(trace: Quiet, run: Run) -> Iterator[Outcome]:
+    """Judge that a robot without declared limits does not drive at a velocity that no robot reaches."""
+    limits = said_of(run).limits
+    if not (limits.linear_declared and limits.angular_declared):
+        yield from _nothing_moved(trace, run, "beyond")
+
+
+@rule("safety/unactuated-refused", on=(attempts,))
+def unactuated_refused(trace: Quiet) -> Iterator[Outcome]:
+    """Judge that a velocity in a component that the robot does not actuate is rejected with 4xx."""
+    yield from refused(one for one in trace.tried if one.kind == "unactuated")
+    driven = [one for one in trace.tried if one.kind == "driven"]
+    for one in driven:
+        yield Case(True, one.exchange, f"4xx for {one.what}, or that it drives so")
+        yield Note("the robot reaches a velocity that its statement leaves out")
+    if not driven and all(one.kind != "unactuated" for one in trace.tried):
+        yield NotClaimed("does not apply: by its statement the robot actuates all six components, so each is driven")
+
+
+@rule("safety/client-vanished", on=(attempts,))
+def client_vanished(trace: Quiet, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot is at rest after requests of which some bytes did not arrive."""
+    yield from incomplete_still.judge(trace, motion_map_of(said_of(run)))
+
+
+@rule("safety/cancel", on=(attempts,))
+def cancel_stays(trace: Quiet, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot stays where it is, without a goal, after its goal was cancelled."""
+    return _nothing_moved(trace, run, "cancelled")
+
+
+@rule("http/not-acceptable-undone", on=(attempts,))
+def not_acceptable_undone(trace: Quiet, run: Run) -> Iterator[Outcome]:
+    """Judge that the robot is at rest, without a goal, after PUTs that it answered 406."""
+    return _nothing_moved(trace, run, "not acceptable")
+
+
+def _nothing_moved(trace: Quiet, run: Run, kind: str) -> Iterator[Outcome]:
+    if any(one.kind == kind for one in trace.tried):
+        yield from nothing_moved(trace, motion_map_of(said_of(run)), kind)
+    else:
+        yield Note(f"no attempt of this kind was made: {kind}")
