@@ -30,7 +30,7 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
     if quiet.home:
         places = [place for place in places if off(place, quiet.home, motion)]
     elsewhere = next(filter(None, (off(place, quiet.where, motion) for place in places)), "")
-    return elsewhere or fastest(seen, motion) or quiet.beside
+    return elsewhere or fastest(seen, motion, rested=True) or quiet.beside
 
 
 def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:

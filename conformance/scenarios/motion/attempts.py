@@ -105,7 +105,7 @@ def _quiet(
             tried.append(one)
             seen = _glance(mapped)
             readings += seen
-            if fastest(seen, mapped.motion):
+            if fastest(seen, mapped.motion, rested=True):
                 if settle is None:
                     break
                 settle()
@@ -116,7 +116,7 @@ def _quiet(
 def _glance(mapped: MappedDevice) -> list[Reading]:
     """Read the device once, and where it seems to move, as often as it takes to tell."""
     seen = [mapped.read(at_once=True)]
-    while len(seen) < SEVERAL and fastest(seen[-1:] * SEVERAL, mapped.motion):
+    while len(seen) < SEVERAL and fastest(seen[-1:] * SEVERAL, mapped.motion, rested=True):
         seen.append(mapped.read())
     return seen
 
@@ -134,7 +134,7 @@ def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
         return mapped.is_near(here, quiet.where) or bool(quiet.home and mapped.is_near(here, quiet.home))
 
     elsewhere = any(one.values and not rests(one.values) for one in quiet.readings)
-    return elsewhere or bool(fastest(quiet.readings, mapped.motion) or quiet.beside)
+    return elsewhere or bool(fastest(quiet.readings, mapped.motion, rested=True) or quiet.beside)
 
 
 def _tries(mapped: MappedDevice) -> Iterator[Attempts]:

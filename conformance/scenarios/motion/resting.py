@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from statistics import median
 from typing import Final
 
-from conformance.measures.samples import SEVERAL, Noise, Sample, goes_on, slope
+from conformance.measures.samples import FARTHEST, SEVERAL, Noise, Sample, goes_on, slope
 from conformance.scenarios.motion.trace import Reading, Resting
 from conformance.statement.motion_map import MotionMap
 
@@ -31,13 +31,21 @@ def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
     return Resting(axes, speeds)
 
 
-def fastest(readings: Sequence[Reading], motion: MotionMap) -> str:
-    """Return a measured velocity that is not zero in several readings in a row; empty if there is none."""
+def fastest(readings: Sequence[Reading], motion: MotionMap, *, rested: bool = False) -> str:
+    """Return a measured velocity that is not zero in several readings in a row; empty if there is none.
+
+    Of a device that has ``rested`` before, each is judged by what the map declares for rest, if it declares that.
+    """
+    declared = motion.velocity.axes if rested and motion.velocity else {}
+    most = {name: motion.speed_tolerance(name) for name in motion.speeds}
+    for name, axis in declared.items():
+        if name in most and axis.rest is not None:
+            most[name] = min(most[name], axis.rest + FARTHEST * axis.noise)
     seen = [one.speeds for one in readings if one.speeds]
     for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
         for name in window[0]:
             speed = median(one[name] for one in window)
-            if abs(speed) > motion.speed_tolerance(name):
+            if abs(speed) > most[name]:
                 return f"{name} at {speed:.4g} per second"
     return ""
 
