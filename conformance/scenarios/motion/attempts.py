@@ -72,12 +72,20 @@ def tried_at_rest(
         for each in several:
             settle()
             alone.append(_quiet(mapped, [each], None, effect_s, beside))
-        settle()
+        _let_rest(mapped, settle)
         quiet = replace(quiet, idle=_quiet(mapped, [], None, effect_s, beside))
         settle()
     except (NoAnswerError, NotPossibleError, PartialTraceError) as error:
         raise PartialTraceError(replace(quiet, alone=tuple(alone))) from error.__cause__ or error
     return replace(quiet, alone=tuple(alone))
+
+
+def _let_rest(mapped: MappedDevice, settle: Callable[[], object]) -> None:
+    """Wait until the device rests by itself, and stop it only if it does not: it may set out again after a stop."""
+    try:
+        mapped.come_to_rest(stop=False)
+    except NotPossibleError:
+        settle()
 
 
 def _settle(mapped: MappedDevice) -> None:

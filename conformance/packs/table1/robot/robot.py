@@ -128,11 +128,6 @@ class Robot:
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
     @property
-    def limits_declared(self) -> bool:
-        """Return whether the statement declares all velocity limits, so that requests beyond them can be made."""
-        return self.limits.linear_declared and self.limits.angular_declared
-
-    @property
     def settle_s(self) -> float:
         """Return how long the robot has to reach a velocity before a miss counts as a failure, s.
 
