@@ -1,4 +1,4 @@
-"""A device of a test that the suite's own scenarios play with, without a run of the command; and all that was sent."""
+"""A device and a clock of a test that the suite's own scenarios play with, without a run of the command."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -16,6 +16,25 @@ from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Listener
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
+
+
+class SimulatedClock:
+    """A clock whose time advances only by sleep().
+
+    Attributes:
+        time_s: the time, s.
+    """
+
+    def __init__(self, time_s: float = 100.0) -> None:
+        self.time_s = time_s
+
+    def now(self) -> float:
+        """Return the time, s."""
+        return self.time_s
+
+    def sleep(self, seconds: float) -> None:
+        """Advance the time."""
+        self.time_s += max(0.0, seconds)
 
 
 class Kept(Listener):

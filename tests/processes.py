@@ -22,6 +22,9 @@ sys.exit(code)
 """
 
 
+#: The words of `roaas load` without the front door, which would draw its pages.
+LOAD = (sys.executable, "-c", "from loadtests.cli import load; load(prog_name='roaas load')")
+_WARM = ((sys.executable, "-m", "roaas"), LOAD)
 # Below the ports that systems give to connections: one of these may take a port before a server listens on it.
 _PORTS = range(10_000, 32_000)
 
@@ -44,17 +47,17 @@ def ended(
     """Run a command to its end; return what it wrote, as text.
 
     Args:
-        command: its words. `python -m roaas` runs in a process that has imported other people's packages before.
+        command: its words. `python -m roaas` and `LOAD` run in a process that imported their modules before.
         check: raise an error if the exit code is not 0.
         peak_mb: the file for its peak memory.
-        fresh: start Python anew for `python -m roaas` as well, as an environment of its own (`env`) always does.
+        fresh: start Python anew for them as well, as an environment of its own (`env`) always does.
         options: of `subprocess.run`.
     """
     given = {"capture_output": True, "text": True, "timeout": 240} | options
     weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
     anew = fresh or peak_mb or not {"env", "preexec_fn"}.isdisjoint(options)
-    if command[:3] == (sys.executable, "-m", "roaas") and not anew:
-        command = (*warm_commands.beginning(), *command[3:])
+    if command[:3] in _WARM and not anew:
+        command = (*warm_commands.beginning(), *command[1:])
     return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
 
 

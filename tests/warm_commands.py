@@ -1,4 +1,4 @@
-"""Run ``python -m roaas`` in processes that have imported its modules before.
+"""Run the commands of RoAAS in processes that have imported their modules before.
 
 These imports take two thirds of a short certification's processor time. A server does them once, and forks twice for
 each command. The second process runs the command; the first waits for it. The command gets the arguments, the working
@@ -28,8 +28,8 @@ _IMPORTED = (
     "jsonschema_rs", "jsonpath", "lxml.etree", "msgspec", "pytest", "regress",
     "schemathesis", "schemathesis.graphql", "schemathesis.specs.openapi.schemas", "securesystemslib", "segno", "yaml",
 )  # fmt: skip
-# NumPy, which the pages of load tests draw with, starts threads; the guard is a program that reads its stdin.
-_NOT_IMPORTED = ("reports.latency", "conformance.api.rest.guard_process")
+# The guard is a program that reads its stdin.
+_NOT_IMPORTED = "conformance.api.rest.guard_process"
 _CLIENT = """
 import array, json, os, socket, sys
 words = json.dumps([sys.argv[2:], os.getcwd(), dict(os.environ)]).encode()
@@ -47,12 +47,17 @@ sys.exit(code)
 
 @cache
 def beginning() -> tuple[str, ...]:
-    """Return the words with which a process begins that runs a command of RoAAS; start the server for it."""
+    """Return the words that stand for `python` before `-m roaas` or `-c ...`; start the server for them."""
     if sys.platform != "linux":
-        return (sys.executable, "-m", "roaas")
+        return (sys.executable,)
     name = f"roaas-tests-{os.getpid()}-{secrets.token_hex(8)}"
     # The server ends when this process does, which holds the other end of its stdin.
-    server = subprocess.Popen((sys.executable, __file__, name), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    server = subprocess.Popen(
+        (sys.executable, __file__, name),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+    )
     _SERVERS.append(server)
     assert server.stdout is not None
     assert server.stdout.readline() == b"ready\n"
@@ -72,6 +77,7 @@ def _serve(name: str) -> None:
         for module in walk_packages(room.__path__, f"{room.__name__}."):
             if not module.name.startswith(_NOT_IMPORTED):
                 import_module(module.name)
+    import_module("loadtests.described.run")  # what `roaas load` needs before it starts the process that measures
     assert len(list(Path("/proc/self/task").iterdir())) == 1  # a process with threads must not fork
     gc.collect()
     gc.freeze()
@@ -114,7 +120,7 @@ def _kill_without(connection: socket.socket, command: int) -> None:
 
 
 def _run(words: list[str], folder: str, environment: dict[str, str], streams: list[int]) -> None:
-    """Do in this process what `python -m roaas` does in a new one, and end it."""
+    """Do in this process what `python` with these words does in a new one, and end it."""
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
         os.close(stream)
@@ -123,8 +129,11 @@ def _run(words: list[str], folder: str, environment: dict[str, str], streams: li
     tempfile.tempdir = None  # found anew, by the command's environment
     os.chdir(folder)
     sys.path.insert(0, folder)
-    sys.argv[1:] = words
-    runpy.run_module("roaas", run_name="__main__", alter_sys=True)
+    sys.argv[1:] = words[2:]
+    if words[0] == "-m":
+        runpy.run_module(words[1], run_name="__main__", alter_sys=True)
+    else:
+        exec(words[1], {})  # noqa: S102 -- the text that a test gives `python -c`
     sys.exit()
 
 

@@ -1,4 +1,4 @@
-"""The clock for observing a device: real in a run, simulated in tests."""
+"""The clock for observing a device."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -31,25 +31,6 @@ class _WallClock:
 
 #: The clock of every run.
 WALL_CLOCK: Final[Clock] = _WallClock()
-
-
-class SimulatedClock:
-    """A clock whose time advances only by sleep().
-
-    Attributes:
-        time_s: the time, s.
-    """
-
-    def __init__(self, time_s: float = 100.0) -> None:
-        self.time_s = time_s
-
-    def now(self) -> float:
-        """Return the time, s."""
-        return self.time_s
-
-    def sleep(self, seconds: float) -> None:
-        """Advance the time."""
-        self.time_s += max(0.0, seconds)
 
 
 # Longest time that is given back to a device that is always late, s.

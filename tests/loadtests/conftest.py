@@ -12,7 +12,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner
-from processes import free_port
+from processes import LOAD, ended, free_port
 
 from conformance.commandline.exit_codes import ExitCode
 from conformance.papers_robot.statement import CONTRACT_DIR
@@ -110,13 +110,10 @@ class Loaded:
         )
 
 
-COMMAND = [sys.executable, "-c", "from loadtests.cli import load; load(prog_name='roaas load')"]
-
-
 @pytest.fixture(scope="session")
 def load_command():
     """The words that begin `roaas load` in a process of its own."""
-    return COMMAND
+    return LOAD
 
 
 @pytest.fixture
@@ -127,15 +124,18 @@ def load(tmp_path):
     `on` are words before the command.
     """
 
+    folder = tmp_path / "out"
+
+    def words(options):
+        return [word for option in options for word in (shlex.split(option) if isinstance(option, str) else [option])]
+
     def run(*options):
-        return run.begin(*options)[1]()
+        done = ended(*LOAD, *words(options), "--out", folder)
+        return Loaded(done.returncode, done.stdout, done.stderr, folder)
 
     def begin(*options, on=()):
-        folder = tmp_path / "out"
-        words = [word for option in options for word in (shlex.split(option) if isinstance(option, str) else [option])]
-        process = subprocess.Popen(
-            [*on, *COMMAND, *words, "--out", folder], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        command = [*on, *LOAD, *words(options), "--out", folder]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
         def finish():
             out, err = process.communicate(timeout=240)

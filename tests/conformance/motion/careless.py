@@ -6,8 +6,8 @@ from unittest.mock import patch
 import simulated
 from arm import MAP, Arm
 from body import Body
+from driven_device import SimulatedClock
 
-from conformance.observe.clock import SimulatedClock
 from conformance.scenarios.motion import attempts, several
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.transport.exchange import Exchange, Request, Response

@@ -11,9 +11,9 @@ import rover
 from arm import LIMITS, MAP, Arm
 from body import Body
 from dome import Dome
+from driven_device import SimulatedClock
 from rover import Rover
 
-from conformance.observe.clock import SimulatedClock
 from conformance.rules.motion import test_motion, test_motion_attempts, test_states, test_velocities
 from conformance.scenarios.motion import moves, several, states, velocities
 from conformance.scenarios.motion.binding import JsonBinding, SoapBinding

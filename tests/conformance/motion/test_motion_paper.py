@@ -6,10 +6,10 @@ from pathlib import Path
 import msgspec
 import pytest
 import rover
+from driven_device import SimulatedClock
 from paper_map import motion_map_of
 from simulated import DEVICES, MUTANTS, RULES, Api, cases_of, map_of, played
 
-from conformance.observe.clock import SimulatedClock
 from conformance.papers_robot.statement import load_robot_statement
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.moves import stops

@@ -3,9 +3,9 @@
 import dome
 import pytest
 import rover
+from driven_device import SimulatedClock
 from simulated import RULES, Api, cases_of, map_of, played
 
-from conformance.observe.clock import SimulatedClock
 from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice

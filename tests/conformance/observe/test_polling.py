@@ -1,6 +1,8 @@
 """Polling by a simulated clock: as often as asked, and once more after the end."""
 
-from conformance.observe.clock import Patience, SimulatedClock, poll_for
+from driven_device import SimulatedClock
+
+from conformance.observe.clock import Patience, poll_for
 from conformance.transport.pace import Pace
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
@@ -21,7 +22,7 @@ from loadtests.statistics.intervals import (
     samples_for_point,
 )
 from loadtests.statistics.measured import Measured
-from loadtests.statistics.over_time import time_series
+from loadtests.statistics.over_time import theil_sen, time_series
 from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import Sample, Unit, in_rounds
 
@@ -148,3 +149,13 @@ def test_a_binomial_quantile_is_the_first_number_whose_cumulative_probability_re
     for share in (0.025, 0.4, 0.975):
         found = binomial_quantile(share, trials, chance)
         assert math.fsum(single[:found]) < share <= math.fsum(single[: found + 1])
+
+
+@pytest.mark.parametrize("cells", [3, 10_000])
+def test_a_slope_and_its_interval_are_those_of_scipy(cells):
+    random = np.random.default_rng(1)
+    for slope in (-1.0, 0.0, 0.3):
+        times = np.cumsum(random.uniform(0.1, 1.0, 20))
+        values = np.round((slope * times + random.standard_normal(20)) * cells) / cells  # a few cells: many are equal
+        expected = stats.theilslopes(values, times, 0.99)
+        assert theil_sen(times, values) == pytest.approx((expected.slope, expected.low_slope, expected.high_slope))

@@ -3,9 +3,9 @@
 from types import SimpleNamespace
 from typing import Any, Final
 
+from driven_device import SimulatedClock
 from toy_messages import exchange
 
-from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot import drive
 from conformance.packs.table1.robot.drive_rules import every_outcome

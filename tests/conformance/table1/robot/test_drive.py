@@ -2,8 +2,8 @@
 
 import pytest
 from clocked import SAMPLE_S, SETTLE_S, WANTED, Body, Drive
+from driven_device import SimulatedClock
 
-from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.robot.robot import STILL
 from conformance.packs.table1.robot.undisturbed import renewed
 

@@ -4,10 +4,10 @@ import itertools
 import json
 
 import pytest
+from driven_device import SimulatedClock
 from toy_body import interface_of
 
 from conformance.api.soap.callable_services import SoapServices
-from conformance.observe.clock import SimulatedClock
 from conformance.packs.table1.robot.no_commands import no_commands
 from conformance.packs.table1.robot.refused_requests import RefusedRequests, is_refused
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, VELOCITY, Robot
