@@ -34,9 +34,9 @@ _COMMANDS = {
     "judge": ("conformance.cli.judge", "Judge a stored run again, without the robot."),
     "report": ("reports.cli.pages", "Write the pages from the result files again."),
     "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
-    "diff": ("reports.cli.difference", "Show what changed between two results, or between two descriptions of an API."),
+    "diff": ("reports.cli.pages", "Show what changed between two results, or between two descriptions of an API."),
     "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
-    "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
+    "sign": ("reports.cli.attestation", "Sign a result, so that others can verify the signer."),
     "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
     "registry": (
         "reports.cli.registry",
@@ -201,7 +201,7 @@ class FrontDoor:
         """Return a signer that holds the private key in a file, read before the run whose results it will sign."""
         try:
             return import_module("reports.attestation.signing").Notary(key, lambda: FrontDoor.known(pack))
-        except import_module("reports.errors").ReportError as error:
+        except import_module("reports.given_files").ReportError as error:
             raise click.UsageError(str(error)) from error
 
     @staticmethod
@@ -221,7 +221,7 @@ class FrontDoor:
         pages = import_module("reports.cli.pages")
         try:
             code: int = pages.tell_change(old, new, threshold)
-        except import_module("reports.errors").ReportError as error:
+        except import_module("reports.given_files").ReportError as error:
             click.echo(f"not compared: {error.format_message()}", err=True)
             return int(pages.EXIT_INVALID)
         return code

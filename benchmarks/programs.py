@@ -12,10 +12,9 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -147,14 +146,6 @@ def roaas_load(*options: Any) -> dict[str, Any]:
     return found
 
 
-def matching(patterns: Iterable[str], faults: Iterable[str]) -> list[str]:
-    """Return the faults whose names match a pattern; print the names where none does."""
-    names = [name for name in faults if any(fnmatch(name, pattern) for pattern in patterns)]
-    if not names:
-        print(f"no fault is named {' or '.join(patterns)}; there are {', '.join(faults)}")
-    return names
-
-
 def report(text: str, *, met: bool) -> bool:
     """Print one line of the result."""
     print(f"{'ok    ' if met else 'MISSED'} {text}", flush=True)
@@ -168,11 +159,9 @@ def machine() -> str:
 
 @dataclass
 class Footprint:
-    """A process's resident memory in MB (with shared pages), open descriptors, threads, and processor time in s."""
+    """A process's resident memory in MB (with shared pages), and processor time in s."""
 
     megabytes: float
-    descriptors: int
-    threads: int
     processor: float
 
     @classmethod
@@ -182,10 +171,7 @@ class Footprint:
         pages = int((proc / "statm").read_text().split()[1])
         fields = (proc / "stat").read_text().rpartition(")")[2].split()
         return cls(
-            pages * os.sysconf("SC_PAGE_SIZE") / 1e6,
-            len(list((proc / "fd").iterdir())),
-            len(list((proc / "task").iterdir())),
-            (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"),
+            pages * os.sysconf("SC_PAGE_SIZE") / 1e6, (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
         )
 
 

@@ -1,14 +1,23 @@
-"""Conversions between ROS messages and the plain values of the simulation."""
+"""Conversions between ROS messages and the plain values of the simulation.
+
+The robot's present pose, read from its odometry topic.
+"""
 
 import math
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from geometry_msgs.msg import PoseStamped, Quaternion
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
-from reference_robot.names import Frames
+from reference_robot.names import Frames, RosNames
 from reference_robot.simulation.planner import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _UNIT_TOLERANCE: Final = 1e-3  # of a quaternion's length, as in the contract
 
@@ -76,3 +85,34 @@ def plain(stamped: PoseStamped) -> dict[str, Any]:
             "orientation": {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w},
         },
     }
+
+
+class Localisation:
+    """A subscriber that knows the robot's latest pose in the map frame, which coincides with the odometry frame.
+
+    Odometry is kept serialized and is only deserialized in ``pose``, which nobody calls while the robot is idle.
+
+    Attributes:
+        on_update: Called after each odometry message.
+    """
+
+    def __init__(self, node: Node, names: RosNames) -> None:
+        self.on_update: Callable[[], None] | None = None
+        self._serialized = b""
+        node.create_subscription(Odometry, names.topics.odom, self._receive, 1, raw=True)
+
+    def pose(self) -> Pose:
+        """Return the robot's x, y (m) and yaw (rad).
+
+        Raises:
+            PoseError: No odometry has been received yet.
+        """
+        if not self._serialized:
+            raise PoseError("the robot has not received its first odometry yet")
+        pose = deserialize_message(self._serialized, Odometry).pose.pose
+        return pose.position.x, pose.position.y, yaw_of(pose.orientation)
+
+    def _receive(self, serialized: bytes) -> None:
+        self._serialized = serialized
+        if self.on_update is not None:
+            self.on_update()

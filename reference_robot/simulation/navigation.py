@@ -22,10 +22,17 @@ from std_msgs.msg import Header, String
 
 from reference_robot.kinematics import Kinematics
 from reference_robot.names import RosNames
-from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import LATCHED, RESULT_TIMEOUT_S, PoseError, plain, pose_of, stamped_pose
+from reference_robot.simulation.kinematics import EXACT, Command, Pursuit
+from reference_robot.simulation.messages import (
+    LATCHED,
+    RESULT_TIMEOUT_S,
+    Localisation,
+    PoseError,
+    plain,
+    pose_of,
+    stamped_pose,
+)
 from reference_robot.simulation.planner import PlanError, Planner, Pose
-from reference_robot.simulation.pursuit import EXACT, Command, Pursuit
 
 PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
 _NEARER_M: Final = 0.05

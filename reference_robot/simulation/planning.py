@@ -13,8 +13,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from reference_robot.names import RosNames
-from reference_robot.simulation.localisation import Localisation
-from reference_robot.simulation.messages import RESULT_TIMEOUT_S, PoseError, pose_of, stamped_pose
+from reference_robot.simulation.messages import RESULT_TIMEOUT_S, Localisation, PoseError, pose_of, stamped_pose
 from reference_robot.simulation.planner import PlanError, Planner, Pose
 
 

@@ -7,8 +7,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from typing import Final, NamedTuple
 
 from reference_robot.webservices.configuration import Configuration
-from reference_robot.webservices.http.admission import Admission
-from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.authorization import Admission, Scope
 from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.listening import REST, SOAP, Listening
@@ -19,10 +18,16 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.about import Health as HealthResource
 from reference_robot.webservices.resources.about import OpenApi, Wadl
-from reference_robot.webservices.resources.delivery import Delivery, DeliveryList
-from reference_robot.webservices.resources.navigation import Goal, Plan
 from reference_robot.webservices.resources.resource import Resource
-from reference_robot.webservices.resources.state import GraphList, LinearVelocity, Pose
+from reference_robot.webservices.resources.state import (
+    Delivery,
+    DeliveryList,
+    Goal,
+    GraphList,
+    LinearVelocity,
+    Plan,
+    Pose,
+)
 from reference_robot.webservices.resources.state import Velocity as VelocityResource
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals

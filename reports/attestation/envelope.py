@@ -15,8 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 
 from reports.attestation.statement import PAYLOAD_TYPE, PREDICATE_TYPE, STATEMENT_TYPE, Statement
-from reports.errors import EnvelopeRefusedError
-from reports.given_files import read_octets
+from reports.given_files import EnvelopeRefusedError, read_octets
 
 ENVELOPE_NAME = "certificate.intoto.json"
 _MOST_BYTES = 4 << 20

@@ -1,5 +1,10 @@
-"""Write the output of `roaas diff`: text for the terminal, an HTML page, and Markdown."""
+"""Write the output of `roaas diff`: text for the terminal, an HTML page, and Markdown.
 
+Show what changed between two descriptions of an API: text for the terminal, an HTML page, and Markdown.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from reports.certificate.difference import MEANINGS, Difference, Kind
@@ -60,4 +65,86 @@ def _values(found: Difference, names: tuple[str, str]) -> dict[str, Any]:
         "meanings": MEANINGS,
         "tones": _TONES,
         "shown": SHOWN,
+    }
+
+
+_NAMED = 5
+_SHOWN = 200
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptionChanges:
+    """The changes between two descriptions.
+
+    Attributes:
+        breaking: what breaks clients of the older one: the change, with the operations that have it.
+        unknown: what could not be compared, likewise.
+        other: what does not break clients, likewise.
+    """
+
+    breaking: dict[str, list[str]]
+    unknown: dict[str, list[str]]
+    other: dict[str, list[str]]
+
+    @property
+    def headline(self) -> str:
+        """Return in a sentence how much breaks."""
+        number, unknown, rest = len(self.breaking), len(self.unknown), len(self.other)
+        parts = [f"{number or 'No'} {'change breaks' if number < 2 else 'changes break'} existing clients"]  # noqa: PLR2004 - plural
+        if unknown:
+            # Where something may break, nothing is said of "no change".
+            parts = [
+                *(parts if number else ()),
+                f"of {_changes(unknown)} it is not known whether existing clients break",
+            ]
+        parts += [_changes(rest).replace(" ", " other ")] if rest else []
+        text = "; ".join(parts)
+        return f"{text[0].upper()}{text[1:]}."
+
+    @property
+    def groups(self) -> Iterator[tuple[str, dict[str, list[str]]]]:
+        """Yield the groups with their headings, if there is something in them."""
+        for heading, found in (
+            ("Breaks existing clients", self.breaking),
+            ("Not known whether it breaks existing clients", self.unknown),
+            ("Other changes", self.other),
+        ):
+            if found:
+                yield heading, found
+
+
+def _changes(number: int) -> str:
+    return "1 change" if number == 1 else f"{number} changes"
+
+
+def description_changes(found: Iterable[tuple[bool | None, str, str]]) -> DescriptionChanges:
+    """Return changes by what they are; each is whether it breaks clients, the operation, and a text."""
+    groups: dict[bool | None, dict[str, list[str]]] = {True: {}, None: {}, False: {}}
+    for breaking, operation, text in found:
+        groups[breaking].setdefault(text, []).append(operation)
+    return DescriptionChanges(groups[True], groups[None], groups[False])
+
+
+def changes_text(found: DescriptionChanges) -> str:
+    """Return the changes as text for a terminal."""
+    lines = [found.headline]
+    for heading, changes in found.groups:
+        lines += ["", f"{heading} ({len(changes)}):"]
+        lines += [
+            f"  {on_a_line(_named(operations), 400)}: {on_a_line(text, 400)}" for text, operations in changes.items()
+        ]
+    return "\n".join(lines)
+
+
+def _named(operations: list[str]) -> str:
+    more = f" and {len(operations) - _NAMED} more" if len(operations) > _NAMED else ""
+    return ", ".join(operations[:_NAMED]) + more
+
+
+def changes_pages(found: DescriptionChanges, names: tuple[str, str], stem: str) -> dict[str, str]:
+    """Return the pages with the changes, by file name; ``names`` say where the descriptions are from."""
+    values: dict[str, Any] = {"found": found, "names": names, "shown": _SHOWN, "named": _NAMED}
+    return {
+        f"{stem}.html": html_page("description-changes.html.j2", **values),
+        f"{stem}.md": markdown_page("description-changes.md.j2", **values),
     }

@@ -1,14 +1,29 @@
-"""List all output formats by the name that `roaas report --format` takes, with their file names."""
+"""List all output formats by the name that `roaas report --format` takes, with their file names.
 
+Write a badge as JSON for shields.io's endpoint; the badge is green only if the robot is conformant.
+"""
+
+import json
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from reports.certificate.markdown import certificate_markdown
-from reports.formats.badge import badge
-from reports.formats.ctrf import ctrf
-from reports.formats.gitlab import annotations, gitlab
-from reports.formats.junit import junit
-from reports.formats.sarif import sarif
+from reports.certificate.page import certificate_markdown, verdict_words
+from reports.formats.junit import ctrf, junit
+from reports.formats.sarif import annotations, gitlab, sarif
+
+_COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive": "lightgrey"}
+
+
+def badge(result: Mapping[str, Any]) -> str:
+    """Return the JSON of a shields.io badge with the verdict of a valid `roaas-result/1` document."""
+    verdict, colour = verdict_words(result)[result["verdict"]].lower(), _COLOURS[result["verdict"]]
+    values = list(result["classes"].values())
+    text = result.get("verdict_line") or f"{verdict} ({values.count('pass')} of {len(values)} classes)"
+    if result.get("accepted_until"):
+        text, colour = f"{verdict}, known failures until {result['accepted_until']}", "orange"
+    if result.get("interrupted"):
+        text, colour = f"{verdict}, interrupted", "red" if result["verdict"] == "not-conformant" else "lightgrey"
+    return json.dumps({"schemaVersion": 1, "label": "RoAAS", "message": text, "color": colour}, indent=1) + "\n"
 
 
 class Format(NamedTuple):

@@ -11,14 +11,31 @@ Jenkins' xUnit plugin, without the extensions that other readers refuse.
 | failed | a failure |
 | error | an error |
 | skipped | skipped, with the reason |
+
+Write CTRF, the Common Test Report Format: one JSON format for the many tools that show test results.
+
+| outcome | becomes |
+|---|---|
+| passed, warning | `passed`; a warning has its message |
+| failed, error | `failed`: readers show `other` without a colour, and a case without a verdict must not look green |
+| accepted | `other` |
+| skipped | `skipped` |
+
+Write latency-junit.xml: a latency result in the format that most CI systems read.
+
+Its test cases are the run itself (whether its figures are valid), each limit of a service level, and the
+comparison with another robot. What is not known is an error, because it is neither a success nor a failure.
 """
 
-from collections.abc import Mapping, Sequence
+import datetime as dt
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from lxml import etree
 
-from reports.formats.cases import MESSAGE, Case, Outcome, cases
+from reports.formats.cases import MESSAGE, Case, Outcome, cases, places_of
 from reports.pages.untrusted import excerpt, visible
 
 _ELEMENTS = {Outcome.FAILED: "failure", Outcome.ERROR: "error", Outcome.ACCEPTED: "skipped", Outcome.SKIPPED: "skipped"}
@@ -89,3 +106,126 @@ def _element(suite: str, case: Case) -> etree._Element:
 
 def _count(found: Sequence[Case], element: str) -> str:
     return str(sum(_ELEMENTS.get(case.outcome) == element for case in found))
+
+
+_SPEC = "0.0.0"
+_STATUSES = {
+    Outcome.PASSED: "passed",
+    Outcome.WARNING: "passed",
+    Outcome.FAILED: "failed",
+    Outcome.ERROR: "failed",
+    Outcome.ACCEPTED: "other",
+    Outcome.SKIPPED: "skipped",
+}
+
+
+def ctrf(result: Mapping[str, Any]) -> str:
+    """Return a valid `roaas-result/1` document as a CTRF report (JSON text)."""
+    tests = [_test(result, case) for case in cases(result)]
+    statuses = [test["status"] for test in tests]
+    start = _milliseconds(result["started"])
+    counts = {name: statuses.count(name) for name in ("passed", "failed", "skipped", "pending", "other")}
+    report = {
+        "reportFormat": "CTRF",
+        "specVersion": _SPEC,
+        "generatedBy": "roaas",
+        "results": {
+            "tool": {"name": "RoAAS", "version": result["suite"]["version"]},
+            "summary": {
+                "tests": len(tests),
+                **counts,
+                "start": start,
+                "stop": _milliseconds(result["finished"]) if result["finished"] else start,
+            },
+            "tests": tests,
+            "environment": _environment(result),
+            "extra": {"verdict": result["verdict"], "seed": result["seed"], "effort": result["effort"]},
+        },
+    }
+    return json.dumps(report, indent=1) + "\n"
+
+
+def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
+    place = places_of(result, case)[0]
+    return {
+        "name": case.name,
+        "status": _STATUSES[case.outcome],
+        "rawStatus": case.outcome,
+        # The time of a single requirement is not measured.
+        "duration": 0,
+        "suite": [case.class_name or "roaas"],
+        "filePath": place.file,
+        "line": place.line,
+        **({"tags": [case.requirement["level"]]} if case.requirement else {}),
+        **({"message": excerpt(case.message, MESSAGE)} if case.message else {}),
+        **({"trace": visible(case.detail)} if case.message and case.detail else {}),
+    }
+
+
+def _environment(result: Mapping[str, Any]) -> dict[str, str]:
+    robot = result["statement"]["robot"]
+    named = {"appName": robot.get("name"), "appVersion": robot.get("version")}
+    return {key: excerpt(value, 200) for key, value in named.items() if value}
+
+
+def _milliseconds(time: str) -> int:
+    return round(dt.datetime.fromisoformat(time).timestamp() * 1000)
+
+
+_GOOD = {"kept", "not slower", "valid"}
+_FAILED = {"broken", "slower"}
+_MESSAGE = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """One test case: its group, its name, its outcome in a word, and the reason."""
+
+    group: str
+    name: str
+    outcome: str
+    reason: str
+
+    @property
+    def element(self) -> str | None:
+        """Return the element of a case that did not pass, or None."""
+        if self.outcome in _GOOD:
+            return None
+        return "failure" if self.outcome in _FAILED else "error"
+
+
+def latency_junit(result: Mapping[str, Any]) -> str:
+    """Return a valid `roaas-latency/1` document as JUnit XML text with an XML declaration (UTF-8)."""
+    cases = list(_cases(result))
+    counts = {kind: str(sum(case.element == kind for case in cases)) for kind in ("failure", "error")}
+    robot = result["environment"].get("robot") or {}
+    name = excerpt(f"RoAAS latency: {robot.get('name') or robot.get('rest') or robot.get('soap') or 'robot'}", 200)
+    totals = {"tests": str(len(cases)), "failures": counts["failure"], "errors": counts["error"]}
+    root = etree.Element("testsuites", {"name": name, **totals})
+    suite = etree.SubElement(root, "testsuite", {"name": "latency", **totals})
+    if result.get("started"):
+        suite.set("timestamp", result["started"][:19])
+    for case in cases:
+        element = etree.SubElement(
+            suite, "testcase", classname=f"roaas.{case.group}", name=excerpt(case.name, 300), time="0"
+        )
+        message = excerpt(case.reason, _MESSAGE)
+        if case.element:
+            etree.SubElement(element, case.element, message=message, type=case.outcome.replace(" ", "-"))
+        else:
+            etree.SubElement(element, "system-out").text = message
+    etree.indent(root)
+    document: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8")
+    return document.decode()
+
+
+def _cases(result: Mapping[str, Any]) -> Iterator[_Case]:
+    sentence = result["headline"]["sentence"]
+    if "stop_undelivered" in result:
+        yield _Case("run", "the robot was stopped", "may still move", result["stop_undelivered"])
+    yield _Case("run", "the figures are valid", "valid" if result["valid"] else "not valid", sentence)
+    for level in result.get("slo", []):
+        name = f"{level['operation']} over {level['interface'].upper()}: {level['limit']} at most {level['most']:g}"
+        yield _Case("slo", name, level["outcome"], level["reason"])
+    if result.get("against"):
+        yield _Case("against", "not slower than the other robot", result["against"]["verdict"], sentence)

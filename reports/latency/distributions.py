@@ -16,8 +16,7 @@ from hdrh.codec import HdrCookieException, HdrLengthException
 from hdrh.histogram import HdrHistogram
 from numpy.typing import NDArray
 
-from reports.errors import ResultInvalidError
-from reports.given_files import unzipped
+from reports.given_files import ResultInvalidError, unzipped
 from reports.pages.untrusted import excerpt
 
 Floats = NDArray[np.float64]

@@ -7,12 +7,10 @@ from typing import Any
 from reports.latency import against
 from reports.latency.distributions import AllSeries, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
-from reports.latency.figures.heat import blocks, heat
 from reports.latency.figures.load import load
-from reports.latency.figures.ratios import Ratio, ratios
-from reports.latency.figures.spans import SPANS, means, spans
+from reports.latency.figures.ratios import SPANS, Ratio, means, ratios, spans
 from reports.latency.figures.spectrum import spectrum
-from reports.latency.figures.timeline import timeline
+from reports.latency.figures.timeline import blocks, heat, timeline
 from reports.latency.findings import PAPER, remarks, verdict
 from reports.latency.noticed import noticed
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share

@@ -5,7 +5,7 @@ import json
 import pytest
 from jsonschema import Draft202012Validator
 
-from reports.errors import (
+from reports.given_files import (
     ResultFormatError,
     ResultGarbledError,
     ResultInvalidError,

@@ -7,10 +7,8 @@ from collections.abc import Awaitable, Callable, Coroutine
 from functools import partial
 from typing import Any, Final
 
-from reference_robot.webservices.http.admission import SAFE, Admission
-from reference_robot.webservices.http.authorization import Scope
-from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.http.negotiation import problem_format
+from reference_robot.webservices.http.authorization import SAFE, Admission, Scope
+from reference_robot.webservices.http.messages import Request, Response, content, problem_format
 from reference_robot.webservices.representation.problems import Problem
 
 _LOGGER: Final = logging.getLogger(__name__)

@@ -1,17 +1,18 @@
 """TLS: the server's certificate, and the handshakes of new connections."""
 
-import asyncio
 import contextlib
 import socket
 import ssl
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from conformance.commandline.secret_file import warn_if_shared
 from reference_robot.webservices.http.connection import HttpConnection
-from reference_robot.webservices.http.crowd import NEVER
-from reference_robot.webservices.http.port import Port
+from reference_robot.webservices.http.port import NEVER, Port
+
+if TYPE_CHECKING:
+    import asyncio
 
 _SHUTDOWN: Final = 2.0  # seconds for the client's close_notify
 

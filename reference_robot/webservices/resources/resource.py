@@ -3,8 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
-from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.http.negotiation import chosen
+from reference_robot.webservices.http.messages import Request, Response, chosen, content
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record
 from reference_robot.webservices.representation.writing import JSON, TEXT, XML, write_json, write_text, write_xml

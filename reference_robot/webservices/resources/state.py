@@ -1,15 +1,37 @@
-"""What the robot does and has: velocity, which clients command; pose, from its odometry; and lists of the ROS graph."""
+"""What the robot does and has: velocity, which clients command; pose, from its odometry; and lists of the ROS graph.
 
+/robot/navigation/: the active goal, which clients read, send and cancel; and a path to a pose in the query.
+The delivery application's resources: the paper's PUT request, and the list of accepted deliveries.
+"""
+
+import math
+import re
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Any, Final
+from urllib.parse import unquote_to_bytes
 
 from geometry_msgs.msg import Twist, Vector3
 
+from conformance.papers_robot.delivery import PATH_NAMES
+from reference_robot.deliveries import DeliveryRequest
+from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.messages import Request, Response
+from reference_robot.webservices.representation.problems import Problem, shown
+from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.representation.shapes import shape_of
-from reference_robot.webservices.resources.resource import FORMATS, Resource, represented, sent, wanted_format
+from reference_robot.webservices.resources.resource import (
+    FORMATS,
+    NO_CONTENT,
+    Resource,
+    represented,
+    sent,
+    wanted_format,
+)
+from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
+from reference_robot.webservices.robot.goals import GOAL, Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
+from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 
@@ -80,3 +102,149 @@ class GraphList(Resource):
     def get(self, request: Request) -> Response:
         """Return the list in the format that the client prefers."""
         return represented(self._entries(), self._root, wanted_format(request))
+
+
+_CREATED: Final = 201
+
+
+class Goal(Resource):
+    """The active goal as a move_base_msgs/MoveBaseActionGoal, with a status that the robot adds."""
+
+    path = "/robot/navigation/action/goal/"
+
+    def __init__(self, goals: Goals, address: Address) -> None:
+        self._goals = goals
+        self._location = address.location(self.path)
+
+    def get(self, request: Request) -> Response:
+        """Return the active goal; raise the Problem 404 if there is none."""
+        media_type = wanted_format(request)
+        return represented(self._goals.followed(), GOAL.name, media_type)
+
+    async def put(self, request: Request) -> Response:
+        """Send a goal to the navigation; return 201 for a new goal, 202 if it displaces another, 200 for a repeat."""
+        media_type = wanted_format(request)
+        status, goal = await self._goals.send(sent(request, GOAL))
+        location = ((b"location", self._location),) if status == _CREATED else ()
+        return represented(goal, GOAL.name, media_type, status, location)
+
+    async def delete(self, _request: Request) -> Response:
+        """Cancel the active goal and return 204; raise the Problem 404 if there is none."""
+        await self._goals.cancel()
+        return NO_CONTENT
+
+
+_NUMBER: Final = re.compile(NUMBER)
+_REQUIRED: Final = ("x", "y")
+_NUMBERS: Final = (*_REQUIRED, "yaw", "tolerance", "start_x", "start_y", "start_yaw")
+
+
+class Plan(Resource):
+    """The resource that returns a nav_msgs/GetPlan response for the pose in the query string."""
+
+    path = "/robot/navigation/service/plan"
+
+    def __init__(self, planner: Planner) -> None:
+        self._planner = planner
+
+    async def get(self, request: Request) -> Response:
+        """Return a plan; raise the Problem 422 if no path leads to the pose."""
+        media_type = wanted_format(request)
+        return represented(await self._planner.plan(_query(request.query)), "GetPlan", media_type)
+
+
+def _query(raw: bytes) -> PlanQuery:
+    """Return the plan query from a raw query string; unknown parameters are ignored.
+
+    A plus sign is not decoded as a space, because no parameter can contain a space.
+
+    Raises:
+        Problem: 400 for a repeated parameter, 422 for a missing parameter or a number that is invalid or not finite.
+    """
+    found: dict[str, str] = {}
+    for part in raw.split(b"&"):
+        name, _, value = (unquote_to_bytes(side).decode("utf-8", "replace") for side in part.partition(b"="))
+        if name in found:
+            raise Problem(400, f"the parameter {shown(name)} occurs more than once")
+        found[name] = value
+    given: dict[str, Any] = {name: _number(name, found[name]) for name in _NUMBERS if name in found}
+    for name in _REQUIRED:
+        if name not in given:
+            raise Problem(422, f"missing parameter {name}")
+    if "frame_id" in found:
+        given["frame_id"] = found["frame_id"]
+    return PlanQuery(**given)
+
+
+def _number(name: str, text: str) -> float:
+    number = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(number):
+        raise Problem(422, f"the parameter {name} must be a finite number, not {shown(text)}")
+    return number
+
+
+# The path template's names of the values, in the order of the message's fields.
+_NAMES: Final = ("code", *PATH_NAMES)
+_PREFIX: Final = "/robot/app/delivery/"
+_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode())
+_WELL_FORMED: Final = re.compile(
+    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in PATH_NAMES)).encode()
+)
+_CODE: Final = re.compile(rb"[+-]?[0-9]{1,40}")
+_NUMBER_OF_DELIVERY: Final = re.compile(NUMBER.encode())
+
+
+class Delivery(Resource):
+    """The resource whose PUT publishes one DeliveryRequestMsg; its path contains the message's values."""
+
+    path = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
+
+    def __init__(self, deliveries: Deliveries) -> None:
+        self._deliveries = deliveries
+
+    @staticmethod
+    def owns(path: bytes) -> bool:
+        """Return whether a raw URL path has the form of a delivery path, whatever its values."""
+        return _ANY.fullmatch(path) is not None
+
+    def put(self, request: Request) -> Response:
+        """Publish a delivery and return 204; raise the Problem 422 for an unknown code or an invalid number."""
+        match = _WELL_FORMED.fullmatch(request.path)
+        sent = _spelled_out(request.path) if match is None else match.groups()
+        try:
+            self._deliveries.accept(DeliveryRequest(int(sent[0]), *map(float, sent[1:])), "rest")
+        except UnusableFieldError as error:
+            place = DeliveryRequest._fields.index(error.field)
+            raise error.refusal(_NAMES[place], _text(sent[place])) from error
+        return NO_CONTENT
+
+
+class DeliveryList(Resource):
+    """The resource that lists the latest accepted deliveries with their states: an extension of the contract."""
+
+    path = _PREFIX
+
+    def __init__(self, deliveries: Deliveries) -> None:
+        self._deliveries = deliveries
+
+    def get(self, request: Request) -> Response:
+        """Return the list of deliveries, newest first."""
+        return represented(self._deliveries.listed(), "Deliveries", wanted_format(request))
+
+
+def _spelled_out(path: bytes) -> tuple[bytes, ...]:
+    """Return the percent-decoded values of a delivery path; raise the Problem 422 that names an invalid value."""
+    match = _ANY.fullmatch(path)
+    if match is None:
+        raise Problem(404, "there is no resource at this delivery path")
+    code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
+    if not _CODE.fullmatch(code):
+        raise Problem(422, f"code must be an integer, not {shown(_text(code))}")
+    for name, value in zip(PATH_NAMES, coordinates, strict=True):
+        if not _NUMBER_OF_DELIVERY.fullmatch(value):
+            raise Problem(422, f"{name} must be a number, not {shown(_text(value))}")
+    return values
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", "replace")

@@ -15,7 +15,7 @@ from observer import Observer, pose, until
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
 from reference_robot.simulation.delivery import Delivery, DeliveryRequests
-from reference_robot.simulation.localisation import Localisation
+from reference_robot.simulation.messages import Localisation
 from reference_robot.simulation.navigation import Navigation
 from reference_robot.simulation.office import DEPOT, OFFICE, SOURCE
 from reference_robot.simulation.planner import Planner

@@ -9,8 +9,7 @@ from contextlib import asynccontextmanager
 import uvloop
 
 from reference_robot.webservices.endpoint import bound
-from reference_robot.webservices.http.admission import Admission
-from reference_robot.webservices.http.authorization import Authorization
+from reference_robot.webservices.http.authorization import Admission, Authorization
 from reference_robot.webservices.http.hosts import AllowedHosts
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import content

@@ -7,9 +7,8 @@ import pytest
 from lxml import html
 
 from reports.certificate.described import described
-from reports.certificate.markdown import certificate_markdown
-from reports.certificate.page import Seal, certificate_html, certificate_print
-from reports.formats.badge import badge
+from reports.certificate.page import Seal, certificate_html, certificate_markdown, certificate_print
+from reports.formats.catalogue import badge
 
 
 def shown(page):

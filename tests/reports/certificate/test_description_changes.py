@@ -5,8 +5,8 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from reports.certificate.description_changes import changes_pages, changes_text, description_changes
-from reports.cli.difference import diff
+from reports.certificate.difference_page import changes_pages, changes_text, description_changes
+from reports.cli.pages import diff
 
 GONE = (True, "GET /a", "status 404 is gone")
 UNKNOWN = (None, "GET /a", "not compared: xml")

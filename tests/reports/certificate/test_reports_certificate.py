@@ -5,8 +5,7 @@ import re
 import pytest
 from lxml import html
 
-from reports.certificate.markdown import certificate_markdown
-from reports.certificate.page import SHOWN_BODY, certificate, certificate_html
+from reports.certificate.page import SHOWN_BODY, certificate, certificate_html, certificate_markdown
 
 
 def page(result):

@@ -5,7 +5,7 @@ import copy
 import pytest
 from lxml import etree, html
 
-from reports.latency.junit import latency_junit
+from reports.formats.junit import latency_junit
 from reports.latency.noticed import noticed
 from reports.latency.page import latency_html, latency_markdown
 

@@ -8,10 +8,10 @@ import pytest
 from hdrh.histogram import HdrHistogram
 from lxml import html
 
-from reports.errors import ResultInvalidError
+from reports.given_files import ResultInvalidError
 from reports.latency.distributions import all_series
 from reports.latency.figures.load import load
-from reports.latency.figures.spans import spans
+from reports.latency.figures.ratios import spans
 from reports.latency.figures.timeline import stalls, timeline
 from reports.latency.findings import remarks, verdict
 from reports.latency.page import latency_html, latency_markdown
