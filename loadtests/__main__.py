@@ -20,7 +20,7 @@ def main() -> int:
     make_streams_lenient()
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends it without a traceback
     try:
-        from loadtests.engine.carrying_out import carry_out  # noqa: PLC0415 -- it takes a second: Ctrl-C has to work meanwhile
+        from loadtests.engine.run import carry_out  # noqa: PLC0415 -- it takes a second: Ctrl-C has to work meanwhile
         from loadtests.settings.settings import Settings  # noqa: PLC0415 -- as above
 
         _raise_file_limit()

@@ -6,12 +6,10 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
-from types import FrameType
 from typing import IO, TYPE_CHECKING, Any, Self
 
 import click
@@ -30,8 +28,7 @@ from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 from loadtests.described.device import DESCRIBED_ONLY, Named
 from loadtests.result.files import FOLDER, BaselineError, folder_of, newest, stops_lines, store, with_unstopped
-from loadtests.settings.cli_options import KNEE_SEARCHES, SHARE, STAGES, CliOptions
-from loadtests.settings.settings import STEP_S, Settings, SettingsError
+from loadtests.settings.settings import KNEE_SEARCHES, SHARE, STAGES, STEP_S, CliOptions, Settings, SettingsError
 from loadtests.settings.settle import (
     AGAINST_LOOKS,
     DEFAULT_AGAINST_S,
@@ -42,6 +39,9 @@ from loadtests.settings.settle import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from types import FrameType
+
     from loadtests.described.operators import Stopping
     from loadtests.described.run import Described
 

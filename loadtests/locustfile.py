@@ -20,8 +20,7 @@ from loadtests.clients.library import read_document
 from loadtests.clients.payloads import CATALOGUE, VARIANTS
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import with_addresses
-from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.settings import Settings, SettingsError
+from loadtests.settings.settings import CliOptions, Settings, SettingsError
 from loadtests.settings.settle import settle
 
 OPERATIONS = tuple(CATALOGUE)

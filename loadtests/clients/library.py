@@ -3,11 +3,14 @@
 SOAP goes through zeep: one Document (the parsed WSDL) for each process, because it takes milliseconds to build, and one
 transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests sent: two
 requests for one call are a silent retry, which makes a run invalid.
+Responses of the library clients, up to a size: `requests` has no limit for lines, bodies and what they unpack to.
 """
 
+import io
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from http.client import HTTPResponse
+from typing import Any, Final
 
 import requests
 import zeep
@@ -15,12 +18,83 @@ from requests.adapters import HTTPAdapter
 from zeep.transports import Transport
 from zeep.wsdl import Document
 
-from loadtests.clients.bounded import TOO_LONG, BoundedResponse, StayingSession
 from loadtests.clients.failures import CallError, connect_error, require_good
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE, Values, rest_path
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import loader
+
+# A longer response is no response to any operation, packed or unpacked; more cookies are a flood.
+_MOST: Final = 16 * 1024 * 1024
+_COOKIES: Final = 100
+_PIECE: Final = 65_536
+#: Begins the message of each error that a longer response raises.
+TOO_LONG: Final = f"the response is longer than {_MOST} bytes"
+
+
+class _Limited(io.RawIOBase):
+    """What a server sends for one response, as long as it is within the limit."""
+
+    def __init__(self, whole: Any) -> None:
+        self._raw = whole.detach()
+        self._left = _MOST
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Read as a socket does.
+
+        Raises:
+            OSError: the response is too long.
+        """
+        count = int(self._raw.readinto(buffer) or 0)
+        self._left -= count
+        if self._left < 0:
+            raise OSError(TOO_LONG)
+        return count
+
+    def close(self) -> None:
+        super().close()
+        self._raw.close()
+
+
+class BoundedResponse(HTTPResponse):
+    """A response of the standard library of which only so much is read, lines of headers and chunks included."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.fp: Any = io.BufferedReader(_Limited(self.fp))
+
+
+class StayingSession(requests.Session):
+    """A session that follows no redirect, which would measure another server, and reads no endless response."""
+
+    def get_redirect_target(self, resp: requests.Response) -> str | None:
+        """Return None: there is no redirect to follow."""
+        del resp
+        return None
+
+    def send(self, request: requests.PreparedRequest, **kwargs: Any) -> requests.Response:
+        """Send a request, and read its response up to the limit: a small one may unpack to any size.
+
+        Raises:
+            requests.RequestException: there is no response, or it is too long.
+        """
+        response = super().send(request, **{**kwargs, "stream": True})
+        pieces: list[bytes] = []
+        size = 0
+        for piece in response.iter_content(_PIECE):
+            pieces.append(piece)
+            size += len(piece)
+            if size > _MOST:
+                response.close()
+                raise requests.exceptions.ContentDecodingError(TOO_LONG)
+        # As the property `content` does it.
+        response._content, response._content_consumed = b"".join(pieces), True  # noqa: SLF001
+        if len(self.cookies) > _COOKIES:
+            self.cookies.clear()
+        return response
 
 
 @dataclass(slots=True)

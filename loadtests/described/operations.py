@@ -13,8 +13,7 @@ from conformance.documents.openapi import Operation, operations_of
 from conformance.statement.load import ServiceLevel
 from loadtests.clients.robot import Described, Robot
 from loadtests.described.device import Device
-from loadtests.described.messages import at_hand
-from loadtests.described.requests import declared_good, robot_at
+from loadtests.described.requests import at_hand, declared_good, robot_at
 from loadtests.settings.settings import Scenario, SettingsError
 from loadtests.statistics.recorder import MOST_OPERATIONS
 

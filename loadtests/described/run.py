@@ -17,8 +17,7 @@ from loadtests.described.operators import Stopping, stops_beside
 from loadtests.described.pairs import Choice, streams_to_hear
 from loadtests.result.files import with_operators
 from loadtests.schedule.plan import step_operation
-from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.settings import Selection, Settings, SettingsError, Target
+from loadtests.settings.settings import CliOptions, Selection, Settings, SettingsError, Target
 from loadtests.settings.settle import settle
 
 _PAPERS_ONLY = (

@@ -1,17 +1,29 @@
-"""One run, from the first call to the written result."""
+"""One run, from the first call to the written result.
 
-from contextlib import ExitStack
+Carry out one run and write its result, also where the run fails or the process is killed.
+"""
+
+import logging
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from conformance.commandline.endings import Started
+import gevent
+import locust  # patches the standard library, which has to come before our modules that use it
+
+from conformance.commandline.endings import Started, ending_signals
 from conformance.commandline.exit_codes import ExitCode
+from conformance.commandline.result_command import CommandResult
 from conformance.documents.wsdl import WsdlError
 from loadtests.clients.failures import CallError
-from loadtests.clients.robot import Robot
 from loadtests.clients.wsdl import with_addresses
 from loadtests.engine.planning import duel_plan, until_decided
-from loadtests.engine.watching import Progress, Watch, show_web_ui, tell_plan
+from loadtests.engine.watching import Progress, Watch, follow_parent, show_web_ui, tell_plan
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
@@ -20,9 +32,15 @@ from loadtests.measuring.preflight import preflight, reach
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess, start_anew
 from loadtests.measuring.streams import hear
+from loadtests.result.document import compose
+from loadtests.result.files import write
 from loadtests.result.outcome import Carried, Outcome, RunAborted
+from loadtests.result.terminal import summary
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
+
+if TYPE_CHECKING:
+    from loadtests.clients.robot import Robot
 
 
 class Run:
@@ -220,3 +238,59 @@ class Run:
         ceiling = self.settings.limits.max_rate if not plan.open_model else None
         executor.run(plan, ceiling, lambda elapsed: self._watch.look(carried, executor.recorder, elapsed))
         self.outcome.cpu_share = max(busiest(executor.members) or 0.0, self.outcome.cpu_share or 0.0)
+
+
+def _begin(run: Run) -> Path | None:
+    """Write a result that remains if this process is killed; return its path, or None if it cannot be written."""
+    unfinished = RunAborted(ExitCode.INCONCLUSIVE, "the run has not ended: it is under way, or it was killed")
+    _, document = compose(run.outcome, run.plan, unfinished)
+    with suppress(OSError):  # told in the end
+        return write(Path(run.settings.output.folder), document | {"interrupted": True})
+    return None
+
+
+def _complain(run: Run, message: str) -> None:
+    """Say what went wrong, also where progress is not wanted."""
+    run.progress.end()
+    sys.stderr.write(f"roaas load: {message}\n")
+    sys.stderr.flush()
+
+
+def carry_out(settings: Settings, begun: Callable[[Path], object] = lambda _: None) -> CommandResult:
+    """Carry out a run and write its result; `begun` gets the path of the result that is there before the run ends."""
+    logging.getLogger(locust.__name__).setLevel(logging.ERROR)  # it warns of fast spawning, which we want
+    run = Run(settings)
+    for number in ending_signals():
+        gevent.signal_handler(number, run.interrupt)
+    gevent.spawn(follow_parent, run.interrupt)
+    aborted: RunAborted | None = None
+    early: Path | None = None
+    try:
+        run.resolve()
+        if (early := _begin(run)) is not None:
+            begun(early)
+        run.check()
+        run.measure()
+    except RunAborted as reason:
+        aborted = reason
+        _complain(run, str(aborted))
+    except Exception as trouble:  # noqa: BLE001 -- our own fault: what was measured is kept, and called invalid
+        traceback.print_exc()
+        aborted = RunAborted(ExitCode.INCONCLUSIVE, f"the load generator failed: {type(trouble).__name__}: {trouble}")
+    run.progress.end()
+    run.name_called()
+    code, document = compose(run.outcome, run.plan, aborted)
+    path, folder = None, Path(settings.output.folder)
+    if aborted is not None and aborted.code == ExitCode.USAGE:
+        if early is not None:
+            early.unlink()
+    else:
+        try:
+            run.progress.say(f"written: {(path := write(folder, document))}")
+        except OSError as error:  # what was measured is printed below
+            code = ExitCode.INCONCLUSIVE
+            _complain(run, f"{folder}: cannot write there: {error.strerror or error}")
+    if aborted is None:
+        sys.stdout.write(summary(document))
+        sys.stdout.flush()
+    return CommandResult(code, path)

@@ -9,8 +9,7 @@ from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.executor import busiest
 from loadtests.schedule.plan import BOTH, Plan, step_operation
 from loadtests.settings.settings import Settings
-from loadtests.statistics.knee import knee_search, search_again
-from loadtests.statistics.steps import Criterion, Step, step_result
+from loadtests.statistics.knee import Criterion, Step, knee_search, search_again, step_result
 
 _LOWEST_RATE, _HIGHEST_RATE = 50.0, 50_000.0
 _MOST_S = 600.0  # for all searches together

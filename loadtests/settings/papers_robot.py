@@ -13,8 +13,7 @@ from loadtests.clients.endpoint import Endpoint, EndpointError, tls_context
 from loadtests.clients.payloads import CATALOGUE, CLIENTS, INTERFACES, MOVES
 from loadtests.clients.robot import Robot
 from loadtests.clients.rosbridge import bridge_endpoint
-from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.settings import Selection, SettingsError, Target
+from loadtests.settings.settings import CliOptions, Selection, SettingsError, Target
 
 
 def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:

@@ -7,9 +7,8 @@ from typing import Any, Self
 
 from conformance.papers_robot.statement import RobotStatement
 from loadtests.schedule.plan import Load
-from loadtests.settings.cli_options import CliOptions
 from loadtests.settings.papers_robot import papers_robot
-from loadtests.settings.settings import Against, Limits, Output, Settings, SettingsError, Steps, Target
+from loadtests.settings.settings import Against, CliOptions, Limits, Output, Settings, SettingsError, Steps, Target
 
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000

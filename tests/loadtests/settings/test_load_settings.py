@@ -10,8 +10,7 @@ from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.load import Load
 from loadtests.cli import load
-from loadtests.settings.cli_options import CliOptions
-from loadtests.settings.settings import Settings, SettingsError
+from loadtests.settings.settings import CliOptions, Settings, SettingsError
 from loadtests.settings.settle import MOTION_RATE, settle
 
 REST = {"rest": "http://robot:7003"}

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from loadtests.statistics.knee import RESOLUTION, knee_search, search_again
-from loadtests.statistics.steps import Step
+from loadtests.statistics.knee import RESOLUTION, Step, knee_search, search_again
 
 
 def robot(knee, tried=None):
