@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from conformance.contract.pack import Contract
-    from proof.mutation.mutant import Mutant
     from proof.mutation.self_test import GoodDevice, SelfTest
-    from proof.selftest.against import Table
+    from proof.mutation.table import Mutant
+    from proof.selftest.comparison import Table
     from proof.selftest.report import Report
 
 # How many mutants `--short` judges where the pack does not name them.
@@ -141,7 +141,7 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
     Raises:
         click.UsageError: a file cannot be read.
     """
-    from proof.selftest.against import read  # noqa: PLC0415 - see _by_hand()
+    from proof.selftest.comparison import read  # noqa: PLC0415 - see _by_hand()
 
     try:
         return read(paths)
@@ -151,7 +151,7 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
 
 def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Path]) -> bool:
     """Print what is worse in later results than in earlier ones; return whether anything is."""
-    from proof.selftest.against import lost  # noqa: PLC0415 - see _by_hand()
+    from proof.selftest.comparison import lost  # noqa: PLC0415 - see _by_hand()
 
     said = lost(before, _read(results), contract.renamed)
     click.echo("\n".join([*map(inert, said), f"{len(said)} differences to the worse" if said else "nothing is worse"]))
@@ -210,7 +210,7 @@ def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
 
 def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]) -> None:
     """Judge generated mutants of the device that starts fastest; compare with Schemathesis only if requested."""
-    from proof.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
+    from proof.cli.selftest_api import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
     from proof.mutation.self_test import self_test_of  # noqa: PLC0415 - see _by_hand()
     from proof.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
 

@@ -10,7 +10,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from proof.mutation.mutant import Mutant
+    from proof.mutation.table import Mutant
     from proof.selftest.comparison import Comparison, Settings, Tool, ToolResult
     from proof.selftest.controls import ControlResult
     from proof.selftest.generated.judging import GeneratedResult

@@ -11,6 +11,7 @@ A row ends with an operator that makes the change, or decorates the change if th
     class _Lingering: ...
 
 Rows whose change is made of words alone are data: see read_rows().
+A mutant: a good device with one change between it and its clients, and the requirements that must kill it.
 """
 
 from __future__ import annotations
@@ -18,14 +19,51 @@ from __future__ import annotations
 import ast
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from pathlib import Path
+from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from proof.mutation.changes import Make, When, Where, altered, instead, rewritten, success, values
-from proof.mutation.messages import Request, Response
-from proof.mutation.mutant import Mutant
 from proof.mutation.xml_trees import tree
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from proof.mutation.messages import Change, IncompleteRequest, Request, Response
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One mutant.
+
+    Attributes:
+        name: its unique name.
+        says: a sentence that says what is wrong with the device.
+        catches: ids of the requirements of which each must fail (MUST) or warn (SHOULD).
+        interface: "rest", "soap" or "both".
+        make: returns a new instance of the change, for one run.
+        incomplete_request: returns what handles requests that clients never complete, or None.
+        probe: whether only a ROS probe can observe the fault.
+        observer: whether only a ROS probe, or a device that shows what reached it, can observe the fault.
+        token: the bearer token that the device requires, or an empty text.
+        serial: whether the device reads the next request only after the previous one is complete.
+        backwards: whether the device answers the second of two pipelined requests first.
+        forgetful: whether the device answers only the first of pipelined requests.
+    """
+
+    name: str
+    says: str
+    catches: tuple[str, ...]
+    interface: str
+    make: Callable[[], Change]
+    incomplete_request: Callable[[], IncompleteRequest] | None = None
+    probe: bool = False
+    observer: bool = False
+    token: str = ""
+    serial: bool = False
+    backwards: bool = False
+    forgetful: bool = False
+
 
 _Decorated = TypeVar("_Decorated", bound=Callable[..., Any])
 

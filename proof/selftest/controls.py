@@ -9,8 +9,7 @@ from pathlib import Path
 
 from conformance.contract.pack import Contract
 from conformance.verdict.verdicts import NOT_SEEN
-from proof.mutation.programs import NotInstalledError
-from proof.mutation.self_test import GoodDevice, self_test_of
+from proof.mutation.self_test import GoodDevice, NotInstalledError, self_test_of
 from proof.selftest.at_once import each_at_once
 from proof.selftest.certifying import Outcome, job_at, run_job
 from proof.selftest.link import linked

@@ -8,8 +8,8 @@ from conformance.contract.generic import generic_ledger
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.collected_checks import checks_of
-from proof.mutation.mutant import Mutant
 from proof.mutation.self_test import self_test_of
+from proof.mutation.table import Mutant
 from proof.selftest.generated.report import page_part
 
 _TITLE = "# Coverage: requirement, source, check, mutants"

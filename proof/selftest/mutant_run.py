@@ -10,8 +10,8 @@ from typing import Any, Self
 from conformance.contract.ledger import classes_of
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Change, unchanged
-from proof.mutation.mutant import Mutant
 from proof.mutation.self_test import GoodDevice
+from proof.mutation.table import Mutant
 from proof.selftest.at_once import each_at_once
 from proof.selftest.certifying import Job, Outcome, job_at, run_job
 from proof.selftest.proxy import Proxy

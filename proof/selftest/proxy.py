@@ -10,8 +10,7 @@ from urllib.parse import urlsplit
 
 from proof.mutation.messages import Change, Forward, HangUpError, IncompleteRequest, Request, Response, unchanged
 from proof.mutation.wire import ClientConnection, IncompleteMessageError, RobotConnection
-from proof.selftest.addresses import Addresses
-from proof.selftest.robots import Robot
+from proof.selftest.robots import Addresses, Robot
 
 _IDLE_S = 60.0
 

@@ -9,7 +9,7 @@ from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.verdict.finding import counted
 from proof.selftest.comparison import Comparison
 from proof.selftest.controls import ControlResult
-from proof.selftest.generated import api_report
+from proof.selftest.generated import report
 from proof.selftest.generated import report as by_rule
 from proof.selftest.generated.judging import KILLED, NOT_REACHED, GeneratedResult
 from proof.selftest.mutant_run import MutantResult
@@ -140,7 +140,7 @@ class Report:
     def matrix(self) -> str:
         """Return Markdown tables: each mutant with the requirements that killed it; rates of generated mutants."""
         if self.blamed is not None:
-            return api_report.page(self.target, self.generated_results, self.blamed, self.compared, self.notes)
+            return report.page(self.target, self.generated_results, self.blamed, self.compared, self.notes)
         if self.generated_results:
             theirs = {seen.mutant: seen.killed for one in self.compared for seen in one.results}
             pack = "" if self.contract.name == DEFAULT_PACK else f" --contract {self.contract.name}"
@@ -202,7 +202,7 @@ class Report:
         if self.blamed is not None:
             alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
             lines.append(f"False alarms on the unchanged device: {alarms}")
-            only = api_report.only_theirs(self.generated_results, self.compared)
+            only = report.only_theirs(self.generated_results, self.compared)
             lines += [f"KILLED BY {one}" for one in only]
         for other in self.compared:
             ours = {result.mutant.name for result in self.tried if not result.survived}

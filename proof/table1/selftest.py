@@ -15,8 +15,16 @@ from conformance.papers_robot.statement import CONTRACT_DIR
 from proof.mutation.changes import inputs, parsed, plain, problem, rest, soap
 from proof.mutation.fields import without
 from proof.mutation.messages import Forward, Request, Response
-from proof.mutation.programs import built, check_installed, program
-from proof.mutation.self_test import GoodDevice, HarmlessChange, OpenPlace, SelfTest, Start
+from proof.mutation.self_test import (
+    GoodDevice,
+    HarmlessChange,
+    OpenPlace,
+    SelfTest,
+    Start,
+    built,
+    check_installed,
+    program,
+)
 from proof.mutation.wire import IncompleteMessageError
 from proof.table1.faulty_bodies import STATEMENTS
 from proof.table1.mutants import MUTANTS

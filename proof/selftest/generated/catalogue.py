@@ -6,7 +6,7 @@ from functools import cache
 
 from conformance.contract.pack import Contract
 from proof.mutation.self_test import OpenPlace, self_test_of
-from proof.selftest.generated import bodies, heads, lenience
+from proof.selftest.generated import heads, lenience
 from proof.selftest.generated.described import described_mutants
 from proof.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
 from proof.selftest.generated.operators import NUMERIC, OPERATORS, Operator
@@ -14,7 +14,7 @@ from proof.selftest.generated.places import Exchange, Place, exchanges, places
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
 # What happens to whole answers now and then.
-_WHOLE = {"crossed": bodies.crossed, "failing": bodies.failing, "cut": bodies.cut}
+_WHOLE = {"crossed": heads.crossed, "failing": heads.failing, "cut": heads.cut}
 
 
 @cache
@@ -79,7 +79,7 @@ def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
     for exchange in exchanges(contract):
         yield from heads.of_statuses(exchange)
         yield from heads.of_headers(exchange)
-        yield from bodies.of_bodies(exchange, numbers=exchange.name in numeric)
+        yield from heads.of_bodies(exchange, numbers=exchange.name in numeric)
         for what, make in _WHOLE.items():
             if what == "cut" and not exchange.formats:
                 continue
@@ -87,7 +87,7 @@ def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
                 yield _whole(exchange, what, mode, when, make)
 
 
-def _whole(exchange: Exchange, what: str, mode: str, when: str, make: bodies.Whole) -> GeneratedMutant:
+def _whole(exchange: Exchange, what: str, mode: str, when: str, make: heads.Whole) -> GeneratedMutant:
     name = f"{what}@{mode}" if mode else what
     return GeneratedMutant(
         f"{name}:{exchange.name}:answer",

@@ -12,16 +12,10 @@ from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, operations_of
 from proof.mutation.messages import Change, Request, Response
 from proof.selftest.generated import described_failures as failures
-from proof.selftest.generated import (
-    described_http,
-    described_lists,
-    described_promises,
-    described_requests,
-    described_things,
-)
-from proof.selftest.generated.bodies import BODIES, crossed
+from proof.selftest.generated import described_http, described_lists, described_promises, described_requests
 from proof.selftest.generated.breaches import breaks, undeclared_status, undeclared_type
-from proof.selftest.generated.described_fields import FIELD_OPERATORS
+from proof.selftest.generated.described_inputs import FIELD_OPERATORS
+from proof.selftest.generated.heads import BODIES, crossed
 from proof.selftest.generated.mutant import MODES, Alter, GeneratedMutant, Tally, answers, in_mode
 from proof.selftest.generated.places import Exchange, Place, fields_of, rest_exchange
 from proof.selftest.generated.slots import edit_message
@@ -63,7 +57,7 @@ def _of_operation(operation: Operation, exchange: Exchange) -> Iterator[Generate
     yield from _of_bodies(operation, description)
     yield from _whole(operation, replace(exchange, classes=("robustness",)))
     yield from described_lists.of_lists(operation, description)
-    yield from described_things.of_things(operation, description)
+    yield from described_lists.of_things(operation, description)
     yield from described_promises.of_promises(operation, description)
     yield from described_requests.lenient(operation, description)
     yield from described_requests.strict(operation, description)

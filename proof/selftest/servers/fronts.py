@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from proof.mutation.programs import built, program
+from proof.mutation.self_test import built, program
 from proof.selftest.robots import Robot, RobotError, stopped
 
 _HERE = Path(__file__).parent

@@ -7,8 +7,7 @@ from pkgutil import iter_modules
 
 from proof.mutation import changes, fields, xml_trees
 from proof.mutation.messages import unchanged
-from proof.mutation.mutant import Mutant
-from proof.mutation.table import read_rows
+from proof.mutation.table import Mutant, read_rows
 
 _MODULES = {module.name: import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)}
 _ALL = {name: value for module in _MODULES.values() for name, value in vars(module).items() if name[0] != "_"}

@@ -10,10 +10,10 @@ from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
 from proof.selftest.comparison import Comparison, ToolResult
-from proof.selftest.generated.api_report import only_theirs, page
 from proof.selftest.generated.described import described_mutants
 from proof.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
+from proof.selftest.generated.report import only_theirs, page
 
 _LAMP = {
     "type": "object",

@@ -10,8 +10,8 @@ from conformance.contract.ledger import classes_of
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from proof.mutation.messages import unchanged
-from proof.mutation.mutant import Mutant
 from proof.mutation.self_test import SelfTest
+from proof.mutation.table import Mutant
 from proof.selftest import coverage
 from proof.table1.mutants import MUTANTS
 

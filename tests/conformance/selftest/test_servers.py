@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from conformance.contract.pack import Contract
-from proof.mutation import programs
+from proof.mutation import self_test
 from proof.mutation.self_test import self_test_of
 from proof.selftest.controls import Case, run_controls
 from proof.selftest.servers.fronts import FRONTS
@@ -27,8 +27,8 @@ def test_a_robot_behind_a_server_is_no_false_positive(domain_id):
 
 @pytest.mark.parametrize("name", [*sorted(_FRONTS), *(device.name for device in ON_SERVERS)])
 def test_a_server_that_is_not_there_is_named_with_what_installs_it(name, monkeypatch, domain_id):
-    monkeypatch.setattr(programs.shutil, "which", lambda *_, **__: None)
-    monkeypatch.setattr(programs, "find_spec", lambda _: None)
+    monkeypatch.setattr(self_test.shutil, "which", lambda *_, **__: None)
+    monkeypatch.setattr(self_test, "find_spec", lambda _: None)
     case = _case(name)
     result = judged(replace(case, device=PLAIN) if case.variant else case, domain_id)
     assert result.outcome is None

@@ -8,7 +8,7 @@ from email.utils import formatdate
 
 import h11
 
-from proof.table1.independent_robots.baroque.writing import problem
+from proof.table1.independent_robots.baroque.rest import problem
 from proof.table1.independent_robots.plain.server import Application, origin_form
 
 _MAX_HEAD = 48 * 1024

@@ -6,8 +6,7 @@ from xml.sax.saxutils import escape
 
 from lxml import etree
 
-from proof.table1.independent_robots.baroque.rest import SENSORS, SERVICES
-from proof.table1.independent_robots.baroque.writing import fill
+from proof.table1.independent_robots.baroque.rest import SENSORS, SERVICES, fill
 from proof.table1.independent_robots.plain import soap
 from proof.table1.independent_robots.plain.server import Answer
 from proof.table1.independent_robots.plain.soap import SOAP, TNS, FaultError

@@ -13,8 +13,7 @@ It claims ``rest-delivery`` and ``soap-delivery`` alone, which the contract lets
 
 from collections.abc import Callable
 
-from proof.table1.independent_robots.legacy.server import start
-from proof.table1.independent_robots.legacy.services import Delivery, Soap
+from proof.table1.independent_robots.legacy.services import Delivery, Soap, start
 
 
 def serve(rest_port: int, soap_port: int) -> tuple[str, str, Callable[[], None]]:
