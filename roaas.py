@@ -36,7 +36,7 @@ _COMMANDS = {
     "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
     "diff": ("reports.cli.pages", "Show what changed between two results, or between two descriptions of an API."),
     "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
-    "sign": ("reports.cli.attestation", "Sign a result, so that others can verify the signer."),
+    "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
     "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
     "registry": (
         "reports.cli.registry",

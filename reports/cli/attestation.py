@@ -1,7 +1,4 @@
-"""Define the commands `roaas keygen` and `roaas verify`.
-
-Define the command `roaas sign`.
-"""
+"""Define the commands `roaas keygen` and `roaas verify`."""
 
 import datetime as dt
 from pathlib import Path
@@ -11,17 +8,13 @@ import click
 import msgspec
 
 from reports.attestation.envelope import read_envelope
-from reports.attestation.files import DESCRIPTION
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
-from reports.attestation.signing import Notary
 from reports.attestation.statement import RESULT_SUBJECT
 from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.given_files import EnvelopeRefusedError
-from reports.pages.untrusted import excerpt, on_a_line
-from reports.reading import RESULT_NAME, read_result
-from reports.rendering import render
+from reports.pages.untrusted import on_a_line
 
 EXIT_REFUSED = 1
 
@@ -90,41 +83,3 @@ def _print(found: Verification, key: str) -> None:
     for words in (PROVED, NOT_PROVED):
         click.echo(f"\n{fill(words, 100)}")
     click.echo(f"\nREFUSED by your policy: {', '.join(refused)}" if refused else "\nACCEPTED by your policy")
-
-
-@click.command()
-@click.argument("directory", metavar="DIR", type=FOLDER)
-@click.option("--key", required=True, type=FILE, help="Private key, as `roaas keygen` makes it.")
-@CONTRACT
-@click.pass_obj
-def sign(door: FrontDoor, directory: Path, key: Path, pack: str | None) -> None:
-    """Sign DIR/result.json: write DIR/certificate.intoto.json, and write the pages again.
-
-    Exit code 2: DIR has no result; the result is incomplete, was edited, or lies beside files of another run; or the
-    key cannot be used.
-    """
-    by = _pack_of(door, directory) if pack is None else pack
-    suite = read_result(directory / RESULT_NAME)["suite"]
-    if suite["digest"] != door.known(by)["suite"]:
-        click.echo(
-            f"RoAAS {excerpt(suite['version'], 40)} judged the robot, with another suite or contract than the "
-            "installed one: the requirements were not compared with a ledger",
-            err=True,
-        )
-    for path in render(directory, Notary(key, lambda: door.known(by))):
-        click.echo(path)
-
-
-def _pack_of(door: FrontDoor, directory: Path) -> str | None:
-    """Return the contract pack of a result: the description beside it, or an installed pack; None for the default."""
-    result = read_result(directory / RESULT_NAME)
-    if "api" in result and (directory / DESCRIPTION).is_dir():
-        return str(directory / DESCRIPTION)
-    name: str | None = result.get("pack", {}).get("name")
-    # A result is data: a name in it leads to no folder.
-    if name is not None and not door.is_installed(name):
-        raise click.UsageError(
-            f"the robot was judged by the contract pack {excerpt(name, 80)!r}, which is not installed: "
-            "give its folder with --contract"
-        )
-    return name

@@ -17,7 +17,8 @@ from vendors import Door, requirement
 from reports.attestation.judging import Known, Policy, read_policy
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
 from reports.certificate.page import Seal
-from reports.cli.attestation import keygen, sign, verify
+from reports.cli.attestation import keygen, verify
+from reports.cli.signing import sign
 from reports.given_files import KeyUnusableError, PolicyUnusableError, ResultInvalidError
 from reports.rendering import render
 
