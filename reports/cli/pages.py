@@ -1,7 +1,4 @@
-"""Define the commands `roaas report` and `roaas compare`.
-
-Define the command `roaas diff`.
-"""
+"""Define the commands `roaas report`, `roaas compare` and `roaas diff`."""
 
 import os
 from pathlib import Path
@@ -17,17 +14,21 @@ from reports.certificate.difference_page import (
     difference_markdown,
     difference_text,
 )
+from reports.certificate.runs import results_below, write_history
 from reports.cli.options import FOLDER, PATH, FrontDoor
 from reports.formats.catalogue import FORMATS
 from reports.given_files import ReportError, parsed, read_octets, showing
 from reports.pages.page import write_pages
 from reports.pages.untrusted import on_a_line
-from reports.reading import LATENCY_NAME, RESULT_NAME, read_latency, read_result
+from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_latency, read_result
 from reports.rendering import render, render_formats
 
 EXIT_OK = 0
 EXIT_SLOWER = 1
 EXIT_INVALID = 4
+EXIT_REGRESSIONS, EXIT_NOT_KNOWN = 1, 4
+# Where a run leaves the description that it judged a device by.
+_DESCRIPTION = Path("description") / "openapi.json"
 
 
 @click.command()
@@ -40,14 +41,25 @@ EXIT_INVALID = 4
     help="Write result.json in this format instead of the pages; may be given several times.",
 )
 def report(directory: Path, formats: tuple[str, ...]) -> None:
-    """Write the pages of the result files in DIR again.
+    """Write the pages of the result files in DIR again, or the history of a device whose runs are in folders of DIR.
 
     result.json becomes certificate.html, certificate.md and junit.xml. latency.json becomes latency.html and
     latency.md. fleet.json becomes fleet.html and fleet.md. --format writes one file for a CI system or a code host.
+    If DIR holds no result file, and folders in it do, history.html shows their runs by the version of the device.
     Exit code 2: there is no result file, or one that cannot be read.
     """
+    if not formats and _holds_runs(directory):
+        for path in write_history(directory):
+            click.echo(path)
+        return
     for path in render_formats(directory, formats) if formats else render(directory):
         click.echo(path)
+
+
+def _holds_runs(directory: Path) -> bool:
+    """Return whether a folder holds no result file, and folders in it do."""
+    own = any((directory / name).exists() for name in (RESULT_NAME, LATENCY_NAME, FLEET_NAME))
+    return not own and bool(results_below(directory))
 
 
 @click.command()
@@ -105,11 +117,6 @@ def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None)
     if not found.valid:
         return EXIT_INVALID
     return EXIT_SLOWER if found.slower else EXIT_OK
-
-
-EXIT_REGRESSIONS, EXIT_NOT_KNOWN = 1, 4
-# Where a run leaves the description that it judged a device by.
-_DESCRIPTION = Path("description") / "openapi.json"
 
 
 @click.command()
