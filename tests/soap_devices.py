@@ -200,7 +200,8 @@ class Device:
         if root.tag != f"{{{self.soap}}}Envelope":
             return "VersionMismatch", "another version"
         for block in root.iterfind(f"{{{self.soap}}}Header/*"):
-            known = block.tag == f"{{{_SECURITY}}}Security"
+            actor = block.get(f"{{{self.soap}}}actor") or block.get(f"{{{self.soap}}}role") or "/next"
+            known = block.tag == f"{{{_SECURITY}}}Security" or not actor.endswith("/next")
             if block.get(f"{{{self.soap}}}mustUnderstand") in {"1", "true"} and not known:
                 return "MustUnderstand", "not understood"
         return ("Client", "not authorised") if self.secured and not self._knows(root) else None

@@ -10,6 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from math import isclose
 from typing import Final
 from urllib.parse import urlsplit
@@ -31,6 +32,8 @@ _FEW: Final = 3
 _MOST: Final = 1_000
 # Nouns of values that are kept as they are given, and are not measured.
 _KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
+# What no XML has, between the values of one name.
+_BETWEEN: Final = "\0"
 _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
 
 
@@ -111,7 +114,7 @@ class SoapMemory:
         self._writers = {act.label: [one for one in acts if act.shows(one)] for act in acts}
         # The values by which a writing operation names the thing that it is for.
         self._keys = {
-            writer.label: {name for act in acts if act.shows(writer) for name in act.sent.keys() & writer.sent.keys()}
+            writer.label: {name for act in acts if act.shows(writer) for name in act.sent.keys() & writer.names.keys()}
             for writer in acts
         }
         self._written: dict[str, list[_Write]] = defaultdict(list)
@@ -156,15 +159,17 @@ class SoapMemory:
     def _done(self, act: Act, exchange: Exchange, sent: dict[str, list[str]], told: dict[str, list[str]]) -> None:
         """Keep what a successful request did."""
         at_s, keys = exchange.response.received_s, self._keys[act.label]
-        if act.role is Role.WRITES:
-            single = {name: texts[0] for name, texts in sent.items() if len(texts) == 1}
-            key = {name: text for name, text in single.items() if name in keys}
-            values = {name: told.get(name, [text])[0] for name, text in single.items() if name not in keys}
+        others: list[_Write] = []
+        if act.role in {Role.WRITES, Role.CREATES}:
+            named = sent if act.role is Role.WRITES else told
+            key = {name: texts[0] for name, texts in named.items() if name in keys and len(texts) == 1}
+            values = {name: _joined(told.get(name, sent[name])) for name in sent.keys() & act.sent.keys() - keys}
             others = [one for one in self._written[act.label] if one.key != key][-_MOST:]
-            self._written.clear()
-            self._written[act.label] = [*others, _Write(key, values, at_s)]
-            return
+            others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
         self._written.clear()
+        self._written[act.label] = others
+        if act.role is Role.WRITES:
+            return
         if act.role is Role.CREATES:
             new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
             new = [one for one in new if REFERS.search(one[0])] or (new if len(new) == 1 else [])
@@ -188,8 +193,8 @@ class SoapMemory:
                 if any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items()):
                     continue
                 for name, text in write.values.items():
-                    if len(told.get(name, ())) == 1:
-                        yield from self._compared(act, writer, write, name, exchange, told[name][0], text)
+                    if told.get(name):
+                        yield from self._compared(act, writer, write, name, exchange, _joined(told[name]), text)
 
     def _compared(
         self, act: Act, writer: Act, write: _Write, name: str, exchange: Exchange, got: str, text: str
@@ -198,7 +203,7 @@ class SoapMemory:
         past, simple = self._past[writer.label, act.label, name], writer.sent[name]
         age_s = exchange.response.received_s - write.at_s
         expected = f"{name} {text!r}, which {writer.operation.name} wrote"
-        if is_alike(simple, text, got):
+        if _is_same(simple, text, got):
             if name not in write.shown:
                 write.shown.add(name)
                 is_late = name in write.late and age_s > SETTLES_S / 2
@@ -240,6 +245,7 @@ class SoapMemory:
         ]
         return (
             len(past.lost) == _LOST
+            and not any(_BETWEEN in one for one in past.lost)
             and len({*past.lost, *past.kept}) == 1
             and act.noun == writer.noun
             and bool(_KEEPS.search(act.noun))
@@ -271,8 +277,21 @@ class SoapMemory:
                     yield case(f"soap/{name}", False, exchange, expected, observed, cause)  # noqa: FBT003 - see Case
 
 
+def _joined(texts: list[str]) -> str:
+    """Return the values of one name as one text, in any order."""
+    return _BETWEEN.join(sorted(texts))
+
+
+def _is_same(simple: Simple, text: str, got: str) -> bool:
+    """Return whether what was read is what was written."""
+    pairs = list(zip_longest(text.split(_BETWEEN), got.split(_BETWEEN)))
+    return all(one is not None is not two and is_alike(simple, one, two) for one, two in pairs)
+
+
 def _is_near(simple: Simple, text: str, got: str) -> bool:
-    """Return whether two numbers with fractions differ by 2 % at most."""
+    """Return whether two numbers with fractions differ by 2 % at most, or two moments by less than a second."""
+    if simple.builtin == "dateTime":
+        return is_alike(simple, *(re.sub(r"\.\d+", "", one) for one in (text, got)))
     first, second = number_in(text), number_in(got)
     if simple.builtin in INTEGERS or first is None or second is None:
         return False
@@ -281,7 +300,9 @@ def _is_near(simple: Simple, text: str, got: str) -> bool:
 
 def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
     """Return whether a device that keeps some values has to keep this one: it lies between them, or has to be taken."""
-    if simple.enumeration or simple.builtin == "boolean":
+    if simple.enumeration or simple.builtin == "boolean" or any(text in one.enumeration for one in simple.others):
+        return True
+    if simple.many or _BETWEEN in text:
         return True
     if simple.builtin in NUMBERS:
         number, numbers = number_in(text), [one for one in map(number_in, kept) if one is not None]

@@ -80,6 +80,7 @@ WSAW: Final = "http://www.w3.org/2006/05/addressing/wsdl"
 ADDRESSING: Final = "http://www.w3.org/2005/08/addressing"
 # SOAP 1.1, 4.2.2: the actor that stands for whoever receives the message first.
 NEXT_ACTOR: Final = "http://schemas.xmlsoap.org/soap/actor/next"
+NEXT_12: Final = "http://www.w3.org/2003/05/soap-envelope/role/next"
 
 
 def local(tag: str) -> str:
@@ -130,20 +131,25 @@ class Node:
         return next(path for path in self.paths() if self.at(path).name == name)
 
     def at(self, path: tuple[int, ...]) -> Node:
-        """Return the descendant at a path of child indexes."""
+        """Return the descendant at a path of child indexes; -1 is the first attribute, as a node with its text."""
+        if path and path[0] < 0:
+            return Node(*self.attributes[~path[0]])
         return self.children[path[0]].at(path[1:]) if path else self
 
     def replaced(self, path: tuple[int, ...], *new: Node) -> Node:
         """Return a copy in which the descendant at ``path`` is replaced by zero or more nodes.
 
         Args:
-            path: child indexes; empty for the node itself, which must be replaced by exactly one.
+            path: as in `at`; empty for the node itself, which must be replaced by exactly one.
             new: the replacement.
         """
         if not path:
             (whole,) = new
             return whole
         index, rest = path[0], path[1:]
+        if index < 0:
+            given = tuple((one.tag, one.text) for one in new)
+            return replace(self, attributes=(*self.attributes[:~index], *given, *self.attributes[~index + 1 :]))
         inside = (self.children[index].replaced(rest, *new),) if rest else new
         return replace(self, children=(*self.children[:index], *inside, *self.children[index + 1 :]))
 

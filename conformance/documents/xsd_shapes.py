@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from decimal import Decimal, InvalidOperation
+from itertools import zip_longest
 from math import isclose
 from typing import TYPE_CHECKING, Any, Final
 
@@ -31,6 +32,8 @@ class Simple:
         minimum: smallest value; maximum: greatest; None: those of the built-in type.
         min_length: in characters; max_length: likewise.
         patterns: regular expressions (XML Schema) that a value must match.
+        many: whether it is a list of such values.
+        others: the further members of a union, whose first member this is.
     """
 
     builtin: str
@@ -40,6 +43,8 @@ class Simple:
     min_length: int | None = None
     max_length: int | None = None
     patterns: tuple[str, ...] = ()
+    many: bool = False
+    others: tuple[Simple, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -189,14 +194,15 @@ def _fixed(simple: Simple, value: str | None) -> Simple:
 
 
 def _simple(declared: Any) -> Simple:
-    """Return a simple type; of a list that of its items, of a union that of its first member."""
+    """Return a simple type."""
     within = getattr(declared, "base_type", None)
     if declared.is_list() and not getattr(declared, "enumeration", None):
         items = getattr(declared, "item_type", None) or getattr(within, "item_type", None)
-        return _simple(items) if items is not None else Simple("string")
+        return replace(_simple(items), many=True) if items is not None else Simple("string")
     if declared.is_union() and not getattr(declared, "enumeration", None):
         members = getattr(declared, "member_types", None) or getattr(within, "member_types", None)
-        return _simple(members[0]) if members else Simple("string")
+        first, *others = map(_simple, members or ()) if members else [Simple("string")]
+        return replace(first, others=tuple(others))
     builtin = declared
     while builtin is not None and not str(builtin.name or "").startswith(clark(XSD, "")):
         builtin = builtin.base_type
@@ -377,7 +383,9 @@ def beyond(simple: Simple, text: str) -> Iterator[str]:
         for bound, sign in ((simple.minimum, -1), (simple.maximum, 1)):
             # An exclusive bound is itself forbidden.
             yield from () if bound is None else (f"{bound:f}", f"{bound + sign * step:f}")
-    elif not simple.enumeration:
+    elif simple.enumeration:
+        yield f"{text}~"
+    else:
         if simple.max_length is not None and simple.max_length < _LONGEST:
             yield (text or "a").ljust(simple.max_length + 1, text[-1:] or "a")
         yield from (text[: max((simple.min_length or 1) - 1, 0)], text[:-1], text + text[-1:], text + "~")
@@ -429,8 +437,11 @@ def plain(simple: Simple) -> str:
 def is_alike(simple: Simple, one: str, two: str) -> bool:
     """Return whether two texts are the same value of a type (2.2)."""
     one, two = one.strip(), two.strip()
-    if simple.builtin == "boolean":
-        one, two = ({"1": "true", "0": "false"}.get(text, text) for text in (one, two))
+    if simple.many:
+        item, pairs = replace(simple, many=False), list(zip_longest(one.split(), two.split(), fillvalue=""))
+        return all(is_alike(item, *pair) for pair in pairs)
+    if read := _READ.get(simple.builtin):
+        one, two = read(one), read(two)
     first, second = (number_in(text) if simple.builtin in NUMBERS else None for text in (one, two))
     if first is not None and second is not None:
         return first == second or (simple.builtin in FLOATS and isclose(first, second, rel_tol=1e-5, abs_tol=1e-9))
@@ -440,6 +451,14 @@ def is_alike(simple: Simple, one: str, two: str) -> bool:
         except (TypeError, ValueError):
             return one == two
     return one == two
+
+
+# What makes two forms of a value equal (3.2.2, 3.2.15, 3.2.16).
+_READ: Final[Mapping[str, Callable[[str], str]]] = {
+    "boolean": lambda text: {"1": "true", "0": "false"}.get(text, text),
+    "hexBinary": str.upper,
+    "base64Binary": lambda text: "".join(text.split()),
+}
 
 
 def number_in(text: str) -> Decimal | None:

@@ -104,6 +104,7 @@ class DescribedMessages:
         turn: int = 0,
         given: Mapping[str, Sequence[str]] = _NONE,
         current: Mapping[str, str] = MappingProxyType({}),
+        form: int | None = None,
     ) -> tuple[Element | None, Node | None]:
         """Return the declaration of an operation's request, and a valid message; None if its Body is empty.
 
@@ -112,13 +113,14 @@ class DescribedMessages:
             turn: which of the given values to use, in rotation.
             given: further values, which the device gave, by what they are called.
             current: values to keep, by name in lower case, as far as they are valid together.
+            form: with all optional parts, in this form (see `ordinary`); None: without them, if that is valid.
 
         Raises:
             NotPossibleError: none can be made.
         """
         if not operation.request:
             return None, None
-        declared, made = self._made(operation.request, operation, turn, given)
+        declared, made = self._made(operation.request, operation, turn, given, form)
         kept = made
         for path, _ in simple_leaves(declared, made) if current else ():
             name = made.at(path).name
@@ -140,7 +142,12 @@ class DescribedMessages:
         ]
 
     def _made(
-        self, tag: str, operation: SoapOperation, turn: int = 0, given: Mapping[str, Sequence[str]] = _NONE
+        self,
+        tag: str,
+        operation: SoapOperation,
+        turn: int = 0,
+        given: Mapping[str, Sequence[str]] = _NONE,
+        form: int | None = None,
     ) -> tuple[Element, Node]:
         """Return the declaration of an element of an operation's messages, and a valid element.
 
@@ -151,8 +158,8 @@ class DescribedMessages:
         if declared is None:
             raise NotPossibleError(f"no schema declares {tag} of {operation.name}")
         fault = ""
-        for optional in (False, True):
-            node = ordinary(declared, optional=optional)
+        for optional in (False, True) if form is None else (True,):
+            node = ordinary(declared, optional=optional, form=form or 0)
             unsure = self.invented(declared, node, named=True)
             for path, simple in simple_leaves(declared, node):
                 name = node.at(path).name

@@ -6,6 +6,7 @@ What comes of it is judged by the checkers of every exchange (checkers/soap_memo
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -14,16 +15,25 @@ from itertools import islice
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.forms import another, rewritten
 from conformance.api.soap.messages import declarations, simple_leaves, with_text
 from conformance.api.soap.mutations import invalid_ones, mutations
 from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
-from conformance.documents.xml import Node
-from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Element, Simple, bounds, is_alike, number_in
+from conformance.documents.xml import XSI, Node, clark, parse
+from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, is_alike, plain
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
-from conformance.scenarios.soap_survey import Caller, Kind, NotSoapError, SoapProbe, mandatory, usual_message
+from conformance.scenarios.soap_survey import (
+    Caller,
+    Kind,
+    NotSoapError,
+    SoapProbe,
+    full_message,
+    mandatory,
+    usual_message,
+)
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
@@ -43,9 +53,16 @@ _THINGS: Final = 3
 # Successive reads of each operation; reads in each of as many simultaneous rounds.
 _READS: Final = (20, 60)
 _ROUNDS: Final = (6, 30)
-# Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
-_TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
+# The turn whose text is beyond ASCII.
 _BEYOND_ASCII: Final = 3
+# Longest text that is sent because its type allows it, characters.
+_LONGEST: Final = 1_000
+# Header blocks that a device has to let pass (SOAP 1.1, 4.2.2 and 4.2.3; SOAP 1.2 Part 1, 2.2 to 2.4).
+_BLOCKS: Final = (
+    ("a header block that need not be understood", "0", ""),
+    ("a header block that another node must understand", "1", "urn:example:other"),
+)
+_GIVES: Final = frozenset({Role.WRITES, Role.CREATES})
 # An operation with the declaration of its request, and a message that it accepts.
 _Message = tuple[Act, Element | None, Node | None]
 
@@ -78,7 +95,13 @@ class _Changes:
                     self.acts.append((act, *self.caller.messages.usual(act.operation)))
                     continue
                 declared, node, kind = usual_message(self.caller, act)
-                if kind is Kind.USUAL and self.caller.probes[-1].succeeded:
+                has = kind is Kind.USUAL and self.caller.probes[-1].succeeded
+                if act.role in _GIVES and (full := full_message(self.caller, act, declared, node)):
+                    if not has:
+                        short = partial(self.caller.messages.message, act.port, act.operation, node)
+                        self._vary(act, full, "the same message without optional parts", short)
+                    has, node = True, full
+                if has:
                     self.acts.append((act, declared, node))
 
     def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED, *blocks: Node) -> SoapProbe:
@@ -97,16 +120,23 @@ class _Changes:
             return
         until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
         keys = {name for one, _, _ in readers for name in one.sent}
-        leaves = [(path, simple) for path, simple in simple_leaves(declared, node) if path]
-        free = [one for one in leaves if node.at(one[0]).name.lower() not in keys]
-        turns, lasting, refusals, made = _TURNS[not self._is_quick], 0, 0, node
+        forms = [
+            (one, [(path, simple) for path, simple in simple_leaves(declared, one) if path])
+            for one in (node, _once(node))
+        ]
+        turns, lasting, refusals, whole, leaves = _TURNS[not self._is_quick], 0, 0, *forms[0]
+        made = whole
         for turn in range(turns):
             if time.monotonic() > until:
                 break
+            node, own = forms[turn % len(forms)]
+            free = [one for one in own if node.at(one[0]).name.lower() not in keys]
             made = _varied(node, free, turn)
             if not self.send(act, made, "a message with other values").succeeded:
                 # Not all of them may be changed: those that may are found one by one.
-                free = [one for one in free if self.send(act, _varied(node, [one], turn), "another value").succeeded]
+                may = [one for one in free if self.send(act, _varied(node, [one], turn), "another value").succeeded]
+                keys |= {node.at(one[0]).name.lower() for one in free if one not in may}
+                free = may
                 if not free:
                     break
                 made = _varied(node, free, turn)
@@ -125,6 +155,7 @@ class _Changes:
             yield
             until += time.monotonic() - left_s
         self._read(readers, made, times=_READS[not self._is_quick])
+        node, free = whole, [one for one in leaves if whole.at(one[0]).name.lower() not in keys]
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
             plain = self.send(act, other, "a message with other values")
             if plain.succeeded and self._wait(readers, other, free):
@@ -145,24 +176,20 @@ class _Changes:
             octets = (head + whole.written().decode()).encode(charset, "xmlcharrefreplace")
             yield f"a message in {charset}", kind, made, octets, charset
         made = _varied(node, free, 1)
-        yield (
-            "comments within texts",
-            Kind.TRIED,
-            made,
-            self._styled(act, made, XmlStyle(text="comment inside")),
-            "utf-8",
-        )
-        made = other = _varied(node, free, 0)
-        for path, simple in free:
-            other = with_text(other, path, _rewritten(simple, other.at(path).text))
-        octets = self.caller.messages.message(act.port, act.operation, other)
-        yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
+        for says, kind in (("comment inside", Kind.TRIED), ("cdata", Kind.VARIED)):
+            yield f"texts: {says}", kind, made, self._styled(act, made, XmlStyle(text=says)), "utf-8"
+        for form, turn in enumerate((0, 1)):
+            made = other = _varied(node, free, turn)
+            for path, simple in free:
+                other = with_text(other, path, rewritten(simple, other.at(path).text, form))
+            octets = self.caller.messages.message(act.port, act.operation, other)
+            yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
 
     def _wait(self, readers: list[_Message], made: Node, free: list[tuple[tuple[int, ...], Simple]]) -> bool:
         """Read until what was written is read, or a device should have taken it; return whether anything was."""
         until = time.monotonic() + SETTLES_S
         while True:
-            told = self._read(readers, made)
+            told = {name: texts[0] for name, texts in self._read(readers, made).items() if len(texts) == 1}
             texts = [(simple, made.at(path).text, told.get(made.at(path).name.lower())) for path, simple in free]
             seen = [is_alike(simple, text, got) for simple, text, got in texts if got is not None]
             if all(seen) or time.monotonic() > until:
@@ -172,18 +199,12 @@ class _Changes:
             self._read(readers, made, times=2)
         return any(seen)
 
-    def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, str]:
-        """Read what a message concerns; return the values that occur once, by name."""
-        names = {written.at(path).name.lower(): written.at(path).text for path in written.paths()}
-        found: dict[str, str] = {}
+    def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, list[str]]:
+        """Read what a message concerns; return the values by name."""
+        found: dict[str, list[str]] = {}
         for _ in range(times):
             for act, _, node in readers:
-                asked = node
-                for path in node.paths() if node else ():
-                    if asked and (text := names.get(asked.at(path).name.lower())) and not asked.at(path).children:
-                        asked = with_text(asked, path, text)
-                probe = self.send(act, asked, "a valid message")
-                found |= _single(probe)
+                found |= _told(self.send(act, _asked(node, written), "a valid message"))
         return found
 
     def _refuse(self, act: Act, declared: Element, node: Node, turn: int) -> None:
@@ -220,8 +241,14 @@ class _Changes:
                 self.send(act, made, "a message for another thing")
             for wait_s in (0.0, SETTLES_S):
                 time.sleep(wait_s)
-                for made in written * 2:
+                for made in written:
                     self._read(readers, made)
+            # Several clients read different things at the same moment: each has to get its own.
+            asked = [(one, _asked(message, made)) for made in written for one, _, message in readers]
+            clients = [self._addressed(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
+            send_together([clients] * _ROUNDS[not self._is_quick])
+            for made in written:
+                self._read(readers, made, times=2)
             for thing, values in told:
                 if values:
                     self.send(act, _as_it_was(thing, free, values), "the values that were there before")
@@ -233,13 +260,15 @@ class _Changes:
         if remove is None or not lists or remove[2] is None:
             return
         free = [one for one in simple_leaves(declared, node) if one[0]]
-        made: list[str] = []
+        readers = [one for one in self.acts if one[0].shows(act)]
+        made, asks = list[str](), list[Node]()
         for turn in range(_THINGS):
             probe = self.send(act, _varied(node, free, turn), "a message that creates")
             if not probe.succeeded:
                 probe = self.send(act, node, "a message that creates")
-            told = _single(probe)
+            told = {name: texts[0] for name, texts in _told(probe).items() if len(texts) == 1}
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
+            asks = [Node("", "", tuple(Node(*one) for one in told.items())), *asks]
             if not turn:
                 # The first one shows that things last longer than the others do until they are removed.
                 time.sleep(_LASTS_S)
@@ -247,6 +276,8 @@ class _Changes:
             yield
         time.sleep(SETTLES_S)
         self._read(lists, node)
+        for asked in asks * 2:
+            self._read(readers, asked)
         self._refuse(act, declared, _varied(node, free, _THINGS), 0)
         self._read(lists, node, times=2)
         for id_ in reversed(made):
@@ -267,7 +298,7 @@ class _Changes:
         readers = [one for one in self.acts if one[0].role is Role.READS]
         for act, _, node in readers:
             for _ in range(_READS[not self._is_quick]):
-                self.send(act, node, "a valid message", Kind.AGAIN)
+                self.send(act, node, "a valid message", Kind.USUAL)
         if len(readers) > 1:
             clients = [readers[number % len(readers)] for number in range(MOST_CLIENTS)]
             rounds = range(_ROUNDS[not self._is_quick])
@@ -281,10 +312,15 @@ class _Changes:
 
     def vary(self) -> None:
         """Send other values that the schema allows: enumerations, other forms of booleans and of XML."""
+        asked = {name for act, _, _ in self.acts if act.role is Role.READS for name in act.sent}
         for act, declared, node in self.acts:
             if act.role in {Role.CREATES, Role.REMOVES}:
                 continue
-            for says, made in _alternatives(declared, node) if declared and node else ():
+            # A bound of what names a thing names none that is there.
+            free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
+            for says, made in _alternatives(declared, node, free) if declared and node else ():
+                if self.caller.messages.found.types.invalid(parse(made.written())):
+                    continue
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
             if act.role is Role.WRITES:
                 self.send(act, node, "the values that were there before")
@@ -292,6 +328,16 @@ class _Changes:
             # A reader that takes no comments is left alone: there are many, and no client that writes messages has any.
             for says, style in [one for one in single_changes() if "comment" not in one[0]]:
                 self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
+            for says, text, actor in _BLOCKS:
+                block = mandatory(act.port, text, actor)
+                message = partial(self.caller.messages.message, act.port, act.operation, node, block)
+                self._vary(act, node, says, message)
+            other = next((one for one, _, _ in self.acts if one.role is Role.READS and one is not act), None)
+            if other is not None:
+                # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
+                octets = self.caller.messages.message(act.port, act.operation, node)
+                says = f"a message with the SOAPAction of {other.operation.name}"
+                self.caller.send(act.port, act.operation, Kind.TRIED, says, octets, action=other.operation)
 
     def _styled(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
         """Return a message in a style."""
@@ -300,7 +346,9 @@ class _Changes:
     def _vary(self, act: Act, node: Node | None, says: str, write: Callable[[], bytes]) -> None:
         """Send a message, and again where it is refused and the usual one is not; each with a nonce of its own."""
         probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
-        if not probe.succeeded and self.send(act, node, "a valid message").succeeded:
+        if not probe.succeeded:
+            if not self.send(act, node, "a valid message").succeeded:
+                return
             probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
         if probe.exchange is not None:
             self.caller.probes.append(replace(probe, kind=Kind.VARIED))
@@ -329,64 +377,57 @@ def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
     return tuple(changes.caller.probes)
 
 
-def _single(probe: SoapProbe) -> dict[str, str]:
-    """Return the values in a success that come once, by name in lower case."""
+def _told(probe: SoapProbe) -> dict[str, list[str]]:
+    """Return the values in a success, by name in lower case."""
     try:
         inside = probe.inside() if probe.succeeded else []
     except NotSoapError:
         return {}
-    return {name: texts[0] for one in inside for name, texts in texts_of(one).items() if len(texts) == 1}
+    return {name: texts for one in inside for name, texts in texts_of(one).items()}
+
+
+def _asked(node: Node | None, written: Node) -> Node | None:
+    """Return a message with the values of another one, by their names."""
+    names = {written.at(path).name.lower(): written.at(path).text for path in written.paths()}
+    for path in node.paths() if node else ():
+        if node and (text := names.get(node.at(path).name.lower())) and not node.at(path).children:
+            node = with_text(node, path, text)
+    return node
+
+
+def _once(node: Node) -> Node:
+    """Return a message in which nothing is there twice."""
+    children = {child.tag: _once(child) for child in node.children[::-1]}
+    return replace(node, children=tuple(children.values())[::-1])
 
 
 def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -> Node:
     """Return a message with other values, by turn."""
+    there = Counter[str]()
     for path, simple in free:
         name = node.at(path).name
+        there[name] += 1
         # A name may be that of the thing itself; where it refers to another one, it is refused, and then left alone.
         is_free = name.lower().endswith("name") or REFERS.search(name) is None
-        node = with_text(node, path, _other(simple, node.at(path).text, turn, is_free))
+        node = with_text(node, path, another(simple, node.at(path).text, turn + there[name] - 1, is_free))
     return node
 
 
-def _other(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa: FBT001 - one caller
-    """Return another value of a type, or the same one if no other is surely valid."""
-    if simple.enumeration:
-        return simple.enumeration[turn % len(simple.enumeration)]
-    if simple.builtin == "boolean":
-        return ("true", "false")[turn % 2]
-    if simple.builtin in INTEGERS and is_free:
-        low, high = bounds(simple)
-        # Far from each other first, so that later ones lie between.
-        return str(min(max((1, 9, 4, 7, 2, 6, 3, 8, 5)[turn % 9], low), high))
-    if simple.builtin in FLOATS | {"decimal"}:
-        low_f = float(simple.minimum) if simple.minimum is not None else 0.0
-        high_f = float(simple.maximum) if simple.maximum is not None else low_f + 1.0
-        share = (0.25, 0.75, 0.5, 0.625, 0.375, 0.6875)[turn % 6]
-        return f"{low_f + share * (high_f - low_f):.10g}"
-    if simple.builtin in STRINGS and is_free and not simple.patterns:
-        made = _TEXTS[turn % len(_TEXTS)]
-        fits = (simple.min_length or 0) <= len(made) <= (simple.max_length or len(made))
-        return made if fits else text
-    return text
-
-
-def _rewritten(simple: Simple, text: str) -> str:
-    """Return the same value in another form of its type (XML Schema Part 2, 3.2.2 and 3.2.5)."""
-    if simple.builtin == "boolean":
-        return {"true": "1", "false": "0"}.get(text, text)
-    number = number_in(text) if simple.builtin in FLOATS and not simple.patterns else None
-    return text if number is None else f"{number:E}"
-
-
-def _as_it_was(node: Node, leaves: list[tuple[tuple[int, ...], Simple]], began: dict[str, str]) -> Node:
+def _as_it_was(node: Node, leaves: list[tuple[tuple[int, ...], Simple]], began: dict[str, list[str]]) -> Node:
+    there = {name: iter(texts) for name, texts in began.items()}
     for path, _ in leaves:
-        node = with_text(node, path, began.get(node.at(path).name.lower(), node.at(path).text))
+        node = with_text(node, path, next(there.get(node.at(path).name.lower(), iter(())), node.at(path).text))
     return node
 
 
-def _alternatives(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
-    """Yield further valid messages, each with what is special about it."""
-    for path, simple in simple_leaves(declared, node):
+def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterator[tuple[str, Node]]:
+    """Yield further messages that may be valid, each with what is special about it.
+
+    The values that are called as in ``free`` get the bounds of their types too.
+    """
+    leaves = simple_leaves(declared, node)
+    types = [simple for _, simple in leaves]
+    for path, simple in leaves:
         name, text = (node.at(path).name if path else node.name), node.at(path).text
         others = [one for one in simple.enumeration if one != text]
         others += (
@@ -394,8 +435,17 @@ def _alternatives(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
             if simple.builtin == "boolean"
             else []
         )
+        others += [plain(one) for one in simple.others if name.lower() in free]
+        # Two values of one type may be bounds of each other.
+        if types.count(simple) == 1 and simple.builtin in NUMBERS and name.lower() in free:
+            others += [f"{bound:f}" for bound in (simple.minimum, simple.maximum) if bound is not None]
+        if simple.builtin in STRINGS and name.lower() in free:
+            others += ["\u00fc" * (simple.max_length or 0)][: (simple.max_length or _LONGEST) < _LONGEST]
         for other in others:
             yield f"{other!r} as {name}", with_text(node, path, other)
     for path, part in declarations(declared, node):
+        for text in ("true", "1") if part.nillable else ():
+            nil = Node(part.tag, "", (), ((clark(XSI, "nil"), text),))
+            yield f'xsi:nil="{text}" at {node.at(path).name}', node.replaced(path, nil)
         if not part.minimum:
             yield f"a message without {node.at(path).name}", node.replaced(path)

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.messages import simple_leaves
 from conformance.api.soap.mutations import STRANGE, facets, invalid_ones, mutations
 from conformance.api.soap.roles import LAST, REFERS, Act, Role, acts_of, in_order, texts_of
 from conformance.commandline.device_options import advice
@@ -17,7 +18,7 @@ from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
-from conformance.documents.xml import Node, NotXmlError, clark, elements
+from conformance.documents.xml import NEXT_12, NEXT_ACTOR, Node, NotXmlError, clark, elements
 from conformance.documents.xsd_shapes import Element, Simple
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -45,7 +46,7 @@ _MANY: Final = 1000
 # Values from the device that are tried for one operation.
 _TRIED: Final = 3
 # Wrong messages for any operation; invalid messages that a schema of usual size yields.
-_WRONG: Final = 6
+_WRONG: Final = 7
 _USUALLY_INVALID: Final = 4
 
 
@@ -205,15 +206,22 @@ class Caller:
         return False
 
     def send(
-        self, port: SoapPort, operation: SoapOperation, kind: Kind, says: str, octets: bytes, charset: str = "utf-8"
+        self,
+        port: SoapPort,
+        operation: SoapOperation,
+        kind: Kind,
+        says: str,
+        octets: bytes,
+        charset: str = "utf-8",
+        action: SoapOperation | None = None,
     ) -> SoapProbe:
-        """Send octets to a port.
+        """Send octets to a port, with the SOAPAction of another operation if one is given.
 
         Raises:
             PartialTraceError: the device does not respond any more, or the time is over.
         """
         path = target_of(port)
-        fields = tuple((name, text.replace("utf-8", charset)) for name, text in fields_of(port, operation))
+        fields = tuple((name, text.replace("utf-8", charset)) for name, text in fields_of(port, action or operation))
         probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
         losses = self.api.run.losses
         try:
@@ -280,6 +288,9 @@ def _explore(caller: Caller, act: Act) -> Iterator[None]:
 def _groups(caller: Caller, act: Act) -> Iterator[None]:
     port, operation = act.port, act.operation
     declared, node, kind = usual_message(caller, act)
+    if act.role in {Role.OTHER, Role.ENDS, Role.WRITES}:
+        node = full_message(caller, act, declared, node) or node
+    _read_what_it_did(caller, act, node)
     yield
     effort = caller.api.run.effort
     # What was created may be there only once, and what was removed is not there any more.
@@ -367,9 +378,56 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
     return declared, node, kind
 
 
-def mandatory(port: SoapPort, text: str = "1") -> Node:
-    """Return a header block that no device knows, and that must be understood."""
-    return Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), text),))
+def full_message(caller: Caller, act: Act, declared: Element | None, node: Node | None) -> Node | None:
+    """Return an accepted message with all optional parts, and the values of a message without; None if there is none.
+
+    That it is refused is no fault: parts may exclude each other, or refer to things that the device does not have.
+    """
+    if declared is None or node is None:
+        return None
+    known = caller.current | {
+        node.at(path).name.lower(): node.at(path).text for path, _ in simple_leaves(declared, node)
+    }
+    for form in (1, 0):
+        with contextlib.suppress(NotPossibleError):
+            full = caller.messages.usual(act.operation, current=known, form=form)[1]
+            if full is None or len(full.written()) <= len(node.written()):
+                continue
+            octets = caller.messages.message(act.port, act.operation, full)
+            probe = caller.send(act.port, act.operation, Kind.TRIED, "a message with all optional parts", octets)
+            if probe.succeeded:
+                caller.learn(probe, full)
+                return full
+    return None
+
+
+def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
+    """Read at once the thing that an operation made or is about: a response may break its schema in one state only."""
+    probe = caller.probes[-1]
+    if probe.operation != act.label or not probe.succeeded or act.role not in {Role.OTHER, Role.ENDS, Role.CREATES}:
+        return
+    texts = {node.at(path).name.lower(): node.at(path).text for path in node.paths()} if node else {}
+    with contextlib.suppress(NotSoapError):
+        texts |= {name: found[0] for one in probe.inside() for name, found in texts_of(one).items()}
+    for reader in caller.acts.values():
+        if (
+            reader.role is Role.READS
+            and reader.needs
+            and reader.needs <= texts.keys()
+            and reader.label not in caller.lost
+        ):
+            with contextlib.suppress(NotPossibleError):
+                given = {name: [text] for name, text in texts.items()}
+                asked = caller.messages.usual(reader.operation, given=given)[1]
+                octets = caller.messages.message(reader.port, reader.operation, asked)
+                caller.send(reader.port, reader.operation, Kind.TRIED, f"what {act.operation.name} concerns", octets)
+
+
+def mandatory(port: SoapPort, text: str = "1", actor: str = "") -> Node:
+    """Return a header block that no device knows, and that the actor must understand if ``text`` is 1."""
+    name = clark(port.envelope, "role" if port.is_12 else "actor")
+    named = ((name, actor),) if actor else ()
+    return Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), text), *named))
 
 
 def _odd(
@@ -389,5 +447,9 @@ def _odd(
     for text in ("1", "true") if port.is_12 else ("1",):
         says = f"a header block that must be understood ({text})"
         yield Kind.UNDERSTAND, says, caller.messages.message(port, operation, node, mandatory(port, text))
+    actor = NEXT_12 if port.is_12 else NEXT_ACTOR
+    block = mandatory(port, "1", actor)
+    says = "a header block that the next node must understand"
+    yield Kind.UNDERSTAND, says, caller.messages.message(port, operation, node, block)
     head, rest = caller.messages.message(port, operation, node).split(b"\n", 1)
     yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

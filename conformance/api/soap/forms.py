@@ -1,13 +1,14 @@
-"""Strategies for the valid forms of simple types, over the whole range of each."""
+"""Valid forms of simple types: strategies over the whole range of each, and other values by turn."""
 
 import string
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from conformance.documents.xsd_shapes import FLOATS, INTEGERS, STRINGS, Simple, bounds, plain
+from conformance.documents.xsd_shapes import FLOATS, INTEGERS, NUMBERS, STRINGS, Simple, bounds, number_in, plain
 
 # XML Schema 1.0 Part 2, 4.3.6: white space around a value is collapsed before it is read.
 _SPACES: Final = ("", " ", "\n\t ", "  ")
@@ -32,6 +33,23 @@ EXTREMES: Final[dict[str, tuple[float, ...]]] = {
     ),
     "float": (0.0, -0.0, 1.401298464324817e-45, 1.1754943508222875e-38, 3.4028234663852886e38, 0.5),
 }
+# Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
+_TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
+# Values of other types; the first two have the usual form.
+_TYPED: Final = {
+    "boolean": ("true", "false"),
+    "dateTime": ("2031-05-06T07:08:09Z", "2032-10-11T12:13:14Z", "2031-07-08T09:10:11+02:00"),
+    "date": ("2031-05-06", "2032-10-11", "2031-12-31"),
+    "time": ("07:08:09Z", "12:13:14Z", "09:10:11Z"),
+    "duration": ("PT5S", "PT7M", "P1D"),
+    "base64Binary": ("AAEC", "+/8A", "/wD+", "//79/Pv6"),
+    "hexBinary": ("0A1B", "00FF", "FF00AC"),
+}
+# Integers by turn, far from each other first, so that later ones lie between: small ones, and for types without bounds
+# those beyond what a double or 32 bits hold.
+_SMALL: Final = (1, 9, 4, 7, 2, 6, 3, 8, 5)
+_WIDE: Final = frozenset({"long", "integer", "nonNegativeInteger", "positiveInteger", "unsignedLong"})
+_LARGE: Final = ("1", str(2**55), "4", str(2**53 + 1), str(2**32 + 7), "6", "3", "8", "5")
 # Characters of random texts: those that XML has to escape, and some of two and three octets.
 _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u20ac\u65e5"
 
@@ -108,3 +126,54 @@ def written_float(value: float, form: int) -> str:
         written if power else (written.removesuffix("0") if size.endswith(".0") else f"{written}000"),
     )
     return forms[form]
+
+
+def another(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa: FBT001 - one caller
+    """Return another value of a type, or the same one if no other is surely valid.
+
+    ``is_free``: whether the value refers to nothing, by its name.
+    """
+    if simple.many:
+        item = replace(simple, many=False)
+        return " ".join(another(item, text, turn + more, is_free) for more in range(1 + turn % 2))
+    if simple.others and turn % 3 > 1:
+        return another(simple.others[0], text, turn, is_free)
+    known = simple.enumeration or (() if simple.patterns else _known(simple, is_free))
+    if known:
+        return known[turn % len(known)]
+    if simple.builtin in FLOATS | {"decimal"}:
+        low = float(simple.minimum) if simple.minimum is not None else 0.0
+        high = float(simple.maximum) if simple.maximum is not None else low + 1.0
+        share = (0.25, 0.75, 0.5, 0.625, 0.375, 0.6875)[turn % 6]
+        return f"{low + share * (high - low):.10g}"
+    return text
+
+
+def _known(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - as another()
+    """Return values of a type, in the order of turns."""
+    shortest, longest = simple.min_length or 0, simple.max_length
+    if simple.builtin in INTEGERS and is_free:
+        low, high = bounds(simple)
+        is_wide = simple.builtin in _WIDE and simple.minimum is None is simple.maximum
+        return _LARGE if is_wide else tuple(str(min(max(one, low), high)) for one in _SMALL)
+    if simple.builtin in STRINGS and is_free:
+        return tuple(one for one in _TEXTS if shortest <= len(one) <= (len(one) if longest is None else longest))
+    return () if shortest or longest else _TYPED.get(simple.builtin, ())
+
+
+def rewritten(simple: Simple, text: str, form: int) -> str:
+    """Return the same value in one of two other forms of its type (XML Schema Part 2, 3.2)."""
+    if simple.patterns or simple.enumeration:
+        return text
+    if simple.many:
+        return ("\n", "  ")[form].join(rewritten(replace(simple, many=False), one, form) for one in text.split())
+    number = number_in(text) if simple.builtin in NUMBERS else None
+    if number is not None:
+        is_float = simple.builtin in FLOATS
+        return (f"{number:E}" if is_float else f"{number:+f}", f"\n{'00' if number >= 0 else ''}{text} ")[form]
+    others = {
+        "boolean": ({"true": "1", "false": "0"}.get(text, text), f"\n {text} "),
+        "hexBinary": (text.lower(), text),
+        "base64Binary": (f"{text[:2]}\n{text[2:]}", text),
+    }
+    return others.get(simple.builtin, (text, text))[form]

@@ -22,33 +22,36 @@ def padded(document: bytes, octets: int) -> bytes:
     return document[:end] + b" " * (octets - len(document)) + document[end:]
 
 
-def ordinary(element: Element, *, optional: bool = False) -> Node:
-    """One valid message with ordinary values, with optional elements or without.
+def ordinary(element: Element, *, optional: bool = False, form: int = 0) -> Node:
+    """One valid message with ordinary values, with optional elements and attributes or without.
 
     An optional element that alone is in its parent is always made: a wrapper without its argument says nothing.
+    ``form`` tells which branch a choice has, in rotation; in an odd one, what may repeat is there twice if optional.
     """
     kind = element.type
     if isinstance(kind, Simple):
         return Node(element.tag, lexical.plain(kind))
-    attributes = tuple((name, lexical.plain(simple)) for name, simple, required in kind.attributes if required)
+    attributes = tuple((name, lexical.plain(simple)) for name, simple, needed in kind.attributes if needed or optional)
     if kind.text is not None:
         return Node(element.tag, lexical.plain(kind.text), (), attributes)
-    return Node(element.tag, "", _ordinary(kind.content, optional=optional), attributes)
+    return Node(element.tag, "", _ordinary(kind.content, form, optional=optional), attributes)
 
 
-def _ordinary(group: Group | None, *, optional: bool) -> tuple[Node, ...]:
+def _ordinary(group: Group | None, form: int, *, optional: bool) -> tuple[Node, ...]:
     if group is None:
         return ()
     if group.model == "choice":
-        return _some(group.items[0], optional=optional) if group.items else ()
+        return _some(group.items[form % len(group.items)], form, optional=optional) if group.items else ()
     alone = len(group.items) == 1
-    return tuple(node for item in group.items for node in _some(item, optional=optional or alone))
+    return tuple(node for item in group.items for node in _some(item, form, optional=optional or alone))
 
 
-def _some(item: Element | Group, *, optional: bool) -> tuple[Node, ...]:
-    count = max(item.minimum, 1 if optional and item.maximum != 0 else 0)
-    made = (ordinary(item, optional=optional),) if isinstance(item, Element) else _ordinary(item, optional=optional)
-    return made * min(count, _MOST)
+def _some(item: Element | Group, form: int, *, optional: bool) -> tuple[Node, ...]:
+    most = 1 + form % 2
+    count = max(item.minimum, min(most, most if item.maximum is None else item.maximum) if optional else 0)
+    if isinstance(item, Element):
+        return (ordinary(item, optional=optional, form=form),) * min(count, _MOST)
+    return _ordinary(item, form, optional=optional) * min(count, _MOST)
 
 
 def filled(element: Element, values: Mapping[str, str]) -> Node:
@@ -97,11 +100,16 @@ def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], El
 
 
 def simple_leaves(element: Element, node: Node) -> list[tuple[tuple[int, ...], Simple]]:
-    """Return the paths of the values in a valid message, each with its type."""
-    own = [((), element.type)] if isinstance(element.type, Simple) else []
-    return own + [
-        (path, declared.type) for path, declared in declarations(element, node) if isinstance(declared.type, Simple)
-    ]
+    """Return the paths of the values in a valid message, attributes included, each with its type."""
+    found: list[tuple[tuple[int, ...], Simple]] = []
+    for path, declared in [((), element), *declarations(element, node)]:
+        kind = declared.type
+        simple = kind if isinstance(kind, Simple) else kind.text
+        found += [(path, simple)] if simple is not None else []
+        types = {} if isinstance(kind, Simple) else {name: one for name, one, _ in kind.attributes}
+        names = [name for name, _ in node.at(path).attributes]
+        found += [((*path, ~index), types[name]) for index, name in enumerate(names) if name in types]
+    return found
 
 
 def sequences(element: Element, node: Node) -> list[tuple[int, ...]]:

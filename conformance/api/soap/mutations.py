@@ -9,11 +9,11 @@ from itertools import pairwise
 from typing import Final
 
 from conformance.api.mutations import Member, Mutation, broken_members
-from conformance.api.soap.messages import declarations, sequences, simple_leaves, with_text
+from conformance.api.soap.messages import declarations, ordinary, sequences, simple_leaves, with_text
 from conformance.documents import xsd_shapes as lexical
 from conformance.documents.xml import XSI, Node, clark, local, namespace, parse
 from conformance.documents.xsd import Types
-from conformance.documents.xsd_shapes import Element, Simple
+from conformance.documents.xsd_shapes import Element, Group, Simple
 
 STRANGE: Final = "urn:example:strange"
 _NOBODY: Final = "no_such_element"
@@ -21,6 +21,8 @@ _NOBODY: Final = "no_such_element"
 Payload = tuple[Node, ...]
 # Kinds of faults that no schema can forbid.
 _BEYOND_SCHEMA: Final = frozenset({"body", "non-finite"})
+# An element that may occur this often is not sent once more than that.
+_MANY: Final = 100
 
 
 def invalid_ones(mutations: Iterable[Mutation[Payload]], types: Types) -> Iterator[Mutation[Payload]]:
@@ -98,17 +100,39 @@ def _values(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
 
 
 def facets(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
-    """Yield mutations by values that a facet of the type may forbid, of elements and of attributes."""
-    for path, declared in [((), element), *declarations(element, base)]:
-        kind, node = declared.type, base.at(path)
-        simple = kind if isinstance(kind, Simple) else kind.text
-        for text in lexical.beyond(simple, node.text) if simple else ():
+    """Yield mutations that facets, choices, numbers of elements and required attributes may forbid."""
+    for path, simple in simple_leaves(element, base):
+        node = base.at(path)
+        for text in lexical.beyond(simple, node.text):
             yield Mutation("facet", f"{text[:60]!r} at {node.name}", (with_text(base, path, text),))
+        if path and path[-1] < 0:
+            yield Mutation("missing", f"{node.name} missing at {base.at(path[:-1]).name}", (base.replaced(path),))
+    for path, declared in [((), element), *declarations(element, base)]:
+        parent, content = base.at(path), None if isinstance(declared.type, Simple) else declared.type.content
+        by_tag = {child.tag: child for child in declared.children}
+        for number, child in enumerate(parent.children):
+            most = by_tag[child.tag].maximum if child.tag in by_tag else None
+            if most and 1 < most < _MANY:
+                more = base.replaced((*path, number), *(child,) * (most + 1))
+                yield Mutation("facet", f"{most + 1} times {child.name} at {parent.name}", (more,))
+            for other in _branches(content, child.tag):
+                both = base.replaced((*path, number), child, ordinary(other))
+                yield Mutation("facet", f"{local(other.tag)} beside {child.name}, of which one is allowed", (both,))
+
+
+def _branches(group: Group | None, tag: str) -> Iterator[Element]:
+    """Yield the elements that a choice allows in place of one."""
+    for item in group.items if group else ():
+        if isinstance(item, Group):
+            yield from _branches(item, tag)
+        elif group and group.model == "choice" and tag in {one.tag for one in group.elements()} - {item.tag}:
+            yield item
 
 
 def _wrapped(simple: Simple, text: str) -> tuple[str, ...]:
     """Return what becomes the same value where only the lower 32 bits of an integer are kept."""
-    return (str(int(text) + 2**32),) if simple.builtin in lexical.INTEGERS else ()
+    number = lexical.number_in(text) if simple.builtin in lexical.INTEGERS else None
+    return (str(int(number) + 2**32),) if number is not None else ()
 
 
 def _nil(element: Element, base: Node) -> Iterator[Mutation[Payload]]:

@@ -79,6 +79,11 @@ class Act:
         is_one = self.role is not Role.READS and self.role not in LAST
         return {name: one for name, one in self.told.items() if is_one and name not in self.needs and _is_id(name, one)}
 
+    @property
+    def names(self) -> dict[str, Simple]:
+        """The values by which a thing that it writes or creates may be identified."""
+        return self.makes if self.role is Role.CREATES else self.sent
+
     def keys(self, name: str, simple: Simple) -> list[str | Simple]:
         """Return the keys by which other messages may know a value: its name, a bare id with the noun, and its type."""
         named = [f"{self.noun}{name}", *([] if REFERS.fullmatch(name) else [name])]
@@ -90,11 +95,12 @@ class Act:
         return label_of(self.port, self.operation)
 
     def shows(self, writer: Act) -> bool:
-        """Return whether this operation reads values that another one writes."""
+        """Return whether this operation reads values that another one writes, or creates a thing with."""
+        is_its = writer.role is Role.CREATES and self.noun == writer.noun and bool(self.needs)
         return (
             self.role is Role.READS
-            and writer.role is Role.WRITES
-            and self.needs <= writer.sent.keys()
+            and (writer.role is Role.WRITES or is_its)
+            and self.needs <= writer.names.keys()
             and not self.told.keys().isdisjoint(writer.sent.keys() - self.sent.keys())
         )
 

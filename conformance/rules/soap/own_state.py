@@ -87,10 +87,13 @@ def _declared(probes: list[SoapProbe], found: Wsdl | None) -> dict[str, frozense
     return {label: faults - (general & refusing) for label, faults in by_label.items()}
 
 
+def entries(fault: etree._Element) -> list[etree._Element]:
+    """Return the elements in the detail of a fault."""
+    return [one for part in elements(fault) if local(str(part.tag)).lower() == "detail" for one in elements(part)]
+
+
 def _inside(fault: etree._Element) -> frozenset[str]:
-    """Return the tags in the detail of a fault."""
-    details = [one for one in elements(fault) if local(str(one.tag)).lower() == "detail"]
-    return frozenset(str(one.tag) for detail in details for one in elements(detail))
+    return frozenset(str(one.tag) for one in entries(fault))
 
 
 def _is_repeatable(probes: list[SoapProbe], label: str) -> bool:

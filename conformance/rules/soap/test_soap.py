@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING
+
+from lxml import etree
 
 from conformance.documents.multipart import parts_of
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import elements, local, text_of
-from conformance.rules.soap.own_state import unexplained
+from conformance.rules.soap.own_state import entries, unexplained
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
@@ -20,12 +21,10 @@ from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 from conformance.verdict.run import Run
 
-if TYPE_CHECKING:
-    from lxml import etree
-
 _ON = (soap_survey, soap_changes)
 _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
+_CHILDREN_11 = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
 # A message that shows no version of SOAP may be answered by a fault of any version, or by none.
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
@@ -155,14 +154,17 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
 
 
 @rule("soap/fault", on=_ON)
-def fault(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a fault has what its SOAP version demands: a code that is a QName, and a text."""
+def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
+    """Judge whether a fault has what its SOAP version demands, and what the WSDL declares for its detail."""
+    types = None if (found := services_of(run.contract)) is None else found.types
 
     def wrong(probe: SoapProbe) -> str | None:
         found = probe.fault
-        if found is None or probe.kind in _OF_NO_VERSION:
+        if found is None:
             return None
-        return _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
+        wrong = _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
+        known = [one for one in entries(found) if types and types.shape(str(one.tag)) is not None]
+        return wrong or next(filter(None, (types.invalid(one) for one in known if types)), "")
 
     return _told(trace, "a well-made fault", wrong)
 
@@ -173,12 +175,21 @@ def _wrong_fault_11(found: etree._Element) -> str:
     for name in ("faultcode", "faultstring"):
         if name not in by_name:
             return f"no {name} without a namespace"
+    if strange := by_name.keys() - _CHILDREN_11:
+        return f"the child {min(strange)}, which SOAP 1.1 does not have"
     prefix, colon, _ = text_of(by_name["faultcode"]).strip().rpartition(":")
     return (
         f"faultcode with the prefix {prefix!r}, which is not declared"
         if colon and not (by_name["faultcode"].nsmap.get(prefix))
         else ""
     )
+
+
+def _code_of(found: etree._Element) -> tuple[str, str]:
+    """Return namespace and name of a fault's code."""
+    code = next((one for one in found.iter(etree.Element) if local(one.tag) in {"faultcode", "Value"}), found)
+    prefix, _, name = text_of(code).strip().rpartition(":")
+    return code.nsmap.get(prefix or None) or "", name
 
 
 def _wrong_fault_12(found: etree._Element) -> str:
@@ -229,9 +240,17 @@ def _came(probe: SoapProbe) -> str:
     return f"a fault: {' '.join(' '.join(map(str, found.itertext())).split())[:200]}"
 
 
-def _refused(trace: Trace, expected: str, *kinds: Kind) -> Iterator[Outcome]:
+def _refused(trace: Trace, expected: str, *kinds: Kind, code: str = "") -> Iterator[Outcome]:
+    """Judge whether messages are refused, and with a fault of SOAP that has the code for that, if there is one."""
+    usable = {one.operation for one in trace if one.kind is Kind.AGAIN and one.succeeded}
+
     def wrong(probe: SoapProbe) -> str | None:
-        return None if probe.exchange is None else "success" if probe.succeeded else ""
+        if probe.exchange is None or probe.succeeded:
+            return None if probe.exchange is None else "success"
+        own = _code_of(probe.fault) if probe.fault is not None else (probe.envelope, code)
+        return (
+            "" if not code or probe.operation not in usable or own == (probe.envelope, code) else f"the code {own[1]}"
+        )
 
     return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
 
@@ -251,13 +270,13 @@ def invalid_refused(trace: Trace) -> Iterator[Outcome]:
 @rule("soap/version-mismatch", on=_ON)
 def version_mismatch(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a message of an unknown SOAP version is refused."""
-    return _refused(trace, "a fault", Kind.VERSION)
+    return _refused(trace, "a VersionMismatch fault", Kind.VERSION, code="VersionMismatch")
 
 
 @rule("soap/must-understand", on=_ON)
 def must_understand(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a message with a header block that must be understood, and is unknown, is refused."""
-    return _refused(trace, "a MustUnderstand fault", Kind.UNDERSTAND)
+    return _refused(trace, "a MustUnderstand fault", Kind.UNDERSTAND, code="MustUnderstand")
 
 
 @rule("soap/doctype-refused", on=_ON)
