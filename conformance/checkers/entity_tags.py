@@ -1,4 +1,4 @@
-"""Entity tags: each stands for one content, and conditions on them hold (RFC 9110 8.8.1, 13.1)."""
+"""Entity tags, conditions and ranges: a tag stands for one content, and 304 and 206 are asked for (RFC 9110 13, 14)."""
 
 import re
 from collections.abc import Iterator
@@ -12,6 +12,8 @@ from conformance.transport.exchange import SAFE_METHODS, Response
 from conformance.verdict.evidence import Case
 
 _TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
+_OPAQUE: Final = re.compile(r'"[^"]*"')
+_PART: Final = re.compile(r"bytes (?P<first>\d+)-(?P<last>\d+)/", re.IGNORECASE)
 _LIST: Final = re.compile(rf"\s*{_TAG.pattern}(?:\s*,\s*{_TAG.pattern})*\s*")
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _CONDITIONS: Final = frozenset(
@@ -81,15 +83,18 @@ class EntityTags:
                 asked[name.lower()] = f"{asked[name.lower()]}, {value}" if name.lower() in asked else value
         if request.method not in SAFE_METHODS:
             yield from self._write(occasion, asked)
-        elif request.method == "GET" and "range" not in asked:
+        elif request.method in {"GET", "HEAD"} and "range" not in asked:
             if "if-none-match" in asked:
                 yield from self._cached(occasion, asked)
-            yield from self._read(occasion)
+            if request.method == "GET":
+                yield from self._read(occasion)
 
     def _read(self, occasion: Occasion) -> Iterator[Case]:
         """Compare a content with the earlier content of the same tag, and with the one before the last write."""
         url, answer = occasion.request.url, occasion.response
-        waiting, wrote = self._waiting.pop(url, None), self._wrote.pop(url, None)
+        # A content with a coding has a tag of its own.
+        wrote = self._wrote.pop(url, None) if not answer.header("content-encoding") else None
+        waiting = self._waiting.pop(url, None)
         if answer.status == HTTPStatus.OK and url in self._stale:
             stale, current = self._stale.pop(url)
             expected = f"status 200 for a client without {current}, which was current before and after"
@@ -127,6 +132,8 @@ class EntityTags:
         """Judge a read by a client that has a copy: if it is current, it gets 304."""
         answer, label = occasion.response, label_of(occasion.operation)
         tags = {one.removeprefix("W/") for one in _TAG.findall(asked["if-none-match"])}
+        # Any content is one that is there.
+        is_any = asked["if-none-match"].strip() == "*"
         expected = "status 304, because If-None-Match has the current entity tag"
         if answer.status == HTTPStatus.NOT_MODIFIED:
             self._has_304 = True
@@ -134,18 +141,20 @@ class EntityTags:
             known = now.header("etag") if now is not None else None
             expected = f"status 304 with ETag: {known}, as status 200 has one (RFC 9110 15.4.5)" if known else expected
             is_alike = self._asked.get(occasion.request.url) == fields_of(occasion)
-            if known and is_alike and known.removeprefix("W/") not in tags and asked["if-none-match"].strip() != "*":
+            if known and is_alike and known.removeprefix("W/") not in tags and not is_any:
                 self._stale[occasion.request.url] = occasion, known
             tag = answer.header("etag")
-            holds = known is None or tag is not None
-            yield occasion.case(_TAGS, holds, expected, "status 304 without ETag", cause=f"{label} 304 without")
+            lacks = "" if known is None or tag is not None else "ETag"
+            if now is not None and is_alike and now.header("vary") and not answer.header("vary"):
+                lacks, expected = "Vary", "status 304 with Vary, as status 200 has one (RFC 9110 15.4.5)"
+            yield occasion.case(_TAGS, not lacks, expected, f"status 304 without {lacks}", cause=f"{label} 304 without")
             if tag is not None and tags:
                 expected = "status 304 with an ETag that is in If-None-Match"
                 is_named = tag.removeprefix("W/") in tags
                 yield occasion.case(_TAGS, is_named, expected, f"ETag: {tag}", cause=f"{label} 304 other")
             yield from self._ignored
             self._ignored.clear()
-        elif answer.status == HTTPStatus.OK and (answer.header("etag") or "").removeprefix("W/") in tags:
+        elif answer.status == HTTPStatus.OK and (is_any or (answer.header("etag") or "").removeprefix("W/") in tags):
             case = occasion.case(
                 _TAGS, False, expected, f"status 200 with ETag: {answer.header('etag')}", cause=f"{label} 304"  # noqa: FBT003
             )  # fmt: skip
@@ -314,3 +323,54 @@ def _said(value: dict[str, Any], name: str) -> str:
 def label_of(operation: Operation | None) -> str:
     """Return the label of an operation; empty without one."""
     return operation.label if operation else ""
+
+
+class Conditional:
+    """Judges responses to conditions, by the entity tags and dates that the run has seen."""
+
+    def __init__(self) -> None:
+        # By URL: the entity tags that were sent, and whether a time of change was.
+        self._tags: dict[str, set[str]] = {}
+        self._dated: set[str] = set()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        url, answer = occasion.request.url, occasion.response
+        # What comes with 304 may be what the client itself has sent.
+        if answer.status != HTTPStatus.NOT_MODIFIED:
+            self._tags.setdefault(url, set()).update(_OPAQUE.findall(answer.header("etag") or ""))
+            if answer.header("last-modified") is not None:
+                self._dated.add(url)
+        asked = {name.lower(): value for name, value in occasion.request.headers}
+        yield from self._not_modified(occasion, asked)
+        if "range" in asked or answer.status == HTTPStatus.PARTIAL_CONTENT:
+            yield _range(occasion, asked)
+
+    def _not_modified(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+        id_, is_unchanged = "http/preconditions", occasion.response.status == HTTPStatus.NOT_MODIFIED
+        tags = _OPAQUE.findall(asked.get("if-none-match", ""))
+        if tags and asked["if-none-match"].strip() != "*":
+            expected = "another status than 304 when the robot never sent the entity tag"
+            has_sent = not self._tags.get(occasion.request.url, set()).isdisjoint(tags)
+            yield occasion.case(id_, has_sent or not is_unchanged, expected)
+        elif "if-modified-since" in asked and "if-none-match" not in asked:
+            # Where a robot says when something was changed, by whatever clock, that may have been longer ago.
+            expected = "another status than 304 when the resource has no Last-Modified"
+            yield occasion.case(id_, not is_unchanged or occasion.request.url in self._dated, expected)
+        elif is_unchanged and "if-none-match" not in asked:
+            yield occasion.case(id_, False, "another status than 304 for a request without a condition")  # noqa: FBT003
+
+
+def _range(occasion: Occasion, asked: dict[str, str]) -> Case:
+    """Judge a request for a part: the response is the whole, or 206 with its Content-Range."""
+    answer = occasion.response
+    # A server may send less than was asked for, or more, and then says so (RFC 9110 15.3.7).
+    part = _PART.match(answer.header("content-range") or "")
+    fits = part is not None and len(answer.body) == int(part["last"]) - int(part["first"]) + 1
+    fits |= occasion.context.is_head or answer.media_type == "multipart/byteranges"
+    return occasion.case(
+        "http/range",
+        answer.status != HTTPStatus.PARTIAL_CONTENT or ("range" in asked and fits),
+        "another status than 206, or a part that was asked for, and the header field Content-Range that fits it",
+        f"status 206 with {len(answer.body)} bytes and Content-Range: {answer.header('content-range')}",
+    )

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
-from conformance.checkers import conditional, declared, fields, problem
+from conformance.checkers import declared, fields, problem
 from conformance.checkers.changes import Changes
 from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
-from conformance.checkers.entity_tags import EntityTags
+from conformance.checkers.entity_tags import Conditional, EntityTags
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
@@ -46,7 +46,7 @@ class RestCheckers:
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._untouched, self._codings = Untouched(contract), Codings()
         self._over_time = (
-            conditional.Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
+            Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
             self._untouched,
         )  # fmt: skip

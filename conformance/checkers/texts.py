@@ -84,7 +84,15 @@ class Texts:
 
 def _members(body: bytes, media_type: str) -> dict[str, Any]:
     value = read_json(body).value if body and is_json(media_type) else None
-    return value if isinstance(value, dict) else {}
+    return dict(_within(value)) if isinstance(value, dict) else {}
+
+
+def _within(value: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the members of an object and of the objects in it, by their paths."""
+    for name, one in value.items():
+        yield f"{above}{name}", one
+        if isinstance(one, dict):
+            yield from _within(one, f"{above}{name}.")
 
 
 def _plain(text: str) -> str:

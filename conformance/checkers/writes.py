@@ -273,16 +273,15 @@ class Writes:
 
     def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
-        parts, shape = _parts(change.schema), _parts(item.shape)
-        for name, value in change.sent.items():
-            part = flat(parts.get(name, {}))
-            if name not in change.now or name in change.moving or is_devices(name, part, self._collections):
+        shape = _parts(item.shape)
+        there = {name: one for name, one in change.now.items() if name not in change.moving}
+        for name, part, value, was, now in _leaves(_parts(change.schema), change.sent, change.before, there):
+            if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
-            now, key = change.now[name], (change.operation.label, name)
-            wrong = ""
+            key, wrong, top = (change.operation.label, name), "", name.partition(".")[0]
             if part.get("format") == "double" and _is_rounded(value, now):
                 self._doubts[key].add(str(value).encode())
-                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(name), now)
+                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(top), change.now[top])
                 wrong = f"{shown(now)} as {name}" if is_sure else ""
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
@@ -296,10 +295,15 @@ class Writes:
                     self._doubts[key].add(str(value).encode())
                     wrong = f"{shown(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
-                wrong = f"{now} as {name}" if 0 < abs(now - value) <= abs(value) >> 52 else ""
-            elif part.get("format") == "date-time" and not same(now, change.before.get(name)) and _is_moved(value, now):
+                wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
+            elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
                 wrong = f"{now} as {name}"
-            elif isinstance(value, list) and isinstance(now, list) and not same(now, change.before.get(name)):
+            elif value in ("", []) and not same(was, value):
+                # Null and absent are other values than an empty one.
+                wrong = (
+                    f"{shown(now)} as {name}" if not same(now, value) and change.is_settled(name, change.sent) else ""
+                )
+            elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
             else:
                 continue
@@ -403,14 +407,27 @@ def _is_rounded(value: Any, now: Any) -> bool:
 
 
 def _is_moved(value: Any, now: Any) -> bool:
-    """Return whether a time reads with the same hour in another time zone, which is another instant."""
+    """Return whether a time reads with the same hour in another time zone, or a date as the day beside it."""
     try:
         sent, read = datetime.fromisoformat(value), datetime.fromisoformat(now)
     except (TypeError, ValueError):
         return False
     if sent.tzinfo is None or read.tzinfo is None:
-        return False
+        return len(value) == len(now) == len("2026-11-29") and abs((sent - read).days) == 1
     return sent != read and sent.replace(tzinfo=None, microsecond=0) == read.replace(tzinfo=None, microsecond=0)
+
+
+def _leaves(
+    parts: Mapping[str, Any], sent: dict[str, Any], before: dict[str, Any], now: dict[str, Any], above: str = ""
+) -> Iterator[tuple[str, Schema, Any, Any, Any]]:
+    """Yield what was sent and is there now, in objects too: its path, its schema, the value, what was there and is."""
+    for name in sent.keys() & now.keys():
+        part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
+        if isinstance(value, dict) and isinstance(seen, dict):
+            inner = was if isinstance(was, dict) else {}
+            yield from _leaves(part.get("properties", {}), value, inner, seen, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", part, value, was, seen
 
 
 def _parts(schema: Schema | None) -> Mapping[str, Any]:

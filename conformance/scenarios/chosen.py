@@ -81,7 +81,13 @@ class Chosen:
         }
         # A list that has it before, and one that does not: the filter chooses by this member, as it is named.
         usable = [one for one, found in lists.items() if one != was and found.is_whole and thing.id not in found.ids]
-        if thing.id not in lists[was].ids or not usable or is_stored(lists[was].exchange):
+        if is_stored(lists[was].exchange) or not usable:
+            return
+        if thing.id not in lists[was].ids:
+            # Others are there by this value, so the filter chooses by this member.
+            if lists[was].is_whole and any(members_of(one).get(name) == was for one in lists[was].items):
+                other, expected = "a list without it", f"a list with {thing.id} by {parameter.name}={was}, as it reads"
+                self.living.note(Kind.CHOSEN, listing.operation.label, lists[was].exchange, expected, other, thing)
             return
         counted = list(self._counts(name, (was, usable[0])))
         counts = [one for one in counted if _agrees(one[1], lists) or self._is_said(one[0])]

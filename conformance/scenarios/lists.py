@@ -187,9 +187,10 @@ class Reader:
         inputs = self.usual
         for name, value in {**self.always, **(query or {})}.items():
             inputs = inputs.having("query", name, value)
-        # A device may answer on a new connection in another way.
-        is_odd = len(query or {}) % 2 == 1
-        found, limit = self.api.send(written(self.listing.operation, inputs), fresh=is_odd), self.listing.limit
+        # A device may answer on a new connection, or with a coding, in another way.
+        is_odd, request = len(query or {}) % 2 == 1, written(self.listing.operation, inputs)
+        headers = (*request.headers, *([("Accept-Encoding", "gzip")] if is_odd else []))
+        found, limit = self.api.send(replace(request, headers=headers), fresh=is_odd), self.listing.limit
         page, most = (
             page_of(found.response, self.listing.operation),
             inputs.query.get(limit.name) if limit is not None else None,

@@ -12,6 +12,7 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote
 
+from conformance.api.rest.listing import fitting, listing_of
 from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, represented
 from conformance.documents.json_schema import Schema, is_number
 from conformance.documents.json_text import read_json, shown
@@ -35,6 +36,8 @@ _STATES: Final = ("state", "status", "phase")
 _PLACES: Final = re.compile(r"(?:url|uri|href|link|links|self|path)$")
 _TIME: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _MANY: Final = 10
+# Items on a page where a list is read in pages.
+_PAGE: Final = 2
 # Newest things that a collection keeps: then it drops the oldest.
 _RING: Final = 3
 
@@ -353,7 +356,12 @@ class Living:
         if self.lister is None:
             raise ValueError("the collection has no list")
         path = thing.path.rstrip("/").rpartition("/")[0] + ("/" if self.lister.template.endswith("/") else "")
-        return read_whole(self.writer, self.lister, self.read, path)
+        # A short list that makes several pages is read page after page.
+        listing, is_more = listing_of(self.lister), len(self.of(State.ALIVE)) > _PAGE
+        is_short = self.listing is not None and len(self.listing.items) <= _MANY - _PAGE
+        limit = listing.limit if listing is not None and is_short and is_more else None
+        few = {limit.name: _PAGE} if limit is not None and fitting(limit, _PAGE) else {}
+        return read_whole(self.writer, self.lister, self.read, path, few)
 
     def _wrong(self, listing: WholeList) -> list[tuple[Thing, Kind, str, str]]:
         """Return a list's fault: the thing, the exchange that shows it, what was expected, and what was found."""

@@ -29,6 +29,7 @@ _REFUSALS: Final = 8
 _READS: Final = 20 - TIMED_AGAIN
 # Octets of a content from which parts are requested.
 _LONG: Final = 8
+_PARTS: Final = ((("Range", "bytes=2-5"),), (("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 # Usual response time below which operations are read more often, ms.
 _QUICK_MS: Final = 50.0
 _FEW_READS: Final = 2
@@ -97,8 +98,9 @@ def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange 
     """Where the last read had an entity tag, read by conditions of clients that have that copy, or another one."""
     tag = (last.response.header("etag") or "") if last is not None else ""
     request = written(read, inputs)
-    for tags in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG) if tag else ():
-        conditional = replace(request, headers=(*request.headers, ("If-None-Match", tags)))
+    conditions = [("GET", one) for one in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", "*", NO_TAG)]
+    for method, tags in (*conditions, ("HEAD", tag)) if tag else ():
+        conditional = replace(request, method=method, headers=(*request.headers, ("If-None-Match", tags)))
         surveyor.send(read, Variation(Kind.ODD, "", "", inputs), conditional, fresh=False)
 
 
@@ -108,11 +110,15 @@ def _parts(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange |
         return
     if "206" not in read.responses and (last.response.header("accept-ranges") or "").strip().lower() != "bytes":
         return
-    request = written(read, inputs)
-    for fields in ((("Range", "bytes=2-5"),), (("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG))):
-        part = replace(request, headers=(*request.headers, *fields))
-        surveyor.send(read, Variation(Kind.ODD, "", "", inputs), part, fresh=False)
-    surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), fresh=False)
+    read_parts(surveyor, read, written(read, inputs))
+
+
+def read_parts(surveyor: Surveyor, read: Operation, whole: Outgoing, *, more: bool = True) -> None:
+    """Read a part of a content, its end and one of another copy if there are ``more``, and the whole."""
+    for fields in _PARTS if more else _PARTS[:1]:
+        part = replace(whole, headers=(*whole.headers, *fields))
+        surveyor.send(read, Variation(Kind.ODD, "", "", Inputs()), part, fresh=False)
+    surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole, fresh=False)
 
 
 def _head(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:

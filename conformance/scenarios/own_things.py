@@ -29,7 +29,7 @@ from conformance.documents.openapi import Operation, is_json, operations_of, res
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
 from conformance.scenarios.living import ABSENT
-from conformance.scenarios.neighbours import NO_TAG
+from conformance.scenarios.neighbours import NO_TAG, read_parts
 from conformance.scenarios.refusing import NO_FORMAT
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
@@ -48,7 +48,6 @@ _MEMBERS: Final = 6
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
 # A list of tags that no content has.
 _NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
-_PARTS: Final = ((("Range", "bytes=-2"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 _GONE_PLACE: Final = "path of what was deleted"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # Files with what programs take for the end of a line, of a text or of a file, each shorter than the one before.
@@ -224,6 +223,8 @@ class _Thing:
             waits = True
             # What is written in other formats shows by special bodies.
             formats = _by_format(change)
+            for own in formats[1:] if self.tag else ():
+                self._refused(own, list(islice(self._special(own), 1)))
             for one, body in ((own, body) for own in formats for body in self._special(own)):
                 before, until = self._members(), time.monotonic() + _SETTLES_S
                 is_done = self.sent(one, body, *self._current(), place="body").ok
@@ -240,7 +241,8 @@ class _Thing:
         That is a wrong condition or none, no format that the device has, and no credentials.
         """
         names = {one.name.lower() for one in change.parameter("header")}
-        tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] if self.tag else []
+        # Twice: a device may take the second try for a wish to overwrite.
+        tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] * 2 if self.tag else []
         if self._current() and "if-match" in names:
             # Strong comparison: a weak tag matches none (RFC 9110 13.1.1).
             tried += [
@@ -253,17 +255,18 @@ class _Thing:
             tried.append((("If-None-Match", "*"),))
         if "406" in change.responses:
             tried.append((("Accept", NO_FORMAT),))
-        for fields in tried:
-            is_right = fields and fields[0][0] != "If-Match"
-            self.sent(change, self._other(bodies), *fields, *(self._current() if is_right else ()))
-            if not self.get().ok:
-                return
+        # First without credentials: what follows may rightly be done.
         if demands(self.api.run.contract.openapi, change):
             body, inputs = self._other(bodies), usual_inputs(change, self.surveyor.values)[0]
             request = written(change, inputs if body is None else replace(inputs, body=body))
             headers = (*request.headers, *self._current())
             self.api.client.send(change.method, self.target, headers=headers, body=request.body, authorized=False)
             self.get()
+        for fields in tried:
+            is_right = fields and fields[0][0] != "If-Match"
+            self.sent(change, self._other(bodies), *fields, *(self._current() if is_right else ()))
+            if not self.get().ok:
+                return
 
     def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
         """Write from two clients at the same moment with the same copy; one of them must be refused.
@@ -352,9 +355,8 @@ class _Thing:
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
         """Read a file, parts of it, and the file again."""
         whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
-        for fields in ((), (("Range", "bytes=2-5"),), *(_PARTS if more else ()), ()):
-            part = replace(whole, headers=(*whole.headers, *fields))
-            self.surveyor.send(read, Variation(Kind.ODD if fields else Kind.AGAIN, "", "", Inputs()), part)
+        self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
+        read_parts(self.surveyor, read, whole, more=more)
 
     def _ended(
         self, put: Operation, read: Operation, delete: Operation | None, request: Outgoing, whole: Outgoing

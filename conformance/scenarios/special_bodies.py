@@ -11,7 +11,7 @@ from conformance.api.rest.inputs import Inputs, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
-from conformance.api.rest.samples import alike_and_apart, fits
+from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.things import another, is_devices
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
@@ -27,6 +27,9 @@ TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
 _ALL_DIGITS: Final = 0.12345678901234
 _BEYOND_DOUBLES: Final = 2**53 + 1
+# Keys of a map's entries; characters of the longest text.
+_KEYS: Final = ("roaas-one", "roaas-two", "roaas-three")
+_LONGEST: Final = 300
 # Members that are removed by null, where a patch allows that.
 _NULLS: Final = 2
 _TIME: Final = "2026-02-{:02}T12:34:56+02:00"
@@ -70,10 +73,11 @@ def special_bodies(
         needed = flat(read.shape or {}).get("required", ())
         nulls = [name for name in there if name not in needed and there[name] is not None and may(name)]
         yield from ({name: None} for name in nulls[:_NULLS] if fits(parts[name], None))
+    # What is refused comes first: what is there already would show nothing.
+    yield from half_valid(change, usual, changed)
     # All together, and what has a time zone alone: the device may have a reason to refuse another one.
     zoned = [{name: one} for name, one in changed.items() if flat(parts[name]).get("format") == "date-time"]
-    yield from (one for one in (changed, *zoned) if one and fits(schema, one))
-    yield from half_valid(change, usual, changed)
+    yield from (one for one in (changed, *zoned, _emptied(parts, changed)) if one and fits(schema, one))
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
         yield restored
@@ -120,6 +124,9 @@ def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
         given = flat(parts.get(name, {}))
         if is_devices(name, given, collections):
             continue
+        if isinstance(body[name], dict):
+            found[name] = telling(given, body[name], turn, collections)
+            continue
         usable = (one for one in _telling(given, found[name], turn) if one != body[name] and fits(given, one))
         value = next(usable, found[name])
         found[name] = value if fits(schema, {**found, name: value}) else found[name]
@@ -134,14 +141,23 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
         for part in (*_PARTS[turn % len(_PARTS) :], *_PARTS):
             yield from (int(value) + part, int(value) - part)
     elif is_number(value) and (schema.get("format") == "int64" or schema.get("maximum", 0) >= _BEYOND_DOUBLES):
-        yield _BEYOND_DOUBLES
+        yield from (-_BEYOND_DOUBLES, _BEYOND_DOUBLES)
     elif isinstance(value, list):
         apart = alike_and_apart(schema)[1][::-1]
         yield from ([*apart, *apart[:1]], apart)
     elif schema.get("format") == "date-time":
         yield _TIME.format(turn)
     elif isinstance(value, str) and is_free_text(schema):
-        yield from TEXTS
+        # As long as it may be: a device may cut it, or count octets.
+        most = min(schema.get("maxLength", 0), _LONGEST)
+        yield from (*((one * most)[:most] for one in TEXTS[:1] if most > len(one)), *TEXTS)
+
+
+def _emptied(parts: Schema, changed: dict[str, Any]) -> dict[str, Any]:
+    """Return an empty text or list for each member that may have one, which is neither null nor absent."""
+    free = {name: one for name, one in changed.items() if isinstance(one, list) or is_free_text(flat(parts[name]))}
+    found = {name: type(one)() for name, one in free.items() if isinstance(one, str | list) and one}
+    return {name: one for name, one in found.items() if fits(parts[name], one)}
 
 
 def _nulls(
@@ -163,6 +179,14 @@ def _nulls(
     changed = telling({"properties": parts}, {name: usable[name] for name in usable if name not in own}, 1, frozenset())
     for name in [one for one in changed if isinstance(changed[one], list) and changed[one] != usable[one]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
+    for name, given in ((one, flat(parts[one]).get("additionalProperties")) for one in usable if one not in own):
+        # One entry of a map goes beside another one that is new, and then all go.
+        entry = sample(given) if isinstance(given, dict) and "properties" not in flat(parts[name]) else None
+        if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):
+            yield {name: dict.fromkeys(_KEYS[:2], entry)}
+            yield {name: {_KEYS[0]: None, _KEYS[2]: entry}}
+            yield {name: dict.fromkeys(_KEYS)}
+            break
     for name, value in changed.items():
         inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
         if inner and len(value) > 1:

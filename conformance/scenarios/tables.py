@@ -22,6 +22,7 @@ from conformance.documents.json_schema import is_number
 from conformance.documents.json_text import shown
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
+from conformance.documents.xsd_shapes import number_in
 from conformance.scenarios.own_things import created_path
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -178,7 +179,7 @@ def _differences(
     for number, (row, item) in enumerate(zip(rows, items, strict=True), 1):
         for name, place in columns.items():
             value, text = item.get(name), row[place].strip() if place < len(row) else ""
-            other = _number(text) if isinstance(value, int | float) and is_number(value) else None
+            other = number_in(text) if isinstance(value, int | float) and is_number(value) else None
             if other is not None and not math.isclose(float(value or 0), other, **_NEAR):
                 yield f"{text} as {name} in row {number}, and {shown(value)} in JSON"
             if isinstance(value, str) and '"' in value and not _is_shown(value.strip(), text):
@@ -189,10 +190,3 @@ def _is_shown(value: str, text: str) -> bool:
     """Return whether a table shows a text, in short or in another encoding as well."""
     is_free = value.startswith(_FORMULA) or "\ufffd" in text or not value.isprintable()
     return is_free or value == text or value.startswith(text.rstrip(". \u2026"))
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

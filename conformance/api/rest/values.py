@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
 from conformance.api.rest.samples import backwards, fits, sample
@@ -47,8 +48,11 @@ class Values:
         self._ids: dict[str, list[Any]] = defaultdict(list)
 
     def learn(self, operation: Operation, exchange: Exchange) -> None:
-        """Remember the scalars of a successful response by name, and the ids of what it lists or created."""
-        response = exchange.response
+        """Remember the scalars of a successful response by name, and the ids in it but that of a deleted thing."""
+        response, (above, _, last) = exchange.response, operation.template.rstrip("/").rpartition("/")
+        if response.ok and operation.method == "DELETE" and last.startswith("{"):
+            gone = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
+            self._ids[above] = [one for one in self._ids[above] if text_of(one) != gone]
         location = (response.header("location") or "").split("?", 1)[0].rstrip("/")
         if response.ok and location:
             self._remember(self._ids[operation.template.rstrip("/")], location.rsplit("/", 1)[-1])

@@ -16,13 +16,15 @@ from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
-from conformance.documents.parameters import Parameter
+from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 
 # Enum values, examples and optional members that are tried in one place; how deep in a body.
 _FEW: Final = 12
 DEPTH: Final = 3
 LONG: Final = 5000
+# Names of members that take any text.
+_TEXTUAL: Final = frozenset({"name", "title", "label", "text", "note", "description", "comment", "message", "remark"})
 _BEYOND: Final = 2**63
 #: Names of members and indexes of items on the way into a body.
 Steps = tuple[str | int, ...]
@@ -254,6 +256,9 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
             filled = replace(usual, body=with_member(usual.body, here, inner))
             yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, filled)
         for kind, one in _valid_values(flatter, flatter.get("examples", ()) or (), [], required=True):
+            if kind is Kind.BOUND and plain_name(name) in _TEXTUAL and isinstance(one, str) and len(one) > 1:
+                # Characters are counted, not octets or units of UTF-16 (JSON Schema Validation 6.3).
+                one = ("\u00e9\U0001f916" * len(one))[: len(one)]  # noqa: PLW2901 - of the same length
             if one != value.get(name, NOTHING):
                 body = with_member(usual.body, here, one)
                 yield Variation(kind, f"{shown(one)} as {place}", place, replace(usual, body=body))

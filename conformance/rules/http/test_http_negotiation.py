@@ -6,6 +6,7 @@ from conformance.api.expectation import expect
 from conformance.api.rest.applicable import answered, reads
 from conformance.api.rest.formats import quality
 from conformance.api.rest.interface import RestInterface
+from conformance.transport.exchange import Outgoing
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
@@ -53,7 +54,7 @@ def test_charset_in_accept(api: RestInterface, judge: Judge) -> None:
 
 
 # Accept-Encoding as clients send it, and as they exclude codings; after every other one the content is read without.
-_CODINGS = ("gzip, br", "identity;q=0, gzip", "gzip;q=0", "identity", "br", "*")
+_CODINGS = ("gzip, br", "deflate", "identity;q=0, gzip", "gzip;q=0", "*;q=0, identity", "identity", "br", "*")
 # Resources of which the largest are chosen; how many these are, beside the smallest.
 _CHOICE, _LARGE = 24, 4
 
@@ -69,6 +70,7 @@ def test_content_codings(api: RestInterface) -> None:
                 call.send(api)
             call.send(api, ("Accept-Encoding", coding))
         call.send(api)
+    api.send(Outgoing("GET", f"{api.path.rstrip('/')}/roaas-is-not-there", (("Accept-Encoding", "gzip"),)))
 
 
 _PRECONDITIONS = "http/preconditions"
