@@ -10,7 +10,17 @@ from lxml import etree
 from conformance.api.soap.envelope import Envelope, Fault, NotSoapError, read_root
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import Wsdl, WsdlError
-from conformance.documents.xml import ENVELOPE, NotXmlError, clark, elements, has_doctype, local, namespace, parse
+from conformance.documents.xml import (
+    ENVELOPE,
+    NotXmlError,
+    clark,
+    elements,
+    has_doctype,
+    has_instruction,
+    local,
+    namespace,
+    parse,
+)
 from conformance.transport.exchange import Attempt, Exchange, Response
 from conformance.verdict.evidence import Case
 
@@ -128,7 +138,7 @@ def _message(
     yield case("R1012", encoding in _ENCODINGS, _UTF, lambda: f"the encoding {encoding!r}")
     yield case("R1018", _fits(response), "the charset of the body in Content-Type", lambda: _type(response))
     yield case("R1008", not has_doctype(root), "a message without DOCTYPE", lambda: "a message with a DOCTYPE")
-    is_plain = not _has_instruction(root)
+    is_plain = not has_instruction(root)
     yield case("R1009", is_plain, "a message without processing instructions", lambda: "a processing instruction")
     try:
         message = read_root(root)
@@ -220,13 +230,6 @@ def _fits(response: Response) -> bool:
     # XML begins with "<" or a byte order mark, so that UTF-16 has a zero or a mark of its own in its first two octets.
     wide = response.body[:2] in {b"\xff\xfe", b"\xfe\xff"} or 0 in response.body[:2]
     return wide == charset[1].lower().startswith("utf-16")
-
-
-def _has_instruction(root: etree._Element) -> bool:
-    if any(node is not None for node in root.iter(etree.PI)):
-        return True
-    around = [*root.itersiblings(preceding=True), *root.itersiblings()]
-    return any(isinstance(node, etree._ProcessingInstruction) for node in around)  # noqa: SLF001 - no public name
 
 
 def _type(response: Response) -> str:

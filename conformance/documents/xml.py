@@ -57,6 +57,14 @@ def has_doctype(root: etree._Element) -> bool:
     return root.getroottree().docinfo.internalDTD is not None
 
 
+def has_instruction(root: etree._Element) -> bool:
+    """Return whether the document of a root element has a processing instruction."""
+    if any(node is not None for node in root.iter(etree.PI)):
+        return True
+    around = [*root.itersiblings(preceding=True), *root.itersiblings()]
+    return any(isinstance(node, etree._ProcessingInstruction) for node in around)  # noqa: SLF001 - no public name
+
+
 def elements(parent: etree._Element) -> list[etree._Element]:
     """Return the element children, without comments, processing instructions and entities."""
     return [child for child in parent if isinstance(child.tag, str)]

@@ -16,12 +16,12 @@ from typing import Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.forms import another, rewritten
-from conformance.api.soap.messages import declarations, simple_leaves, with_text
-from conformance.api.soap.mutations import invalid_ones, mutations
+from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
+from conformance.api.soap.mutations import branches, invalid_ones, mutations
 from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.openapi import operations_of
-from conformance.documents.xml import XSI, Node, clark, parse
+from conformance.documents.xml import NEXT_12, NEXT_ACTOR, XSI, Node, clark, parse
 from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, is_alike, plain
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
@@ -104,11 +104,6 @@ class _Changes:
                 if has:
                     self.acts.append((act, declared, node))
 
-    def send(self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED, *blocks: Node) -> SoapProbe:
-        """Send a message to an operation, with further header blocks."""
-        octets = self.caller.messages.message(act.port, act.operation, node, *blocks)
-        return self.caller.send(act.port, act.operation, kind, says, octets)
-
     def by_role(self, role: Role) -> list[tuple[Act, Element, Node]]:
         """Return the operations of a role that have values in their message."""
         return [(act, declared, node) for act, declared, node in self.acts if act.role is role and declared and node]
@@ -120,10 +115,7 @@ class _Changes:
             return
         until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
         keys = {name for one, _, _ in readers for name in one.sent}
-        forms = [
-            (one, [(path, simple) for path, simple in simple_leaves(declared, one) if path])
-            for one in (node, _once(node))
-        ]
+        forms = _forms_of(declared, node)
         turns, lasting, refusals, whole, leaves = _TURNS[not self._is_quick], 0, 0, *forms[0]
         made = whole
         for turn in range(turns):
@@ -132,15 +124,15 @@ class _Changes:
             node, own = forms[turn % len(forms)]
             free = [one for one in own if node.at(one[0]).name.lower() not in keys]
             made = _varied(node, free, turn)
-            if not self.send(act, made, "a message with other values").succeeded:
+            if not self.caller.ask(act, made, "a message with other values").succeeded:
                 # Not all of them may be changed: those that may are found one by one.
-                may = [one for one in free if self.send(act, _varied(node, [one], turn), "another value").succeeded]
-                keys |= {node.at(one[0]).name.lower() for one in free if one not in may}
-                free = may
+                tried = [(one, self.caller.ask(act, _varied(node, [one], turn), "another value")) for one in free]
+                keys |= {node.at(one[0]).name.lower() for one, probe in tried if not probe.succeeded}
+                free = [one for one, probe in tried if probe.succeeded]
                 if not free:
                     break
                 made = _varied(node, free, turn)
-                self.send(act, made, "a message with other values")
+                self.caller.ask(act, made, "a message with other values")
             sent = self._wait(readers, made, free)
             if sent and lasting < _LASTING:
                 lasting += 1
@@ -157,13 +149,13 @@ class _Changes:
         self._read(readers, made, times=_READS[not self._is_quick])
         node, free = whole, [one for one in leaves if whole.at(one[0]).name.lower() not in keys]
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
-            plain = self.send(act, other, "a message with other values")
+            plain = self.caller.ask(act, other, "a message with other values")
             if plain.succeeded and self._wait(readers, other, free):
-                self.send(act, node, "the first values")
-                self.caller.send(act.port, act.operation, kind, says, octets, charset)
+                self.caller.ask(act, node, "the first values")
+                self.caller.send(act, kind, says, octets, charset)
                 self._wait(readers, other, free)
         self._others(act, node, free, readers)
-        self.send(act, _as_it_was(node, leaves, began), "the values that were there before")
+        self.caller.ask(act, _as_it_was(node, leaves, began), "the values that were there before")
 
     def _forms(
         self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]]
@@ -204,7 +196,7 @@ class _Changes:
         found: dict[str, list[str]] = {}
         for _ in range(times):
             for act, _, node in readers:
-                found |= _told(self.send(act, _asked(node, written), "a valid message"))
+                found |= _told(self.caller.ask(act, _asked(node, written), "a valid message"))
         return found
 
     def _refuse(self, act: Act, declared: Element, node: Node, turn: int) -> None:
@@ -213,10 +205,10 @@ class _Changes:
         tried = sorted(mutations(declared, node), key=lambda one: one.kind != kind)
         tried = [one for one in tried if one.kind in {"lexical", "missing", "unknown"}]
         for wrong in islice(invalid_ones(tried, self.caller.messages.found.types), 1):
-            self.send(act, wrong.made[0], wrong.what, Kind.INVALID)
+            self.caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)
         if turn % 2:
             says = "a header block that must be understood"
-            self.send(act, node, says, Kind.UNDERSTAND, mandatory(act.port))
+            self.caller.ask(act, node, says, Kind.UNDERSTAND, mandatory(act.port))
 
     def _others(
         self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]], readers: list[_Message]
@@ -238,7 +230,7 @@ class _Changes:
         if len(things) > 1:
             written = [_varied(thing, free, turn) for turn, thing in enumerate(things, 1)]
             for made in written:
-                self.send(act, made, "a message for another thing")
+                self.caller.ask(act, made, "a message for another thing")
             for wait_s in (0.0, SETTLES_S):
                 time.sleep(wait_s)
                 for made in written:
@@ -246,12 +238,12 @@ class _Changes:
             # Several clients read different things at the same moment: each has to get its own.
             asked = [(one, _asked(message, made)) for made in written for one, _, message in readers]
             clients = [self._addressed(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
-            send_together([clients] * _ROUNDS[not self._is_quick])
+            send_together([clients] * (_ROUNDS[not self._is_quick] // 2))
             for made in written:
                 self._read(readers, made, times=2)
             for thing, values in told:
                 if values:
-                    self.send(act, _as_it_was(thing, free, values), "the values that were there before")
+                    self.caller.ask(act, _as_it_was(thing, free, values), "the values that were there before")
 
     def create(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
         """Create things, read the lists, be refused, and remove what was created."""
@@ -259,13 +251,14 @@ class _Changes:
         lists = [one for one in self.acts if one[0].lists(act)]
         if remove is None or not lists or remove[2] is None:
             return
-        free = [one for one in simple_leaves(declared, node) if one[0]]
+        forms = _forms_of(declared, node)[::-1]
+        node, free = forms[0]
         readers = [one for one in self.acts if one[0].shows(act)]
         made, asks = list[str](), list[Node]()
         for turn in range(_THINGS):
-            probe = self.send(act, _varied(node, free, turn), "a message that creates")
+            probe = self.caller.ask(act, _varied(*forms[turn % 2], turn), "a message that creates")
             if not probe.succeeded:
-                probe = self.send(act, node, "a message that creates")
+                probe = self.caller.ask(act, node, "a message that creates")
             told = {name: texts[0] for name, texts in _told(probe).items() if len(texts) == 1}
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
             asks = [Node("", "", tuple(Node(*one) for one in told.items())), *asks]
@@ -276,7 +269,7 @@ class _Changes:
             yield
         time.sleep(SETTLES_S)
         self._read(lists, node)
-        for asked in asks * 2:
+        for asked in asks * 3:
             self._read(readers, asked)
         self._refuse(act, declared, _varied(node, free, _THINGS), 0)
         self._read(lists, node, times=2)
@@ -291,14 +284,16 @@ class _Changes:
         paths = [path for path in node.paths() if not node.at(path).children]
         named = [path for path in paths if REFERS.search(node.at(path).name)] or paths
         if named:
-            self.send(act, with_text(node, named[0], id_), "the id of what was created")
+            self.caller.ask(act, with_text(node, named[0], id_), "the id of what was created")
 
     def read_often(self) -> None:
         """Read again and again, one after another and at the same moment."""
         readers = [one for one in self.acts if one[0].role is Role.READS]
+        # What writers change was read as often beside them.
+        written = [act for act, _, _ in self.by_role(Role.WRITES)]
         for act, _, node in readers:
-            for _ in range(_READS[not self._is_quick]):
-                self.send(act, node, "a valid message", Kind.USUAL)
+            for _ in range(0 if any(map(act.shows, written)) else _READS[not self._is_quick]):
+                self.caller.ask(act, node, "a valid message", Kind.USUAL)
         if len(readers) > 1:
             clients = [readers[number % len(readers)] for number in range(MOST_CLIENTS)]
             rounds = range(_ROUNDS[not self._is_quick])
@@ -323,21 +318,20 @@ class _Changes:
                     continue
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
             if act.role is Role.WRITES:
-                self.send(act, node, "the values that were there before")
+                self.caller.ask(act, node, "the values that were there before")
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
             # A reader that takes no comments is left alone: there are many, and no client that writes messages has any.
             for says, style in [one for one in single_changes() if "comment" not in one[0]]:
                 self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
             for says, text, actor in _BLOCKS:
                 block = mandatory(act.port, text, actor)
-                message = partial(self.caller.messages.message, act.port, act.operation, node, block)
-                self._vary(act, node, says, message)
+                self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, node, block))
+            next_ = mandatory(act.port, "1", NEXT_12 if act.port.is_12 else NEXT_ACTOR)
+            self.caller.ask(act, node, "a header block that the next node must understand", Kind.UNDERSTAND, next_)
             other = next((one for one, _, _ in self.acts if one.role is Role.READS and one is not act), None)
             if other is not None:
                 # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
-                octets = self.caller.messages.message(act.port, act.operation, node)
-                says = f"a message with the SOAPAction of {other.operation.name}"
-                self.caller.send(act.port, act.operation, Kind.TRIED, says, octets, action=other.operation)
+                self.caller.ask(act, node, f"a message with the SOAPAction of {other.operation.name}", action=other)
 
     def _styled(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
         """Return a message in a style."""
@@ -345,11 +339,11 @@ class _Changes:
 
     def _vary(self, act: Act, node: Node | None, says: str, write: Callable[[], bytes]) -> None:
         """Send a message, and again where it is refused and the usual one is not; each with a nonce of its own."""
-        probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
+        probe = self.caller.send(act, Kind.TRIED, says, write())
         if not probe.succeeded:
-            if not self.send(act, node, "a valid message").succeeded:
+            if not self.caller.ask(act, node, "a valid message").succeeded:
                 return
-            probe = self.caller.send(act.port, act.operation, Kind.TRIED, says, write())
+            probe = self.caller.send(act, Kind.TRIED, says, write())
         if probe.exchange is not None:
             self.caller.probes.append(replace(probe, kind=Kind.VARIED))
 
@@ -393,6 +387,11 @@ def _asked(node: Node | None, written: Node) -> Node | None:
         if node and (text := names.get(node.at(path).name.lower())) and not node.at(path).children:
             node = with_text(node, path, text)
     return node
+
+
+def _forms_of(declared: Element, node: Node) -> list[tuple[Node, list[tuple[tuple[int, ...], Simple]]]]:
+    """Return a message, and the same one in which nothing is there twice, each with its values."""
+    return [(one, [leaf for leaf in simple_leaves(declared, one) if leaf[0]]) for one in (node, _once(node))]
 
 
 def _once(node: Node) -> Node:
@@ -443,6 +442,8 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
             others += ["\u00fc" * (simple.max_length or 0)][: (simple.max_length or _LONGEST) < _LONGEST]
         for other in others:
             yield f"{other!r} as {name}", with_text(node, path, other)
+    for path, says, branch in branches(declared, node):
+        yield says, node.replaced(path, ordinary(branch))
     for path, part in declarations(declared, node):
         for text in ("true", "1") if part.nillable else ():
             nil = Node(part.tag, "", (), ((clark(XSI, "nil"), text),))

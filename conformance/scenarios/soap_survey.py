@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
@@ -18,7 +19,7 @@ from conformance.documents.multipart import root_of
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
-from conformance.documents.xml import NEXT_12, NEXT_ACTOR, Node, NotXmlError, clark, elements
+from conformance.documents.xml import Node, NotXmlError, clark, elements, has_instruction
 from conformance.documents.xsd_shapes import Element, Simple
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -46,7 +47,7 @@ _MANY: Final = 1000
 # Values from the device that are tried for one operation.
 _TRIED: Final = 3
 # Wrong messages for any operation; invalid messages that a schema of usual size yields.
-_WRONG: Final = 7
+_WRONG: Final = 6
 _USUALLY_INVALID: Final = 4
 
 
@@ -113,6 +114,8 @@ class SoapProbe:
             raise NotSoapError(f"content that cannot be read: {error}") from error
         if root.tag != clark(self.envelope, "Envelope"):
             raise NotSoapError(f"the root element {root.tag}")
+        if has_instruction(root):
+            raise NotSoapError("a processing instruction, which SOAP forbids")
         body = [one for one in elements(root) if one.tag == clark(self.envelope, "Body")]
         if len(body) != 1:
             raise NotSoapError(f"an Envelope with {len(body)} Body elements")
@@ -198,31 +201,31 @@ class Caller:
             maker = self.acts[label]
             keys = {key for name, simple in maker.makes.items() for key in maker.keys(name, simple)}
             if keys & needed and label not in self.lost and maker is not act:
-                octets = self.messages.message(maker.port, maker.operation, node)
-                probe = self.send(maker.port, maker.operation, Kind.TRIED, "a message that creates", octets)
+                probe = self.ask(maker, node, "a message that creates")
                 if probe.succeeded:
                     self.learn(probe, node)
                     return True
         return False
 
-    def send(
-        self,
-        port: SoapPort,
-        operation: SoapOperation,
-        kind: Kind,
-        says: str,
-        octets: bytes,
-        charset: str = "utf-8",
-        action: SoapOperation | None = None,
+    def ask(
+        self, act: Act, node: Node | None, says: str, kind: Kind = Kind.TRIED, *blocks: Node, action: Act | None = None
     ) -> SoapProbe:
-        """Send octets to a port, with the SOAPAction of another operation if one is given.
+        """Send a message to an operation, with further header blocks; see `send`."""
+        octets = self.messages.message(act.port, act.operation, node, *blocks)
+        return self.send(act, kind, says, octets, action=action)
+
+    def send(
+        self, act: Act, kind: Kind, says: str, octets: bytes, charset: str = "utf-8", action: Act | None = None
+    ) -> SoapProbe:
+        """Send octets to an operation, with the SOAPAction of another one if that is given.
 
         Raises:
             PartialTraceError: the device does not respond any more, or the time is over.
         """
-        path = target_of(port)
-        fields = tuple((name, text.replace("utf-8", charset)) for name, text in fields_of(port, action or operation))
-        probe = SoapProbe(label_of(port, operation), kind, says, port.envelope, operation.response)
+        path, operation = target_of(act.port), act.operation
+        fields = fields_of(act.port, (action or act).operation)
+        fields = tuple((name, text.replace("utf-8", charset)) for name, text in fields)
+        probe = SoapProbe(act.label, kind, says, act.port.envelope, operation.response)
         losses = self.api.run.losses
         try:
             probe = replace(probe, exchange=self.api.client.send("POST", path, headers=fields, body=octets))
@@ -286,7 +289,6 @@ def _explore(caller: Caller, act: Act) -> Iterator[None]:
 
 
 def _groups(caller: Caller, act: Act) -> Iterator[None]:
-    port, operation = act.port, act.operation
     declared, node, kind = usual_message(caller, act)
     if act.role in {Role.OTHER, Role.ENDS, Role.WRITES}:
         node = full_message(caller, act, declared, node) or node
@@ -299,8 +301,7 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
     quick = _REPEATED if act.role in {Role.OTHER, Role.ENDS} else 0
     for _ in range(0 if is_once else quick if effort.name == "quick" else _USUAL - 1):
         if act.label not in caller.lost:
-            message = caller.messages.message(port, operation, node)
-            caller.send(port, operation, kind, "a valid message", message)
+            caller.ask(act, node, "a valid message", kind)
     yield
     until = time.monotonic() + _BUDGET_S
     tried = list(mutations(declared, node)) if declared and node else []
@@ -313,21 +314,13 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
     near = list(invalid_ones(facets(declared, node), types)) if declared and node else []
     for wrong in (*invalid_ones(drawn, types), *effort.subsample(near, _MOST)):
         if time.monotonic() < until and act.label not in caller.lost:
-            message = caller.messages.message(port, operation, wrong.made[0])
-            caller.send(port, operation, Kind.INVALID, wrong.what, message)
+            caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)
     yield
-    for kind, says, octets in _odd(caller, port, operation, node):
+    for kind, says, octets in _odd(caller, act, node):
         if time.monotonic() < until and act.label not in caller.lost:
-            caller.send(port, operation, kind, says, octets)
-            if is_once:
-                continue
-            caller.send(
-                port,
-                operation,
-                Kind.AGAIN,
-                f"a valid message after {says}",
-                caller.messages.message(port, operation, node),
-            )
+            caller.send(act, kind, says, octets)
+            if not is_once:
+                caller.ask(act, node, f"a valid message after {says}", Kind.AGAIN)
 
 
 def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None, Kind]:
@@ -362,8 +355,7 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
         if node in tried:
             continue
         tried.append(node)
-        octets = messages.message(act.port, act.operation, node)
-        probe = caller.send(act.port, act.operation, Kind.TRIED if turn else kind, "a valid message", octets)
+        probe = caller.ask(act, node, "a valid message", Kind.TRIED if turn else kind)
         if probe.succeeded:
             kind, caller.probes[-1] = Kind.USUAL, replace(probe, kind=Kind.USUAL)
             caller.learn(probe, node)
@@ -385,16 +377,14 @@ def full_message(caller: Caller, act: Act, declared: Element | None, node: Node 
     """
     if declared is None or node is None:
         return None
-    known = caller.current | {
-        node.at(path).name.lower(): node.at(path).text for path, _ in simple_leaves(declared, node)
-    }
+    values = [node.at(path) for path, _ in simple_leaves(declared, node)]
+    known = caller.current | {one.name.lower(): one.text for one in values}
     for form in (1, 0):
         with contextlib.suppress(NotPossibleError):
             full = caller.messages.usual(act.operation, current=known, form=form)[1]
             if full is None or len(full.written()) <= len(node.written()):
                 continue
-            octets = caller.messages.message(act.port, act.operation, full)
-            probe = caller.send(act.port, act.operation, Kind.TRIED, "a message with all optional parts", octets)
+            probe = caller.ask(act, full, "a message with all optional parts")
             if probe.succeeded:
                 caller.learn(probe, full)
                 return full
@@ -410,17 +400,11 @@ def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
     with contextlib.suppress(NotSoapError):
         texts |= {name: found[0] for one in probe.inside() for name, found in texts_of(one).items()}
     for reader in caller.acts.values():
-        if (
-            reader.role is Role.READS
-            and reader.needs
-            and reader.needs <= texts.keys()
-            and reader.label not in caller.lost
-        ):
+        is_its = reader.role is Role.READS and reader.needs and reader.needs <= texts.keys()
+        if is_its and reader.label not in caller.lost:
             with contextlib.suppress(NotPossibleError):
-                given = {name: [text] for name, text in texts.items()}
-                asked = caller.messages.usual(reader.operation, given=given)[1]
-                octets = caller.messages.message(reader.port, reader.operation, asked)
-                caller.send(reader.port, reader.operation, Kind.TRIED, f"what {act.operation.name} concerns", octets)
+                asked = caller.messages.usual(reader.operation, given={name: [text] for name, text in texts.items()})[1]
+                caller.ask(reader, asked, f"what {act.operation.name} concerns")
 
 
 def mandatory(port: SoapPort, text: str = "1", actor: str = "") -> Node:
@@ -430,26 +414,16 @@ def mandatory(port: SoapPort, text: str = "1", actor: str = "") -> Node:
     return Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), text), *named))
 
 
-def _odd(
-    caller: Caller, port: SoapPort, operation: SoapOperation, node: Node | None
-) -> Iterator[tuple[Kind, str, bytes]]:
+def _odd(caller: Caller, act: Act, node: Node | None) -> Iterator[tuple[Kind, str, bytes]]:
     """Yield messages that are wrong whatever the operation is."""
-    whole = caller.messages.message(port, operation, node)
+    make = partial(caller.messages.message, act.port, act.operation, node)
+    whole = make()
     yield Kind.UNREADABLE, "XML that is not well-formed", whole[: len(whole) * 2 // 3]
     yield Kind.UNREADABLE, "octets that are no XML", b"roaas"
     yield Kind.EMPTY, "an empty body", b""
-    yield (
-        Kind.VERSION,
-        "an Envelope of an unknown namespace",
-        caller.messages.message(port, operation, node, space=STRANGE),
-    )
+    yield Kind.VERSION, "an Envelope of an unknown namespace", make(space=STRANGE)
     # An xs:boolean in SOAP 1.2 (Part 1, 5.2.3); 0 or 1 in SOAP 1.1.
-    for text in ("1", "true") if port.is_12 else ("1",):
-        says = f"a header block that must be understood ({text})"
-        yield Kind.UNDERSTAND, says, caller.messages.message(port, operation, node, mandatory(port, text))
-    actor = NEXT_12 if port.is_12 else NEXT_ACTOR
-    block = mandatory(port, "1", actor)
-    says = "a header block that the next node must understand"
-    yield Kind.UNDERSTAND, says, caller.messages.message(port, operation, node, block)
-    head, rest = caller.messages.message(port, operation, node).split(b"\n", 1)
+    for text in ("1", "true") if act.port.is_12 else ("1",):
+        yield Kind.UNDERSTAND, f"a header block that must be understood ({text})", make(mandatory(act.port, text))
+    head, rest = make().split(b"\n", 1)
     yield Kind.DOCTYPE, "a DOCTYPE", head + b'\n<!DOCTYPE e [<!ENTITY a "b">]>' + rest

@@ -45,11 +45,11 @@ _TYPED: Final = {
     "base64Binary": ("AAEC", "+/8A", "/wD+", "//79/Pv6"),
     "hexBinary": ("0A1B", "00FF", "FF00AC"),
 }
-# Integers by turn, far from each other first, so that later ones lie between: small ones, and for types without bounds
-# those beyond what a double or 32 bits hold.
+# Integers by turn, far from each other first, so that later ones lie between; those of wide types beyond what a double
+# or 32 bits hold.
 _SMALL: Final = (1, 9, 4, 7, 2, 6, 3, 8, 5)
-_WIDE: Final = frozenset({"long", "integer", "nonNegativeInteger", "positiveInteger", "unsignedLong"})
-_LARGE: Final = ("1", str(2**55), "4", str(2**53 + 1), str(2**32 + 7), "6", "3", "8", "5")
+_LARGE: Final = (1, 2**55, 4, 2**53 + 1, 2**32 + 7, 6, 3, 8, 5)
+_WIDE: Final = frozenset({"long", "unsignedLong"})
 # Characters of random texts: those that XML has to escape, and some of two and three octets.
 _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u20ac\u65e5"
 
@@ -154,8 +154,8 @@ def _known(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - 
     shortest, longest = simple.min_length or 0, simple.max_length
     if simple.builtin in INTEGERS and is_free:
         low, high = bounds(simple)
-        is_wide = simple.builtin in _WIDE and simple.minimum is None is simple.maximum
-        return _LARGE if is_wide else tuple(str(min(max(one, low), high)) for one in _SMALL)
+        own = _LARGE if simple.builtin in _WIDE and high > _LARGE[1] else _SMALL
+        return tuple(str(min(max(one, low), high)) for one in own)
     if simple.builtin in STRINGS and is_free:
         return tuple(one for one in _TEXTS if shortest <= len(one) <= (len(one) if longest is None else longest))
     return () if shortest or longest else _TYPED.get(simple.builtin, ())

@@ -108,16 +108,24 @@ def facets(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
         if path and path[-1] < 0:
             yield Mutation("missing", f"{node.name} missing at {base.at(path[:-1]).name}", (base.replaced(path),))
     for path, declared in [((), element), *declarations(element, base)]:
-        parent, content = base.at(path), None if isinstance(declared.type, Simple) else declared.type.content
+        parent = base.at(path)
         by_tag = {child.tag: child for child in declared.children}
         for number, child in enumerate(parent.children):
             most = by_tag[child.tag].maximum if child.tag in by_tag else None
             if most and 1 < most < _MANY:
                 more = base.replaced((*path, number), *(child,) * (most + 1))
                 yield Mutation("facet", f"{most + 1} times {child.name} at {parent.name}", (more,))
+    for path, says, other in branches(element, base):
+        yield Mutation("facet", f"{says}, and both", (base.replaced(path, base.at(path), ordinary(other)),))
+
+
+def branches(element: Element, base: Node) -> Iterator[tuple[tuple[int, ...], str, Element]]:
+    """Yield the elements that a choice allows in place of one in a message: its path, words, and the other one."""
+    for path, declared in [((), element), *declarations(element, base)]:
+        content = None if isinstance(declared.type, Simple) else declared.type.content
+        for number, child in enumerate(base.at(path).children):
             for other in _branches(content, child.tag):
-                both = base.replaced((*path, number), child, ordinary(other))
-                yield Mutation("facet", f"{local(other.tag)} beside {child.name}, of which one is allowed", (both,))
+                yield (*path, number), f"{local(other.tag)} in place of {child.name}", other
 
 
 def _branches(group: Group | None, tag: str) -> Iterator[Element]:

@@ -175,8 +175,8 @@ def _wrong_fault_11(found: etree._Element) -> str:
     for name in ("faultcode", "faultstring"):
         if name not in by_name:
             return f"no {name} without a namespace"
-    if strange := by_name.keys() - _CHILDREN_11:
-        return f"the child {min(strange)}, which SOAP 1.1 does not have"
+    if strange := [name for name in by_name if not name.startswith("{") and name not in _CHILDREN_11]:
+        return f"the child {strange[0]} without a namespace, which SOAP 1.1 does not have"
     prefix, colon, _ = text_of(by_name["faultcode"]).strip().rpartition(":")
     return (
         f"faultcode with the prefix {prefix!r}, which is not declared"
