@@ -3,6 +3,7 @@
 import string
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime, timedelta
 from typing import Any, Final
 
 from hypothesis import strategies as st
@@ -35,10 +36,10 @@ EXTREMES: Final[dict[str, tuple[float, ...]]] = {
 }
 # Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
 _TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
-# Values of other types; the first two have the usual form.
+# Values of other types, by turn.
 _TYPED: Final = {
     "boolean": ("true", "false"),
-    "dateTime": ("2031-05-06T07:08:09Z", "2032-10-11T12:13:14Z", "2031-07-08T09:10:11+02:00"),
+    "dateTime": ("2031-05-06T07:08:09Z", "2032-10-11T12:13:14Z", "2031-07-08T09:10:11Z"),
     "date": ("2031-05-06", "2032-10-11", "2031-12-31"),
     "time": ("07:08:09Z", "12:13:14Z", "09:10:11Z"),
     "duration": ("PT5S", "PT7M", "P1D"),
@@ -171,8 +172,10 @@ def rewritten(simple: Simple, text: str, form: int) -> str:
     if number is not None:
         is_float = simple.builtin in FLOATS
         return (f"{number:E}" if is_float else f"{number:+f}", f"\n{'00' if number >= 0 else ''}{text} ")[form]
+    moment = datetime.fromisoformat(text[:-1]) if text in _TYPED["dateTime"] else None
     others = {
         "boolean": ({"true": "1", "false": "0"}.get(text, text), f"\n {text} "),
+        "dateTime": (f"{moment + timedelta(hours=2):%FT%T}+02:00" if moment else text, text.replace("Z", ".0Z")),
         "hexBinary": (text.lower(), text),
         "base64Binary": (f"{text[:2]}\n{text[2:]}", text),
     }
