@@ -1,7 +1,7 @@
 """Requests without credentials, and with wrong ones, to operations for which the description requires some."""
 
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from typing import Final
 from urllib.parse import quote
 
@@ -42,13 +42,13 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
         raise NotPossibleError("no operation that may be called requires credentials by the description")
     found = []
     own = api.client.connection.credentials
-    with closing(Stranger(api)) as unknown, closing(Stranger(api, own.lengthened)) as nearly:
-        tried: list[tuple[HttpClient | Stranger, bool]] = [
-            (api.client, False),
-            *([(unknown, True)] if own else []),
-            *([(nearly, True)] if own.lengthened else []),
-        ]
-        for operation in closed:
+    with ExitStack() as stack:
+        unknown, *nearly = (stack.enter_context(closing(Stranger(api, wrong))) for wrong in (own.wrong, *own.nearly))
+        for number, operation in enumerate(closed):
+            # What is nearly right takes turns.
+            near = nearly[number % len(nearly) :][:1] if nearly else []
+            tried: list[tuple[HttpClient | Stranger, bool]] = [(api.client, False)]
+            tried += [(one, True) for one in ([unknown, *near] if own else [])]
             if operation.label in api.streams:
                 continue
             request = written(operation, usual_inputs(operation, values)[0])

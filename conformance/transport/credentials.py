@@ -12,7 +12,7 @@ import datetime as dt
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from email.utils import parsedate_to_datetime
 from enum import StrEnum
@@ -38,6 +38,7 @@ _SHOWN_ANSWER: Final = re.compile(rb"Authorization: Digest \$ROAAS_DIGEST\r\n")
 WRONG: Final = "roaas-not-this-one"
 # Headers whose value begins with the name of a scheme (RFC 9110 11.6.2, 11.7.2); a pair in a Cookie header.
 _AUTHORIZATION: Final = frozenset({"authorization", "proxy-authorization"})
+_HEX: Final = re.compile(r"[0-9A-Fa-f-]+")
 _COOKIE_VALUE: Final = re.compile(r"([^=;\s]+=)[^;]*")
 
 
@@ -54,6 +55,16 @@ class Kind(StrEnum):
 
 # A whole header field is none of them if it is of cookies.
 _PLAIN: Final = frozenset({Kind.BEARER, Kind.HEADER})
+# What is nearly a secret, by a word for it, and what then follows the secret's variable. Another scheme has the secret.
+_NEARLY: Final[dict[str, tuple[Callable[[str], str], str]]] = {
+    "": (str, ""),
+    "lengthened": (lambda secret: f"{secret}-{WRONG}", f"-{WRONG}"),
+    "shortened": (lambda secret: secret[:-1], "_SHORTENED"),
+    # Hexadecimal digits are the same number in both cases.
+    "recased": (lambda secret: secret if _HEX.fullmatch(secret) else secret.swapcase(), "_RECASED"),
+    "emptied": (lambda _: "", "_EMPTIED"),
+    "schemed": (str, ""),
+}
 
 
 @dataclass(frozen=True)
@@ -64,17 +75,17 @@ class Credential:
         kind: where it goes.
         secret: the token, the key, the header's value, or ``user:password`` for ``basic`` and ``digest``.
         name: of the header, the query parameter or the cookie; empty for the others.
-        tail: what follows the secret, with which no robot knows it.
+        near: how the sent text differs from the secret, so that no robot knows it; empty: it does not.
     """
 
     kind: Kind
     secret: str = field(repr=False)
     name: str = ""
-    tail: str = ""
+    near: str = ""
 
     def __post_init__(self) -> None:
-        if WRONG not in self.secret and not self.tail:
-            for secret in self.secrets:
+        if WRONG not in self.secret:
+            for secret in filter(None, (self.sent,) if self.near else self.secrets):
                 SECRETS.keep(secret, self.variable)
 
     @property
@@ -83,14 +94,15 @@ class Credential:
         if WRONG in self.secret:
             return self.sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
-        return f"$ROAAS_{own or re.sub('[^A-Z0-9]', '_', f'{self.kind}_{self.name}'.upper())}{self.tail}"
+        name = own or re.sub("[^A-Z0-9]", "_", f"{self.kind}_{self.name}".upper())
+        return f"$ROAAS_{name}{_NEARLY[self.near][1]}"
 
     @property
     def sent(self) -> str:
         """The secret as it stands in a request."""
         if self.kind is Kind.BASIC:
             return base64.b64encode(self.secret.encode()).decode()
-        return quote(self.secret, safe="") if self.kind is Kind.QUERY else self.secret + self.tail
+        return quote(self.secret, safe="") if self.kind is Kind.QUERY else _NEARLY[self.near][0](self.secret)
 
     @property
     def header(self) -> str:
@@ -101,7 +113,7 @@ class Credential:
     def value(self, text: str) -> str:
         """Return the header's value, or the query, with ``text`` for the secret."""
         forms = {
-            Kind.BEARER: f"Bearer {text}",
+            Kind.BEARER: f"{'Token' if self.near == 'schemed' else 'Bearer'} {text}".rstrip(),
             Kind.BASIC: f"Basic {text}",
             Kind.DIGEST: f"Digest {text}",
             Kind.HEADER: text,
@@ -260,10 +272,15 @@ class Credentials:
         return Credentials(tuple(item.wrong for item in self.items))
 
     @property
-    def lengthened(self) -> Credentials:
-        """The same credentials with a tail behind each token and key; empty if there are others."""
-        is_plain = all(item.kind in _PLAIN and not item.scheme for item in self.items)
-        return Credentials(tuple(replace(item, tail=f"-{WRONG}") for item in self.items if is_plain))
+    def nearly(self) -> tuple[Credentials, ...]:
+        """The same credentials, each token and key nearly right in one way; none if there are others than these."""
+        is_plain = bool(self) and all(item.kind in _PLAIN and not item.scheme for item in self.items)
+        found = [tuple(replace(item, near=one) for item in self.items) for one in (_NEARLY if is_plain else ())]
+        return tuple(
+            Credentials(items)
+            for items in found
+            if all(one.value(one.sent) != own.value(own.sent) for one, own in zip(items, self.items, strict=True))
+        )
 
 
 def bearer(token: str) -> Credential:
