@@ -116,10 +116,10 @@ def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
             observed=f"{found:.4g}",
             cause=name,
         )
-        yield from _renewed(drive, name, wanted, motion)
+        yield from renewed(drive, name, wanted, motion)
 
 
-def _renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
+def renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a velocity that was sent again and again outlasts the hold time of the first command."""
     hold_s = motion.velocity.hold_s if motion.velocity else None
     first = drive.commands[0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
 from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, slowest, tries_of, went_on
@@ -117,6 +117,11 @@ def _held(drive: Drive, hold_s: float, share: float, motion: MotionMap) -> tuple
 def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that gets no command any more still drives within its hold time."""
     return held(trace, motion, _HELD[1])
+
+
+def fails(outcomes: Iterable[Outcome]) -> bool:
+    """Return whether one of some outcomes is a failure."""
+    return any(isinstance(one, Case) and not one.holds for one in outcomes)
 
 
 def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[Outcome]:

@@ -323,6 +323,7 @@ def left_alone(
     gone: str = "",
     brief: bool,
     silent_s: float | None = None,
+    outlasts_s: float = 0.0,
     beside: Callable[[], None] = lambda: None,
 ) -> Iterator[Drive]:
     """Drive at a velocity, then send nothing any more, and watch; again where a slow link or the limits spoilt it.
@@ -338,6 +339,7 @@ def left_alone(
         brief: whether to look no longer than until it rests.
         silent_s: for so long after the last command a client that vanishes sends nothing, s; None: until the device
             must rest, unless it goes on reading.
+        outlasts_s: for so long it is commanded at least before, as usual, and measured after that, s.
         beside: called after each reading before the last call of ``refused``.
     """
     settle_s, whole = mapped.drives.settle_s, False
@@ -345,8 +347,9 @@ def left_alone(
         silent_s = 0.0 if gone in {"", POLLING} else hold_s + settle_s
     for _ in range(TRIES):
         rests_s = hold_s + more * mapped.room.slowest_s + settle_s
-        made = with_room(mapped, [part.speeds], settle_s + rests_s, slower=_SLOWER)[0]
-        drive, whole = _kept_up(mapped, part, made, settle_s, rests_s, measured_s=0.0)
+        made = with_room(mapped, [part.speeds], max(settle_s, outlasts_s) + rests_s, slower=_SLOWER)[0]
+        kept, measured_s = (replace(part, by=()), MEASURED_S) if outlasts_s else (part, 0.0)
+        drive, whole = _kept_up(mapped, kept, made, settle_s, rests_s, outlasts_s=outlasts_s, measured_s=measured_s)
         if not whole:
             # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
             mapped.come_to_rest()

@@ -27,14 +27,12 @@ class Driven:
         drive: all commands and readings.
         let_go: the velocities that were not renewed.
         paused: two looks at the robot at rest after each of them, the first ones of the velocity after a pause.
-        not_tested: why a requirement could not be tested, by its id.
         over_soap: readings of pose and velocity over SOAP, beside the looks.
     """
 
     drive: Trace
     let_go: tuple[Drive, ...] = ()
     paused: tuple[tuple[Turn, Turn], ...] = ()
-    not_tested: tuple[tuple[str, str], ...] = ()
     over_soap: tuple[Exchange, ...] = ()
 
 

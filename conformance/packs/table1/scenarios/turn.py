@@ -10,17 +10,17 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
 from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART, Turn, certain_s
+from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, JUDGED, LINEAR_PART, Turn, certain_s
 from conformance.packs.table1.robot.goals import make_room
 from conformance.packs.table1.robot.motion_map import COMMANDS, By, speeds_of, way_of
-from conformance.packs.table1.robot.no_commands import no_commands
+from conformance.packs.table1.robot.no_commands import no_commands, refuse_goal
 from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
-from conformance.packs.table1.robot.undisturbed import arc, renewed
 from conformance.packs.table1.robot.unrenewed import slow, unrenewed
 from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
 from conformance.packs.table1.scenarios.trace import Driven, longer_s
+from conformance.rules.motion.test_velocities import fails, held
 from conformance.scenarios.motion import trace as generic
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Command
@@ -40,6 +40,11 @@ _PAUSE_S: Final = 1.1
 _RENEWED: Final = 1.4
 # How often it is measured how long a velocity holds beside requests that the robot takes although it had refused them.
 _ATTEMPTS: Final = 3
+# Velocities beyond any limit, or in a direction without a drive.
+_BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
+# Time in which a robot that drops its angular velocity shows it, s; tries of what could not be seen in time.
+_SHOWS_S: Final = 0.2
+_TRIES: Final = 3
 # The only whole number of rad/s below the limits of most robots.
 _WHOLE: Final = 1.0
 # Share of the limit at which the robot drives along an arc.
@@ -97,7 +102,6 @@ class _Turning:
     refused: deque[Refused] = field(default_factory=deque)
     drives: list[generic.Drive] = field(default_factory=list)
     paused: list[tuple[Turn, Turn]] = field(default_factory=list)
-    not_tested: list[tuple[str, str]] = field(default_factory=list)
     over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
     pause_s: float = 0.0  # for so long after a hold time the suite is silent at least
@@ -110,7 +114,7 @@ class _Turning:
         # What came after the first velocity that was let go is no way of one drive: the pose was read elsewhere.
         whole, end = self.drive.whole, self.seen
         drive = replace(whole, odometry=whole.odometry[:end], measured=whole.measured[:end])
-        recorded = Driven(drive, tuple(self.drives), tuple(self.paused), tuple(self.not_tested))
+        recorded = Driven(drive, tuple(self.drives), tuple(self.paused))
         return replace(recorded, over_soap=tuple(self.over_soap))
 
     def read_over_soap(self, subscribers: SoapService, turn: int) -> None:
@@ -131,17 +135,13 @@ class _Turning:
             left = handy(robot, 0.6)
             drive.command(left)
             drive.reach(left, "rest-resources/velocity-converges")
-        fast = self._fast() if robot.actuated(ABOUT) else None
-        if fast is None:
-            drive.refresh(left)
-        if not renewed(robot, drive, fast or left):
-            reason = "responses came too late to renew a velocity within its hold time"
-            self.not_tested.append(("safety/renewal", reason))
+        if robot.actuated(ABOUT):
+            self._fast()
         bent = robot.drivable(Velocity(*(-part for part in left)))
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
             # A small circle: either part has to end. The linear part is commanded last, and ends as well.
             bent, before = along_arc(robot, bent, _ASIDE)
-            arc(robot, drive, bent, before)
+            _arc(robot, drive, bent, before)
             drive.stop(bent)
 
     def play_letting_go(self, run: Run) -> None:
@@ -177,8 +177,8 @@ class _Turning:
         drive.stop(ends[0])
         self.let_go(robot.drivable(Velocity(*(_ASIDE * part for part in ends[0]))))
 
-    def _fast(self) -> Velocity | None:
-        """Turn left and right, both at the highest speed; return the second velocity if it is reached.
+    def _fast(self) -> None:
+        """Turn left and right, both at the highest speed.
 
         At first the robot also drives as fast as it can. Where the statement does not say how the two depend on each
         other, it need not reach both limits at once.
@@ -192,11 +192,8 @@ class _Turning:
         ids = () if declared or beside == left else ("rest-resources/velocity-both",)
         reached = reach(drive, beside, *ids)
         self.fastest = beside if reached else left
-        if not reached and not ids:
-            return None
-        if ids and not reached and not reach(drive, left):
-            return None
-        return right if reach(drive, right) else None
+        if reached or (ids and reach(drive, left)):
+            reach(drive, right)
 
     def _ahead_from_rest(self, *, renewed: bool) -> None:
         """Command a linear part after the angular part has ended by itself: the angular part must stay zero.
@@ -231,32 +228,44 @@ class _Turning:
     def let_go(self, turning: Velocity, by: By = "velocity") -> None:
         """Command a velocity and then nothing any more, and watch how it ends; ``by``: what commands it last.
 
-        Where the robot takes what it had refused before, the velocity is no longer the last command: so again.
+        The first one is renewed for longer than it holds, and others that the robot must refuse come after it. Where it
+        does not last, or the robot takes what it had refused before, the velocity is let go again.
         """
-        hold_s, drive = self.robot.limits.hold_s, self.drive
+        hold_s, drive, motion = self.robot.limits.hold_s, self.drive, self.mapped.motion
         if hold_s is None:
             return
         self.seen = len(drive.trace.odometry) if self.seen is None else self.seen
-        part = Part(f"{turning} by {COMMANDS[by]}", speeds_of(turning), by=way_of(self.mapped.motion, by))
-        silent_s = hold_s + (self.pause_s or longer_s(self.robot.limits))
-        for _ in range(_ATTEMPTS):
-            self.taken, more = None, int(by in {"linear", "closing"})
-            drives = left_alone(
-                self.mapped, part, hold_s, more=more, refused=partial(self._send_idle, hold_s), gone=SILENT, brief=True,
-                silent_s=silent_s, beside=self._send_refused,
-            )  # fmt: skip
+        part = Part(f"{turning} by {COMMANDS[by]}", speeds_of(turning), by=way_of(motion, by))
+        silent_s, first = hold_s + (self.pause_s or longer_s(self.robot.limits)), not self.drives
+        for attempt in range(_ATTEMPTS):
+            self.taken, disturbed, again = None, first and not attempt, first and attempt
+            refused = None if again else partial(self._send_idle, hold_s, disturbed=disturbed)
+            beside = (lambda: None) if again else self._send_refused
+            more = int(disturbed or by in {"linear", "closing"})
+            drives = tuple(left_alone(
+                self.mapped, part, hold_s, more=more, refused=refused, gone=SILENT, brief=True, silent_s=silent_s,
+                outlasts_s=hold_s if disturbed else 0.0, beside=beside,
+            ))  # fmt: skip
             self.drives.extend(drives)
-            if self.taken is None:
+            if self.taken is None and drives and not (disturbed and fails(held(drives, motion, JUDGED))):
                 break
         drive.look()
         drive.look()
         self.paused.append((drive.trace.turns[-2], drive.trace.turns[-1]))
 
-    def _send_idle(self, hold_s: float) -> Command | None:
-        """Send requests that renew nothing for a part of the hold time, at least one; return what the robot took."""
-        clock = self.drive.clock
-        until = clock.now() + _MEANWHILE * hold_s
-        self.robot.velocity()
+    def _send_idle(self, hold_s: float, *, disturbed: bool) -> Command | None:
+        """Send requests that renew nothing for a part of the hold time, at least one.
+
+        Return what the robot took; else, if ``disturbed``, the last of the velocities that it must refuse, sent first.
+        """
+        clock, robot = self.drive.clock, self.robot
+        sent, until = clock.now(), clock.now() + _MEANWHILE * hold_s
+        if disturbed:
+            robot.put_linear(_BAD[0])
+            bad = [robot.put_velocity(one) for one in _BAD]
+            refuse_goal(robot)
+            return self.taken or Command(sent, clock.now(), {}, bad[-1])
+        robot.velocity()
         for _ in range(len(self.idle)):
             send = self.idle.pop(0)
             self.idle.append(send)
@@ -274,3 +283,29 @@ class _Turning:
                 self.taken = Command(sent, self.drive.clock.now(), {}, exchange)
             else:
                 self.refused.append(one)
+
+
+def _arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
+    """PUT two linear parts, one after the other, and record whether the angular part stays.
+
+    Args:
+        robot: the robot.
+        drive: a drive of that robot.
+        bent: the velocity at the end.
+        before: the first linear part.
+    """
+    back = bent._replace(angular_z=0.0)
+    drive.refresh(bent)
+    if not drive.command(before, linear=True):
+        return
+    for attempt in range(_TRIES):
+        if attempt or robot.usual_s > _QUICK_S:
+            # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
+            drive.refresh(bent)
+        drive.command(back, linear=True)
+        drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))
+        keeps, found = drive.sees(bent, 1.5, part=ANGULAR_PART, until=drive.holds_until)
+        if keeps is not None:
+            break
+    expected = f"the angular part as it was before the linear PUT, {bent}"
+    drive.saw("rest-resources/linear-keeps-angular", expected, found, "changed", holds=keeps)

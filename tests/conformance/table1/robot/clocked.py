@@ -25,15 +25,11 @@ _EXCHANGE = exchange()
 class Body:
     """Reaches what it is told so long after it was told, and stops where it is not told again within its hold time.
 
-    It has an odometry five times a second. What it is told again does not ``renew`` it in one that is faulty, what it
-    refuses ``stops`` another one, and another one ``loses`` the first that it is told.
+    It has an odometry five times a second. A faulty one ``loses`` the first that it is told.
     """
 
-    def __init__(self, clock: SimulatedClock, takes_s: float, hold_s: float, **faults: bool) -> None:
-        self.clock, self.takes_s, self.hold_s = clock, takes_s, hold_s
-        self.renews, self.stops, self.loses = (
-            faults.get(name, name == "renews") for name in ("renews", "stops", "loses")
-        )
+    def __init__(self, clock: SimulatedClock, takes_s: float, hold_s: float, *, loses: bool = False) -> None:
+        self.clock, self.takes_s, self.hold_s, self.loses = clock, takes_s, hold_s, loses
         self.told: list[float] = []
 
     def tell(self) -> None:
@@ -43,13 +39,7 @@ class Body:
             return
         if self.told and self.clock.time_s > self.told[-1] + self.hold_s:
             self.told = []
-        if self.renews or not self.told:
-            self.told.append(self.clock.time_s)
-
-    def refuse(self, *_: object) -> None:
-        """Take no velocity."""
-        if self.stops:
-            self.told = []
+        self.told.append(self.clock.time_s)
 
     @property
     def sampled(self) -> float:
@@ -70,8 +60,7 @@ class Drive(drive.Drive):
         declared = {"settle_s": SETTLE_S, "hold_s": hold_s, "tolerance_abs": 0.02}
         limits = DeclaredLimits(**declared).resolved()
         given: dict[str, Any] = {"limits": limits, "clock": body.clock, "settle_s": 1.25 * SETTLE_S + 0.25}
-        given |= {"sample_s": SAMPLE_S, "usual_s": usual_s, "put_velocity": body.refuse, "put_linear": body.refuse}
-        given["put"] = body.refuse
+        given |= {"sample_s": SAMPLE_S, "usual_s": usual_s}
         super().__init__(SimpleNamespace(**given))
         self.body, self.looks = body, looks
 

@@ -17,7 +17,8 @@ _PATIENCE_S = 5.0
 # multiple is read.
 _TURNS = 250
 _READ = 4
-# Twice as long as the odometry has to be steady, s.
+# Longer than the odometry has to be steady, and twice as long, s.
+_STEADY_S = 0.4
 _LONG_S = 0.6
 _SAMPLE, _BESIDE = "rest-resources/pose-sample", "rest-resources/velocity-odometry"
 # Readings in a row without odometry after which there is none.
@@ -91,7 +92,7 @@ def test_velocity_and_odometry(robot: Robot, judge: Judge, effort: Effort) -> No
     drive = Drive(robot)
     hold_s = robot.limits.hold_s
     alone = hold_s is not None and hold_s < _LONG_S  # no drive of such a robot is steady for so long
-    drive.keep(max(0.4 * robot.watchfulness, _LONG_S if alone else 0.0))
+    drive.keep(_LONG_S if alone else _STEADY_S)
     while len(drive.trace.turns) < effort.cases(60):
         drive.look()
     for id_ in (_BESIDE, "rest-resources/linear-agrees"):

@@ -17,7 +17,8 @@ from conformance.packs.table1.scenarios.turn import further_axes, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.rules.motion import test_velocities as generic
-from conformance.rules.motion.test_velocities import held
+from conformance.rules.motion.judging import renewed
+from conformance.rules.motion.test_velocities import fails, held
 from conformance.scenarios.motion.trace import Drive
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.transport.exchange import Exchange
@@ -37,20 +38,34 @@ _OFF: Final = 1.5
 # Zero velocity stops the robot before its watchdog would.
 stop = shown("safety/stop", straight, turn, further_axes, velocity_walk)
 limits_hold = shown("safety/limits-hold", straight, turn, further_axes, velocity_walk)
-refused_keeps = shown("safety/refused-keeps", turn, velocity_walk)
+refused_keeps = shown("safety/refused-keeps", velocity_walk)
 
 
 @rule("safety/renewal", on=(turn,))
 def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity lasts as long as it is renewed."""
     yield from outcomes("safety/renewal", trace.drive, said_of(run).limits)
-    yield from (NotTested(reason) for id_, reason in trace.not_tested if id_ == "safety/renewal")
+    motion, found = motion_map_of(said_of(run)), list[Outcome]()
+    for drive in _let_go(trace):
+        if drive.was_kept(said_of(run).limits.hold_s):
+            found += (one for name, wanted in drive.wanted.items() for one in renewed(drive, name, wanted, motion))
+    yield from found or [NotTested("responses came too late to renew a velocity within its hold time")]
+
+
+@rule("safety/refused-keeps", on=(turn,))
+def refused_keeps_under_way(trace: Driven, run: Run) -> Iterator[Outcome]:
+    """Judge that a velocity lasts beside others that the robot refuses, unless it does not last without them either."""
+    motion = motion_map_of(said_of(run))
+    disturbed, alone = _apart(trace)
+    if not fails(held(alone[:1], motion, JUDGED)):
+        yield from held(disturbed, motion, JUDGED)
 
 
 @rule("safety/hold", on=(turn, further_axes))
 def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity that is not renewed lasts for the hold time."""
-    return held(_let_go(trace), motion_map_of(said_of(run)), JUDGED)
+    disturbed, alone = _apart(trace)
+    return held(alone or disturbed, motion_map_of(said_of(run)), JUDGED)
 
 
 @rule("safety/watchdog", on=(turn, further_axes))
@@ -87,6 +102,12 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
 def _let_go(trace: Driven) -> tuple[Drive, ...]:
     """Return the drives that were let go and whose commands were accepted; others are judged by their responses."""
     return tuple(one for one in trace.let_go if one.after and all(command.accepted for command in one.commands))
+
+
+def _apart(trace: Driven) -> tuple[tuple[Drive, ...], tuple[Drive, ...]]:
+    """Return the drives that were let go beside velocities that the robot refused, and the others."""
+    drives = _let_go(trace)
+    return tuple(one for one in drives if one.refused), tuple(one for one in drives if not one.refused)
 
 
 def _period_s(drive: Drive) -> float:
