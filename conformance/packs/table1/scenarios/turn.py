@@ -239,7 +239,7 @@ class _Turning:
         silent_s, first = hold_s + (self.pause_s or longer_s(self.robot.limits)), not self.drives
         for attempt in range(_ATTEMPTS):
             self.taken, disturbed, again = None, first and not attempt, first and attempt
-            refused = None if again else partial(self._send_idle, hold_s, disturbed=disturbed)
+            refused = (lambda: None) if again else partial(self._send_idle, hold_s, disturbed=disturbed)
             beside = (lambda: None) if again else self._send_refused
             more = int(disturbed or by in {"linear", "closing"})
             drives = tuple(left_alone(
