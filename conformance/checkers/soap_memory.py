@@ -34,6 +34,7 @@ _MOST: Final = 1_000
 _KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 # What no XML has, between the values of one name.
 _BETWEEN: Final = "\0"
+_WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
 
 
@@ -227,7 +228,7 @@ class SoapMemory:
         has_to = (
             not past.moves
             and len(others) + is_shown >= _KEPT
-            and (is_shown or text in past.kept or _is_usual(simple, text, others))
+            and (is_shown or text in past.kept or _is_usual(simple, text, others) or _is_cut(simple, text, got))
         )
         is_ignored = self._is_ignored(act, writer, past)
         if has_to or is_ignored:
@@ -296,6 +297,13 @@ def _is_near(simple: Simple, text: str, got: str) -> bool:
     if simple.builtin in INTEGERS or first is None or second is None:
         return False
     return isclose(first, second, rel_tol=0.02)
+
+
+def _is_cut(simple: Simple, text: str, got: str) -> bool:
+    """Return whether only the lower 32 bits of an integer are left: no limit makes that of it."""
+    if simple.builtin not in INTEGERS or not (_WHOLE.fullmatch(text) and _WHOLE.fullmatch(got)):
+        return False
+    return int(got) not in {0, int(text)} and (int(text) - int(got)) % 2**32 == 0
 
 
 def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:

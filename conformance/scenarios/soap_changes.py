@@ -47,7 +47,7 @@ _BUDGET_S: Final = 12.0
 # Changes of one operation at quick and at other efforts; refusals of it.
 _TURNS: Final = (6, 16)
 _REFUSALS: Final = 3
-# Values that are watched for lasting: two, as a third one may be read in place of one of them.
+# Values after the first one that are watched for lasting: two, as a third one may be read in place of one of them.
 _LASTING: Final = 2
 _THINGS: Final = 3
 # Successive reads of each operation; reads in each of as many simultaneous rounds.
@@ -116,7 +116,7 @@ class _Changes:
         until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
         keys = {name for one, _, _ in readers for name in one.sent}
         forms = _forms_of(declared, node)
-        turns, lasting, refusals, whole, leaves = _TURNS[not self._is_quick], 0, 0, *forms[0]
+        turns, refusals, whole, leaves = _TURNS[not self._is_quick], 0, *forms[0]
         made = whole
         for turn in range(turns):
             if time.monotonic() > until:
@@ -134,11 +134,11 @@ class _Changes:
                 made = _varied(node, free, turn)
                 self.caller.ask(act, made, "a message with other values")
             sent = self._wait(readers, made, free)
-            if sent and lasting < _LASTING:
-                lasting += 1
+            if sent and 0 < turn <= _LASTING:
+                # A value that is back at the second read did not end: the first one failed, after a time without any.
                 time.sleep(_LASTS_S)
-                self._read(readers, made)
-            elif sent and refusals < _REFUSALS:
+                self._read(readers, made, times=2)
+            elif sent and turn and refusals < _REFUSALS:
                 # What a refusal changes is soon seen; other values were kept for longer by now.
                 self._refuse(act, declared, _varied(made, free, turn + 1), refusals)
                 refusals += 1
@@ -228,7 +228,11 @@ class _Changes:
             return
         name = node.at(keys[0]).name
         own = node.at(keys[0]).text
-        known = [own, *self.caller.given.get(name.lower(), []), *([str(int(own) + 1)] if own.isdecimal() else [])]
+        known = [
+            own,
+            *self.caller.given.get(name.lower(), []),
+            *(str(int(own) + more) for more in (1, 2) if own.isdecimal()),
+        ]
         things = [with_text(node, keys[0], text) for text in list(dict.fromkeys(known))[: _THINGS + 1]]
         told = [(thing, self._read(readers, thing)) for thing in things]
         things = [thing for thing, values in told if values]

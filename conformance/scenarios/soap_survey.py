@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.messages import simple_leaves
+from conformance.api.soap.messages import simple_leaves, with_text
 from conformance.api.soap.mutations import STRANGE, facets, invalid_ones, mutations
 from conformance.api.soap.roles import LAST, REFERS, Act, Role, acts_of, in_order, texts_of
 from conformance.commandline.device_options import advice
@@ -20,7 +20,7 @@ from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import SoapOperation, SoapPort
 from conformance.documents.wsdl_pack import each, label_of, services_of
 from conformance.documents.xml import Node, NotXmlError, clark, elements, has_instruction
-from conformance.documents.xsd_shapes import Element, Simple
+from conformance.documents.xsd_shapes import STRINGS, Element, Simple
 from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of, values_in
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -315,6 +315,7 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
     for wrong in (*invalid_ones(drawn, types), *effort.subsample(near, _MOST)):
         if time.monotonic() < until and act.label not in caller.lost:
             caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)
+    _ask_for_nothing(caller, act, declared, node)
     yield
     for kind, says, octets in _odd(caller, act, node):
         if time.monotonic() < until and act.label not in caller.lost:
@@ -405,6 +406,15 @@ def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
             with contextlib.suppress(NotPossibleError):
                 asked = caller.messages.usual(reader.operation, given={name: [text] for name, text in texts.items()})[1]
                 caller.ask(reader, asked, f"what {act.operation.name} concerns")
+
+
+def _ask_for_nothing(caller: Caller, act: Act, declared: Element | None, node: Node | None) -> None:
+    """Name a thing that is not there, so that a declared fault is seen."""
+    if not act.operation.faults or act.role not in {Role.READS, *LAST} or declared is None or node is None:
+        return
+    for path, simple in simple_leaves(declared, node):
+        if simple.builtin in STRINGS and REFERS.search(node.at(path).name):
+            caller.ask(act, with_text(node, path, f"no {node.at(path).name}"), "an id that nothing has")
 
 
 def mandatory(port: SoapPort, text: str = "1", actor: str = "") -> Node:
