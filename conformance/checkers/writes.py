@@ -298,11 +298,6 @@ class Writes:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
             elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
                 wrong = f"{now} as {name}"
-            elif value in ("", []) and not same(was, value):
-                # Null and absent are other values than an empty one.
-                wrong = (
-                    f"{shown(now)} as {name}" if not same(now, value) and change.is_settled(name, change.sent) else ""
-                )
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
             else:

@@ -77,7 +77,7 @@ def special_bodies(
     yield from half_valid(change, usual, changed)
     # All together, and what has a time zone alone: the device may have a reason to refuse another one.
     zoned = [{name: one} for name, one in changed.items() if flat(parts[name]).get("format") == "date-time"]
-    yield from (one for one in (changed, *zoned, _emptied(parts, changed)) if one and fits(schema, one))
+    yield from (one for one in (changed, *zoned) if one and fits(schema, one))
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
         yield restored
@@ -151,13 +151,6 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
         # As long as it may be: a device may cut it, or count octets.
         most = min(schema.get("maxLength", 0), _LONGEST)
         yield from (*((one * most)[:most] for one in TEXTS[:1] if most > len(one)), *TEXTS)
-
-
-def _emptied(parts: Schema, changed: dict[str, Any]) -> dict[str, Any]:
-    """Return an empty text or list for each member that may have one, which is neither null nor absent."""
-    free = {name: one for name, one in changed.items() if isinstance(one, list) or is_free_text(flat(parts[name]))}
-    found = {name: type(one)() for name, one in free.items() if isinstance(one, str | list) and one}
-    return {name: one for name, one in found.items() if fits(parts[name], one)}
 
 
 def _nulls(
