@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
@@ -81,11 +82,12 @@ def tried_at_rest(
 
 
 def _let_rest(mapped: MappedDevice, settle: Callable[[], object]) -> None:
-    """Wait until the device rests by itself, and stop it only if it does not: it may set out again after a stop."""
-    try:
-        mapped.come_to_rest(stop=False)
-    except NotPossibleError:
-        settle()
+    """Let a device that takes no positions rest by itself, which may set out again after a stop; else ``settle``."""
+    if mapped.motion.goto is None:
+        with suppress(NotPossibleError):
+            mapped.come_to_rest(stop=False)
+            return
+    settle()
 
 
 def _settle(mapped: MappedDevice) -> None:
