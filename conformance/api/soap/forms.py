@@ -145,7 +145,7 @@ def another(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa
     if simple.builtin in FLOATS | {"decimal"}:
         low = float(simple.minimum) if simple.minimum is not None else 0.0
         high = float(simple.maximum) if simple.maximum is not None else low + 1.0
-        share = (0.25, 0.75, 0.5, 0.625, 0.375, 0.6875)[turn % 6]
+        share = (0.25, 0.75, 0.5, 0.6, 0.4, 0.7)[turn % 6]
         return f"{low + share * (high - low):.10g}"
     return text
 
