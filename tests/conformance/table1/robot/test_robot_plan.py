@@ -131,7 +131,7 @@ def test_no_step_is_longer_than_declared(step, failures):
 
 def test_a_pose_in_another_frame_is_found_where_none_was_asked_for():
     body = json.dumps({"plan": {"header": header(), "poses": [{"header": header("odom"), "pose": pose(1.9)}]}}).encode()
-    judge = _seen([], body=body).judge
+    judge = _seen([], octets=body).judge
     assert judge.refuted().get("rest-resources/plan-frame", 0) == 1
 
 
@@ -156,7 +156,7 @@ def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
 
 @pytest.mark.parametrize(
     "given",
-    [{"path": "/robot/pose/"}, {"status": 422}, {"body": b"{}"}, {"headers": (("Content-Type", "text/plain"),)}],
+    [{"path": "/robot/pose/"}, {"status": 422}, {"octets": b"{}"}, {"headers": (("Content-Type", "text/plain"),)}],
     ids=["another resource", "refused", "no plan", "another format"],
 )
 def test_what_is_no_plan_is_for_others_to_judge(given):
