@@ -9,6 +9,7 @@ import re
 import time
 from base64 import b64encode
 from datetime import UTC, datetime
+from functools import partial
 
 from aiohttp import web
 from small_device import REFUSED, answers, described, error
@@ -51,6 +52,16 @@ def _tag(value, style):
     """Return the entity tag of a value, weak in some styles."""
     text = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:16]
     return f'W/"{text}"' if style.get("etag") == "weak" else f'"{text}"'
+
+
+def _of_a_zone(handle):
+    """Return a handler that gets the id of a zone; it answers 404 if there is none."""
+
+    async def found(self, request):
+        id_ = request.match_info["id"]
+        return await handle(self, request, id_) if id_ in self.zones else error(404, "no such zone")
+
+    return found
 
 
 class Sprinklers:
@@ -295,14 +306,8 @@ class Sprinklers:
 
     # --- a zone ---
 
-    def zone(self, request):
-        id_ = request.match_info["id"]
-        return id_ if id_ in self.zones else ""
-
-    async def read(self, request):
-        id_ = self.zone(request)
-        if not id_:
-            return error(404, "no such zone")
+    @_of_a_zone
+    async def read(self, request, id_):
         if not self.wants(request, "application/json"):
             return error(406, "JSON only")
         until, before = self.old.get(id_, (0.0, None))
@@ -314,11 +319,9 @@ class Sprinklers:
     def acts_anyway(self, status):
         return self.has(f"what is refused with {status} is written")
 
-    async def put(self, request):
-        id_ = self.zone(request)
+    @_of_a_zone
+    async def put(self, request, id_):
         none = request.headers.get("If-None-Match")
-        if not id_:
-            return error(404, "no such zone")
         body = await self.body(request, whole=True)
         if isinstance(body, web.Response):
             if body.status == 415 and self.acts_anyway(415):
@@ -329,10 +332,8 @@ class Sprinklers:
             return error(412, "there is one")
         return await self.written(request, id_, {**_FIRST, **self.taken(body)})
 
-    async def patch(self, request):
-        id_ = self.zone(request)
-        if not id_:
-            return error(404, "no such zone")
+    @_of_a_zone
+    async def patch(self, request, id_):
         body = await self.body(request, whole=False)
         return body if isinstance(body, web.Response) else await self.written(request, id_, self.taken(body))
 
@@ -348,10 +349,8 @@ class Sprinklers:
         value = self.shown(id_)
         return refusal or web.json_response(value, headers=self.headers(value))
 
-    async def delete(self, request):
-        id_ = self.zone(request)
-        if not id_:
-            return error(404, "no such zone")
+    @_of_a_zone
+    async def delete(self, request, id_):
         refusal = self.refused(request, id_)
         if refusal is not None and not (refusal.status == 428 and self.has("what is refused with 428 is deleted")):
             return refusal
@@ -360,10 +359,8 @@ class Sprinklers:
         return refusal or web.Response(status=204)
 
     def transition(self, old, new, action):
-        async def act(request):
-            id_ = self.zone(request)
-            if not id_:
-                return error(404, "no such zone")
+        @_of_a_zone
+        async def act(self, _, id_):
             self.shown(id_)
             zone = self.zones[id_]
             if zone["state"] not in old:
@@ -374,14 +371,12 @@ class Sprinklers:
                 zone["state"] = "running"
             return web.json_response(value)
 
-        return act
+        return partial(act, self)
 
     # --- files ---
 
-    async def upload(self, request):
-        id_ = self.zone(request)
-        if not id_:
-            return error(404, "no such zone")
+    @_of_a_zone
+    async def upload(self, request, id_):
         if request.content_type != "application/octet-stream":
             return error(415, "octets only")
         octets = await request.read()
@@ -398,9 +393,9 @@ class Sprinklers:
             octets = octets.strip() + b"\n"
         return web.json_response({"size": len(octets), "sha256": hashlib.sha256(octets).hexdigest()})
 
-    async def download(self, request):
-        id_ = self.zone(request)
-        if not id_ or id_ not in self.maps:
+    @_of_a_zone
+    async def download(self, request, id_):
+        if id_ not in self.maps:
             return error(404, "no map")
         return self.octets(request, self.maps[id_], "application/octet-stream")
 
@@ -446,8 +441,7 @@ class Sprinklers:
             self.settings["pressure"] = 2 + next(self.ticks) % 7 / 4
         if self.style.get("drifts"):
             self.settings["pressure"] = 2 + int(time.monotonic() / self.style["drifts"]) % 7 / 4
-        value = dict(self.settings)
-        return web.json_response(value)
+        return web.json_response(self.settings)
 
     async def write_settings(self, request):
         if request.content_type != "application/json":

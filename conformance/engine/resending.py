@@ -98,9 +98,9 @@ def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
         if isinstance(finding.exchange, Exchange):
             response = finding.exchange.response
             response = replace(response, octets=SECRETS.masked_bytes(response.octets))
-            finding.exchange = replace(finding.exchange, response=response)
-        if finding.exchange is not None:
-            finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request))
+            finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request), response=response)
+        elif finding.exchange is not None:
+            finding.exchange = finding.exchange._replace(request=masked(finding.exchange.request))
         finding.sequence = tuple(one._replace(request=masked(one.request)) for one in finding.sequence)
         for label, one in finding.operations.items():
             finding.operations[label] = one._replace(request=one.request and masked(one.request))

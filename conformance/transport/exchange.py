@@ -234,9 +234,8 @@ class NoAnswer(StrEnum):
 OF_GATEWAY: Final = {502: NoAnswer.BAD_GATEWAY, 503: NoAnswer.UNAVAILABLE, 504: NoAnswer.GATEWAY_TIMEOUT}
 
 
-@dataclass(frozen=True)
-class Unanswered:
-    """A request without an HTTP response.
+class Unanswered(NamedTuple):
+    """A request without an HTTP response. A file of traces tells it from an exchange, as a tuple is a JSON array.
 
     Attributes:
         request: the request.
