@@ -213,7 +213,7 @@ class Rack:
             octets += b"    "
         if "weak ETags" in self.styles:
             headers.update({"ETag": f"W/{headers['ETag']}"} if "ETag" in headers else {})
-        if "gzip" in self.styles and re.search(r"gzip(?!;q=0)|\*", fields.get("accept-encoding", "*")) and octets:
+        if "gzip" in self.styles and re.search(r"(gzip|\*)(?!;q=0)", fields.get("accept-encoding", "*")) and octets:
             octets = gzip.compress(octets, mtime=0)
             headers |= {"Content-Encoding": "gzip"}
             headers.update({"ETag": headers["ETag"][:-1] + '-gzip"'} if "ETag" in headers else {})
