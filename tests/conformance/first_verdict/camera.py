@@ -10,6 +10,7 @@ from lxml import etree
 from small_device import Handle
 
 _S11, _S12 = "http://schemas.xmlsoap.org/soap/envelope/", "http://www.w3.org/2003/05/soap-envelope"
+_TRUE, _HERE = {"1", "true"}, ("/next", "/ultimateReceiver", "next")
 _WSA, _XOP = "http://www.w3.org/2005/08/addressing", "http://www.w3.org/2004/08/xop/include"
 _XS = "http://www.w3.org/2001/XMLSchema"
 _W = {"soap": "http://schemas.xmlsoap.org/wsdl/soap/", "soap12": "http://schemas.xmlsoap.org/wsdl/soap12/"}
@@ -219,12 +220,18 @@ class Camera:
             return _fault(space, "Client", "no XML")
         headers = root.findall(f"{{{space}}}Header/*")
         known = {"imaging": "{urn:camera}Session", "events": f"{{{_WSA}}}Action"}.get(name)
-        foreign = [one for one in headers if etree.QName(one).namespace not in {_WSA, "urn:camera"}]
+        # A block for another node is none of this one's business (SOAP 1.1, 4.2.2; SOAP 1.2 Part 1, 2.4).
+        own = [
+            one
+            for one in headers
+            if all(one.get(f"{{{space}}}{role}", "next").endswith(_HERE) for role in ("actor", "role"))
+        ]
+        foreign = [one for one in own if etree.QName(one).namespace not in {_WSA, "urn:camera"}]
         body = root.find(f"{{{space}}}Body")
         refusals = {
             "a DOCTYPE": ("Client", root.getroottree().docinfo.doctype),
             "a version": ("VersionMismatch", root.tag != f"{{{space}}}Envelope"),
-            "a header": ("MustUnderstand", any(one.get(f"{{{space}}}mustUnderstand") for one in foreign)),
+            "a header": ("MustUnderstand", any(one.get(f"{{{space}}}mustUnderstand") in _TRUE for one in foreign)),
             "a header is missing": ("Client", known and known not in [one.tag for one in headers]),
             "no body": ("Client", body is None or len(body) != 1),
         }
