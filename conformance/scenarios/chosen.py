@@ -84,8 +84,9 @@ class Chosen:
         if is_stored(lists[was].exchange) or not usable:
             return
         if thing.id not in lists[was].ids:
-            # Others are there by this value, so the filter chooses by this member.
-            if lists[was].is_whole and any(members_of(one).get(name) == was for one in lists[was].items):
+            # Others are there by this value, so the filter chooses by this member; the list of all names it by this id.
+            is_by = lists[was].is_whole and any(members_of(one).get(name) == was for one in lists[was].items)
+            if is_by and thing.id in self._list(listing, thing, {}).ids:
                 other, expected = "a list without it", f"a list with {thing.id} by {parameter.name}={was}, as it reads"
                 self.living.note(Kind.CHOSEN, listing.operation.label, lists[was].exchange, expected, other, thing)
             return
