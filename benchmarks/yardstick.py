@@ -7,7 +7,7 @@ roaas selftest --against FILE --results out/later/selftest.json
 import sys
 from pathlib import Path
 
-from proof.selftest.comparison import read, stored
+from proof.selftest.against import read, stored
 
 if __name__ == "__main__":
     target, *runs = map(Path, sys.argv[1:])

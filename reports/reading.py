@@ -10,14 +10,8 @@ import jsonschema_rs
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError, best_match
 
-from reports.given_files import (
-    ResultFormatError,
-    ResultGarbledError,
-    ResultInvalidError,
-    ResultUnreadableError,
-    parsed,
-    read_octets,
-)
+from reports.errors import ResultFormatError, ResultGarbledError, ResultInvalidError, ResultUnreadableError
+from reports.given_files import parsed, read_octets
 from reports.pages.untrusted import excerpt
 
 SCHEMA_DIR = Path(__file__).parent / "schemas"

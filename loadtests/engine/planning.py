@@ -6,7 +6,8 @@ from loadtests.clients.payloads import LIBRARY, ROSBRIDGE
 from loadtests.clients.robot import Robot
 from loadtests.schedule.plan import BLOCK_S, LIBRARY_RATE, Plan
 from loadtests.settings.settings import Against, Settings
-from loadtests.statistics.comparisons import UNCLEAR, aa_controls, against
+from loadtests.statistics.against import UNCLEAR, against
+from loadtests.statistics.comparisons import aa_controls
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 

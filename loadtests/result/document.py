@@ -21,15 +21,8 @@ from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.schedule.plan import GAP_S, Plan
 from loadtests.settings.settings import Settings
 from loadtests.statistics import counts, figures, modes, over_time, service_levels, streams, verdict
-from loadtests.statistics.comparisons import (
-    EXIT_CODES,
-    AaControl,
-    Against,
-    aa_controls,
-    against,
-    further_interfaces,
-    soap_over_rest,
-)
+from loadtests.statistics.against import EXIT_CODES, Against, against
+from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.headline import Found, headline
 from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured

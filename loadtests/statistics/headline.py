@@ -7,16 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from loadtests.schedule.plan import Plan
-from loadtests.statistics.comparisons import (
-    DECIDING,
-    NOT_SLOWER,
-    SLOWER,
-    UNCLEAR,
-    AaControl,
-    Against,
-    Change,
-    SoapOverRest,
-)
+from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
+from loadtests.statistics.comparisons import AaControl, SoapOverRest
 from loadtests.statistics.figures import Series
 from loadtests.statistics.overload import Overload
 from loadtests.statistics.service_levels import BROKEN, NOT_KNOWN

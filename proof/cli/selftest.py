@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from conformance.contract.pack import Contract
     from proof.mutation.self_test import GoodDevice, SelfTest
     from proof.mutation.table import Mutant
-    from proof.selftest.comparison import Table
+    from proof.selftest.against import Table
     from proof.selftest.report import Report
 
 # How many mutants `--short` judges where the pack does not name them.
@@ -141,7 +141,7 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
     Raises:
         click.UsageError: a file cannot be read.
     """
-    from proof.selftest.comparison import read  # noqa: PLC0415 - see _by_hand()
+    from proof.selftest.against import read  # noqa: PLC0415 - see _by_hand()
 
     try:
         return read(paths)
@@ -151,7 +151,7 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
 
 def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Path]) -> bool:
     """Print what is worse in later results than in earlier ones; return whether anything is."""
-    from proof.selftest.comparison import lost  # noqa: PLC0415 - see _by_hand()
+    from proof.selftest.against import lost  # noqa: PLC0415 - see _by_hand()
 
     said = lost(before, _read(results), contract.renamed)
     click.echo("\n".join([*map(inert, said), f"{len(said)} differences to the worse" if said else "nothing is worse"]))

@@ -1,7 +1,4 @@
-"""Start the good devices of a self-test as separate processes, and stop them.
-
-Rewrite a robot's own addresses in its responses, so that they lead to the proxy in front of the robot.
-"""
+"""Start the good devices of a self-test as separate processes, and stop them."""
 
 import contextlib
 import os
@@ -14,11 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any
 
 from conformance.commandline.device_options import advice
 from conformance.contract.pack import Contract
-from proof.mutation.messages import Request, Response
 from proof.mutation.self_test import GoodDevice, Start, self_test_of
 
 _READY = re.compile(r"ready rest=(\S+)(?: soap=(\S*))?")
@@ -176,49 +172,3 @@ def _ready(process: subprocess.Popen[str], name: str) -> tuple[str, str]:
         f"it ended with exit code {process.poll()}" if process.poll() is not None else f"not ready after {_START_S:g} s"
     )
     raise RobotError(f"the device {name!r} does not start: {why}")
-
-
-_ORIGIN: Final = re.compile(r"^https?://[^/?]*(?=[/?])", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class Addresses:
-    """The addresses of a robot and of the proxy in front of it, as origins by interface ("rest", "soap").
-
-    Attributes:
-        robot: the robot's origins, such as ``http://127.0.0.1:8080``.
-        proxy: the proxy's origins, which clients use.
-        prefix: path before every REST path at the proxy, such as "/r2d2/api", or empty.
-    """
-
-    robot: dict[str, str]
-    proxy: dict[str, str]
-    prefix: str = ""
-
-    def public(self, side: str) -> str:
-        """Return the base URL of an interface at the proxy, as clients use it."""
-        return self.proxy[side] + (self.prefix if side == "rest" else "")
-
-    def inward(self, request: Request) -> Request | None:
-        """Return a client's request with the robot's own address in it, or None for a path that is not the robot's."""
-        if request.side != "rest" or not self.prefix or request.raw is not None:
-            return request
-        # A target in absolute form (RFC 9112 3.2.2) reaches the robot in origin form.
-        target = _ORIGIN.sub("", request.target)
-        if not target.startswith(self.prefix):
-            return None
-        return request.copy(target=target.removeprefix(self.prefix) or "/")
-
-    def outward(self, response: Response) -> Response:
-        """Replace the robot's address with the proxy's in a response, in place, and return the response."""
-        for side, robot in self.robot.items():
-            here = self.public(side)
-            # A robot may go by the Host field, which is the proxy's, and cannot know that the proxy speaks TLS.
-            asked = self.proxy[side]
-            for there in (robot, asked.replace("https:", "http:")) if asked.startswith("https:") else (robot,):
-                response.body = response.body.replace(there.encode(), here.encode())
-                response.fields = [(name, value.replace(there, here)) for name, value in response.fields]
-        location = response.field("Location")
-        if self.prefix and location is not None and location.startswith("/"):
-            response.put("Location", self.prefix + location)
-        return response

@@ -21,7 +21,7 @@ from reference_robot.ending import Ending, RosCommand
 from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.names import load_names
 from reference_robot.ros import RosRuntime
-from reference_robot.simulation.base import Realism
+from reference_robot.simulation.realism import Realism
 from reference_robot.simulation.runner import Simulation
 
 _NICENESS: Final = 5  # the web services run first: on a real robot they share no processor with the motors

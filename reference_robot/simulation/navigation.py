@@ -22,7 +22,6 @@ from std_msgs.msg import Header, String
 
 from reference_robot.kinematics import Kinematics
 from reference_robot.names import RosNames
-from reference_robot.simulation.kinematics import EXACT, Command, Pursuit
 from reference_robot.simulation.messages import (
     LATCHED,
     RESULT_TIMEOUT_S,
@@ -33,6 +32,7 @@ from reference_robot.simulation.messages import (
     stamped_pose,
 )
 from reference_robot.simulation.planner import PlanError, Planner, Pose
+from reference_robot.simulation.pursuit import EXACT, Command, Pursuit
 
 PATIENCE_S: Final = 20.0  # without getting 0.05 m nearer, in simulated time
 _NEARER_M: Final = 0.05

@@ -2,7 +2,7 @@
 
 This module checks what securesystemslib does not: the payload type is in-toto's, there is exactly one signature, the
 base64 is canonical, and the envelope has no other members. An envelope that includes a key, for example, is refused,
-because only the recipient decides whom to trust. The module `signature` verifies the signature.
+because only the recipient decides whom to trust. securesystemslib verifies the signature.
 """
 
 import base64
@@ -13,9 +13,13 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
+from securesystemslib.dsse import Envelope
+from securesystemslib.exceptions import VerificationError
+from securesystemslib.signer import Key, Signature, Signer
 
 from reports.attestation.statement import PAYLOAD_TYPE, PREDICATE_TYPE, STATEMENT_TYPE, Statement
-from reports.given_files import EnvelopeRefusedError, read_octets
+from reports.errors import EnvelopeRefusedError
+from reports.given_files import read_octets
 
 ENVELOPE_NAME = "certificate.intoto.json"
 _MOST_BYTES = 4 << 20
@@ -126,3 +130,33 @@ def _octets(text: str, what: str) -> bytes:
     if base64.b64encode(octets).decode() != text:
         raise EnvelopeRefusedError(f"the {what} is not canonical base64. {_ASK}")
     return octets
+
+
+def seal(statement: Statement, signer: Signer) -> str:
+    """Sign a statement and return the signed DSSE envelope as indented JSON text."""
+    envelope = Envelope(msgspec.json.encode(statement), PAYLOAD_TYPE, {})
+    envelope.sign(signer)
+    return msgspec.json.format(msgspec.json.encode(envelope.to_dict()), indent=1).decode() + "\n"
+
+
+def unseal(octets: bytes, key: Key) -> Statement:
+    """Verify an envelope's signature by a trusted public key, and return the signed statement.
+
+    Raises:
+        EnvelopeRefusedError: the envelope is not signed by that key, or is not as `seal` writes envelopes.
+    """
+    opened = open_envelope(octets)
+    if opened.keyid != key.keyid:
+        raise EnvelopeRefusedError(
+            f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
+            "If the vendor has a new key, compare its fingerprint over a second channel, and use that key"
+        )
+    signature = Signature(opened.keyid, opened.signature.hex())
+    try:
+        Envelope(opened.payload, PAYLOAD_TYPE, {opened.keyid: signature}).verify([key], 1)
+    except VerificationError as error:
+        raise EnvelopeRefusedError(
+            "the signature was not made by your key over this content: somebody changed it, or signed it "
+            "with another key. Do not rely on it; ask the vendor for the file as `roaas sign` wrote it"
+        ) from error
+    return statement_in(opened)

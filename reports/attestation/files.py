@@ -10,7 +10,7 @@ from typing import NamedTuple
 from reports.attestation.envelope import ENVELOPE_NAME
 from reports.attestation.outcomes import named
 from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Statement
-from reports.given_files import ResultUnreadableError, ResultUnsignableError
+from reports.errors import ResultUnreadableError, ResultUnsignableError
 
 RECORDED = ("traces.json.gz", "history.jsonl.gz")
 """Files that a run records beside its result, each of which may be missing."""

@@ -2,7 +2,6 @@
 
 A key is identified by its fingerprint: SHA-256 of the public key as DER (SubjectPublicKeyInfo, RFC 8410), as
 `openssl pkey -pubin -in public-key.pem -outform DER | sha256sum` prints it.
-Sign a statement into an envelope, and verify an envelope: Ed25519 and DSSE by securesystemslib.
 """
 
 import hashlib
@@ -12,7 +11,6 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-import msgspec
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 from cryptography.hazmat.primitives.serialization import (
@@ -21,13 +19,10 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
     load_pem_public_key,
 )
-from securesystemslib.dsse import Envelope
-from securesystemslib.exceptions import VerificationError
-from securesystemslib.signer import CryptoSigner, Key, Signature, Signer, SSlibKey
+from securesystemslib.signer import CryptoSigner, SSlibKey
 
-from reports.attestation.envelope import open_envelope, statement_in
-from reports.attestation.statement import PAYLOAD_TYPE, Statement
-from reports.given_files import EnvelopeRefusedError, KeyUnusableError, ReportError, read_octets
+from reports.errors import KeyUnusableError, ReportError
+from reports.given_files import read_octets
 from reports.pages.untrusted import on_a_line
 
 _MOST_BYTES = 1 << 20
@@ -133,33 +128,3 @@ def _warn_if_shared(path: Path) -> None:
         if os.name == "posix" and stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH):
             shown = on_a_line(str(path), 1000)
             sys.stderr.write(f"warning: other users can read the private key in {shown}: chmod 600 {shown}\n")
-
-
-def seal(statement: Statement, signer: Signer) -> str:
-    """Sign a statement and return the signed DSSE envelope as indented JSON text."""
-    envelope = Envelope(msgspec.json.encode(statement), PAYLOAD_TYPE, {})
-    envelope.sign(signer)
-    return msgspec.json.format(msgspec.json.encode(envelope.to_dict()), indent=1).decode() + "\n"
-
-
-def unseal(octets: bytes, key: Key) -> Statement:
-    """Verify an envelope's signature by a trusted public key, and return the signed statement.
-
-    Raises:
-        EnvelopeRefusedError: the envelope is not signed by that key, or is not as `seal` writes envelopes.
-    """
-    opened = open_envelope(octets)
-    if opened.keyid != key.keyid:
-        raise EnvelopeRefusedError(
-            f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
-            "If the vendor has a new key, compare its fingerprint over a second channel, and use that key"
-        )
-    signature = Signature(opened.keyid, opened.signature.hex())
-    try:
-        Envelope(opened.payload, PAYLOAD_TYPE, {opened.keyid: signature}).verify([key], 1)
-    except VerificationError as error:
-        raise EnvelopeRefusedError(
-            "the signature was not made by your key over this content: somebody changed it, or signed it "
-            "with another key. Do not rely on it; ask the vendor for the file as `roaas sign` wrote it"
-        ) from error
-    return statement_in(opened)

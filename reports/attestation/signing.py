@@ -7,13 +7,13 @@ from typing import Any
 
 import msgspec
 
-from reports.attestation.envelope import strict_json
+from reports.attestation.envelope import seal, strict_json
 from reports.attestation.files import DESCRIPTION, RECORDED, digests_in
-from reports.attestation.judging import Known
-from reports.attestation.keys import seal, signer_of
+from reports.attestation.keys import signer_of
 from reports.attestation.outcomes import Entry, contradictions, departures, named
+from reports.attestation.policy import Known
 from reports.attestation.statement import run_of, sha256, statement_of
-from reports.given_files import ResultUnsignableError
+from reports.errors import ResultUnsignableError
 
 
 class Notary:

@@ -11,12 +11,13 @@ from typing import Any
 import msgspec
 from securesystemslib.signer import Key
 
-from reports.attestation.envelope import strict_json
+from reports.attestation.envelope import strict_json, unseal
 from reports.attestation.files import compared, remarks_on
-from reports.attestation.judging import Known, Point, Policy, judge
-from reports.attestation.keys import unseal
+from reports.attestation.judging import Point, judge
+from reports.attestation.policy import Known, Policy
 from reports.attestation.statement import RESULT_SUBJECT, Statement, run_of
-from reports.given_files import ResultMissingError, read_octets
+from reports.errors import ResultMissingError
+from reports.given_files import read_octets
 
 PROVED = (
     "Proved: the holder of this key vouches that this run took place and gave this result, and nothing was changed "

@@ -9,7 +9,8 @@ from urllib.parse import quote
 from reports.certificate.difference import Difference, difference
 from reports.certificate.difference_page import headline
 from reports.certificate.page import Certificate, certificate, verdict_words
-from reports.given_files import ResultMissingError, ResultUnreadableError, showing
+from reports.errors import ResultMissingError, ResultUnreadableError
+from reports.given_files import showing
 from reports.pages.page import html_page, write_pages
 from reports.reading import RESULT_NAME, read_result
 

@@ -13,7 +13,7 @@ from reports.attestation.statement import RESULT_SUBJECT
 from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
-from reports.given_files import EnvelopeRefusedError
+from reports.errors import EnvelopeRefusedError
 from reports.pages.untrusted import on_a_line
 
 EXIT_REFUSED = 1

@@ -6,7 +6,7 @@ from typing import Protocol
 import click
 import msgspec
 
-from reports.attestation.judging import Known, Policy, read_policy
+from reports.attestation.policy import Known, Policy, read_policy
 
 PATH = click.Path(path_type=Path)
 FILE = click.Path(dir_okay=False, path_type=Path)

@@ -16,8 +16,9 @@ from reports.certificate.difference_page import (
 )
 from reports.certificate.runs import results_below, write_history
 from reports.cli.options import FOLDER, PATH, FrontDoor
+from reports.errors import ReportError
 from reports.formats.catalogue import FORMATS
-from reports.given_files import ReportError, parsed, read_octets, showing
+from reports.given_files import parsed, read_octets, showing
 from reports.pages.page import write_pages
 from reports.pages.untrusted import on_a_line
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_latency, read_result

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Any
 
-from reports.given_files import ResultsIncompatibleError
+from reports.errors import ResultsIncompatibleError
 from reports.latency.distributions import AllSeries, Series, all_series
 from reports.latency.numbers import rate
 

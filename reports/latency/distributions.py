@@ -16,7 +16,8 @@ from hdrh.codec import HdrCookieException, HdrLengthException
 from hdrh.histogram import HdrHistogram
 from numpy.typing import NDArray
 
-from reports.given_files import ResultInvalidError, unzipped
+from reports.errors import ResultInvalidError
+from reports.given_files import unzipped
 from reports.pages.untrusted import excerpt
 
 Floats = NDArray[np.float64]

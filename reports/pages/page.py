@@ -17,7 +17,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports.given_files import ResultUnreadableError
+from reports.errors import ResultUnreadableError
 from reports.pages.untrusted import beginning, code_block, code_span, coded, excerpt, plain, visible
 
 TEMPLATE_DIR = Path(__file__).parent / "templates"

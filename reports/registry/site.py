@@ -9,7 +9,7 @@ from reports.attestation.statement import RESULT_SUBJECT, Run
 from reports.certificate.described import DESCRIBED_CLASS, WORDS
 from reports.certificate.difference import MEANINGS, Kind
 from reports.certificate.difference_page import SHOWN, headline
-from reports.given_files import ResultUnreadableError
+from reports.errors import ResultUnreadableError
 from reports.pages.matrix import Mark, Matrix, Row, marks
 from reports.pages.page import html_page, write_pages
 from reports.registry.entries import Refused

@@ -13,7 +13,8 @@ from typing import Any
 
 import msgspec
 
-from reports.attestation.judging import SKEW, Known, Point, Policy, judge
+from reports.attestation.judging import SKEW, Point, judge
+from reports.attestation.policy import Known, Policy
 from reports.attestation.statement import Run, passed, sha256
 from reports.certificate.difference import Difference, difference
 from reports.registry.entries import Certificate

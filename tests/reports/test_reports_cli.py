@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from latencies import scaled
 
 from reports.cli.pages import compare, report
-from reports.given_files import ResultMissingError
+from reports.errors import ResultMissingError
 from reports.rendering import render
 
 

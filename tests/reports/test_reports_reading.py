@@ -5,7 +5,7 @@ import json
 import pytest
 from jsonschema import Draft202012Validator
 
-from reports.given_files import (
+from reports.errors import (
     ResultFormatError,
     ResultGarbledError,
     ResultInvalidError,

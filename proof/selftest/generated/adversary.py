@@ -18,17 +18,9 @@ from typing import Final
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from proof.mutation.messages import Change, Forward, HangUpError, Request, Response
-from proof.selftest.generated.mutant import (
-    OF_FORMATS,
-    OF_NUMBERS,
-    OF_TEXTS,
-    TIMES,
-    GeneratedMutant,
-    Tally,
-    When,
-    striking,
-)
+from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange, places
+from proof.selftest.generated.whens import OF_FORMATS, OF_NUMBERS, OF_TEXTS, TIMES, When, striking
 
 _NUMBERS = frozenset({"number", "integer"})
 # Effects that last or grow by themselves.

@@ -21,9 +21,11 @@ from functools import partial
 from time import perf_counter
 from typing import Any, Final
 
+from reference_robot.webservices.http.crowd import NEVER
+from reference_robot.webservices.http.heads import full
 from reference_robot.webservices.http.interface import described
-from reference_robot.webservices.http.messages import BODY_LIMIT, Request, Response, full
-from reference_robot.webservices.http.port import NEVER, Port
+from reference_robot.webservices.http.messages import BODY_LIMIT, Request, Response
+from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.representation.problems import Problem
 
 FIELD_BYTES: Final = 200  # bytes of memory per field besides its text: two Python objects and their references

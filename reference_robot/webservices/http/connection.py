@@ -19,17 +19,13 @@ from typing import Final, cast
 from httptools import HttpParserCallbackError, HttpParserError, HttpParserUpgrade, HttpRequestParser
 
 from reference_robot.webservices.http.answering import DRAINED, FIELD_BYTES, PacedConnection
-from reference_robot.webservices.http.hosts import take_forwarded
-from reference_robot.webservices.http.interface import described
-from reference_robot.webservices.http.messages import (
-    BODY_LIMIT,
+from reference_robot.webservices.http.crowd import Client
+from reference_robot.webservices.http.heads import (
     FRAMING_FIELDS,
     FRAMING_LIMIT,
     FRAMING_PER_BYTE,
     HEAD_LIMIT,
     TARGET_LIMIT,
-    Field,
-    Request,
     fields_by_name,
     framing_too_large,
     full,
@@ -40,7 +36,10 @@ from reference_robot.webservices.http.messages import (
     require_head,
     require_old_version,
 )
-from reference_robot.webservices.http.port import Client, Port
+from reference_robot.webservices.http.hosts import take_forwarded
+from reference_robot.webservices.http.interface import described
+from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
+from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.representation.problems import Problem, not_yet
 
 _UNREAD: Final = 16 * 1024  # bytes of unread responses at which a client counts as not reading

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from conformance.commandline.secret_file import warn_if_shared
 from reference_robot.webservices.http.connection import HttpConnection
-from reference_robot.webservices.http.port import NEVER, Port
+from reference_robot.webservices.http.crowd import NEVER
+from reference_robot.webservices.http.port import Port
 
 if TYPE_CHECKING:
     import asyncio

@@ -16,7 +16,8 @@ from reference_robot.webservices.nodes.calls import ManagedNode, RosCalls
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
-from reference_robot.webservices.robot.odometry import LatestOdometry, inverse, moved, planar_pose, require_known_frame
+from reference_robot.webservices.robot.odometry import LatestOdometry
+from reference_robot.webservices.robot.poses import inverse, moved, planar_pose, require_known_frame
 
 _Move: TypeAlias = Callable[[Pose], Pose]
 

@@ -3,7 +3,7 @@
 import pytest
 
 from proof.mutation.messages import Request, Response
-from proof.selftest.robots import Addresses
+from proof.selftest.proxy import Addresses
 
 
 def test_fields_are_found_in_any_case_and_altered_in_a_copy_alone():

@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from proof.selftest.comparison import read, stored
+from proof.selftest.against import read, stored
 from roaas import main
 
 # An id that was merged into another one, as the ledger's aliases say.

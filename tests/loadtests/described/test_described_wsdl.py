@@ -14,7 +14,8 @@ from loadtests.described.device import DESCRIBED_ONLY, Device, Named
 from loadtests.described.operations import chosen
 from loadtests.described.pairs import Choice
 from loadtests.described.requests import robot_of
-from loadtests.measuring.preflight import preflight, values_difference
+from loadtests.measuring.equivalence import values_difference
+from loadtests.measuring.preflight import preflight
 from loadtests.settings.settings import SettingsError
 
 NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001

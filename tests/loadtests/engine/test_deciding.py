@@ -7,7 +7,8 @@ from loadtests.engine.planning import until_decided
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.settings.settings import Against
-from loadtests.statistics.comparisons import NOT_SLOWER, SLOWER, UNCLEAR, Judge, aa_controls, against
+from loadtests.statistics.against import NOT_SLOWER, SLOWER, UNCLEAR, Judge, against
+from loadtests.statistics.comparisons import aa_controls
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Recorder
 

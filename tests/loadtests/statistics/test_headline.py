@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from loadtests.schedule.plan import Load, Plan
-from loadtests.statistics.comparisons import Against, Change, SoapOverRest
+from loadtests.statistics.against import Against, Change
+from loadtests.statistics.comparisons import SoapOverRest
 from loadtests.statistics.figures import Series
 from loadtests.statistics.headline import Found, headline
 

@@ -6,8 +6,8 @@ import math
 import pytest
 from web_protocol import closed, request, runs, statuses
 
+from reference_robot.webservices.http.crowd import Crowd, address_of
 from reference_robot.webservices.http.hosts import TrustedProxies
-from reference_robot.webservices.http.port import Crowd, address_of
 
 
 class Waiting:

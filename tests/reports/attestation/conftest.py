@@ -12,8 +12,8 @@ import pytest
 from securesystemslib.dsse import Envelope
 from vendors import Door, change, make_conformant
 
-from reports.attestation.judging import Known, Policy
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
+from reports.attestation.policy import Known, Policy
 from reports.attestation.signing import Notary
 from reports.attestation.verifying import Verification, verify
 from reports.rendering import render

@@ -9,7 +9,7 @@ from reports.attestation.envelope import ENVELOPE_NAME
 from reports.attestation.keys import PRIVATE_NAME, generate
 from reports.attestation.signing import Notary
 from reports.attestation.statement import seed_of
-from reports.given_files import EnvelopeRefusedError
+from reports.errors import EnvelopeRefusedError
 from reports.rendering import render
 
 

@@ -14,12 +14,12 @@ from click.testing import CliRunner
 from processes import ended
 from vendors import Door, requirement
 
-from reports.attestation.judging import Known, Policy, read_policy
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key, signer_of
+from reports.attestation.policy import Known, Policy, read_policy
 from reports.certificate.page import Seal
 from reports.cli.attestation import keygen, verify
 from reports.cli.signing import sign
-from reports.given_files import KeyUnusableError, PolicyUnusableError, ResultInvalidError
+from reports.errors import KeyUnusableError, PolicyUnusableError, ResultInvalidError
 from reports.rendering import render
 
 

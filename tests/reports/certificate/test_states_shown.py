@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from reports.certificate.moves_drawn import grid
+from reports.certificate.states_shown import grid
 
 _WALK = {
     "states": ["ready", "run", "running"],

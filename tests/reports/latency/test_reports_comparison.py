@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from latencies import scaled
 
-from reports.given_files import ResultsIncompatibleError
+from reports.errors import ResultsIncompatibleError
 from reports.latency.comparison import compare, judge, ratio_interval, widened
 from reports.latency.comparison_page import comparison_html, comparison_markdown, table, verdict
 

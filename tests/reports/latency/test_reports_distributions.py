@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hdrh.histogram import HdrHistogram
 
-from reports.given_files import ResultInvalidError
+from reports.errors import ResultInvalidError
 from reports.latency.distributions import all_series, distribution
 
 

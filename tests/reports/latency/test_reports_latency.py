@@ -8,7 +8,7 @@ import pytest
 from hdrh.histogram import HdrHistogram
 from lxml import html
 
-from reports.given_files import ResultInvalidError
+from reports.errors import ResultInvalidError
 from reports.latency.distributions import all_series
 from reports.latency.figures.load import load
 from reports.latency.figures.ratios import spans

@@ -1,0 +1,100 @@
+"""Read a policy: a TOML file with what a recipient demands of a signed certificate, one demand per line."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from reports.attestation.outcomes import Entry
+from reports.errors import PolicyUnusableError, ReportError
+from reports.given_files import read_octets
+
+_MOST_BYTES = 1 << 20
+_Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+OWN = "installed"
+"""In a policy, this word means the suite that verifies."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """The digests and profiles of the installed suite, with which a certificate is compared.
+
+    Attributes:
+        suite: digest of the installed suite.
+        requirement_sets: digest of each requirement set, by its name.
+        ledger: the requirements of the contract, by id.
+        contract: digest of each file of the contract, by its name.
+        profiles: names of the conformance classes in each profile, by the profile's name.
+    """
+
+    suite: str = ""
+    requirement_sets: Mapping[str, str] = field(default_factory=dict)
+    ledger: Mapping[str, Entry] = field(default_factory=dict)
+    contract: Mapping[str, str] = field(default_factory=dict)
+    profiles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The requirements that a certificate must meet to be accepted.
+
+    The defaults are the default policy; docs/certificates.md explains each field.
+
+    Attributes:
+        robot: required robot name, or None for any; `vendor` and `firmware` likewise.
+        statement: required digest of the vendor's statement, or None for any.
+        verdicts: accepted verdicts of the whole run.
+        profile: profile whose conformance classes must have passed, unless `classes` names them.
+        suites: digests of trusted suites; "installed" stands for the suite that verifies.
+        requirement_sets: names of accepted requirement sets, which the verifying suite must know.
+        efforts: accepted effort levels of the run.
+        motion: whether the robot must have been allowed to move.
+        ros: whether the suite must have observed the ROS topics of every passed class that uses ROS topics.
+        baseline: whether failures that the vendor's baseline file accepts are tolerated.
+        interrupted: always False: an interrupted run is never accepted.
+        tested: least share of the MUSTs of the required classes that were tested, 0 to 1.
+        operations: least share of the operations of a device's own description that were called, 0 to 1.
+        cases: least share of the cases that were tried, of those that a fast robot gets, 0 to 1.
+        max_age_days: greatest age of the run in days.
+        nonce: nonce that the run must have been made with, or None for any.
+    """
+
+    robot: str | None = None
+    vendor: str | None = None
+    firmware: str | None = None
+    statement: str | None = None
+    verdicts: tuple[str, ...] = ("conformant",)
+    profile: str = "full"
+    classes: tuple[str, ...] | None = None
+    suites: tuple[str, ...] = (OWN,)
+    requirement_sets: tuple[str, ...] = ("1.2",)
+    efforts: tuple[str, ...] = ("standard", "deep")
+    motion: bool = True
+    ros: bool = False
+    baseline: bool = False
+    interrupted: Literal[False] = False
+    tested: _Share = 0.5
+    operations: _Share = 0.5
+    cases: _Share = 0.04
+    max_age_days: Annotated[float, msgspec.Meta(gt=0, le=100_000)] = 365
+    nonce: str | None = None
+
+
+def read_policy(path: Path, known: Known) -> Policy:
+    """Read a policy from a TOML file and return it.
+
+    Raises:
+        PolicyUnusableError: the file cannot be read, has an unknown field or a wrong value, or names an unknown
+            profile.
+    """
+    try:
+        policy = msgspec.convert(tomllib.loads(read_octets(path, _MOST_BYTES).decode("utf-8")), Policy)
+    except ReportError as error:
+        raise PolicyUnusableError(error.message) from error
+    except (ValueError, RecursionError) as error:  # no UTF-8, no TOML, or another type
+        raise PolicyUnusableError(f"{path}: {error}") from error
+    if policy.classes is None and policy.profile not in known.profiles:
+        raise PolicyUnusableError(f"{path}: profile = {policy.profile!r} must be one of {', '.join(known.profiles)}")
+    return policy
