@@ -201,7 +201,7 @@ class FrontDoor:
         """Return a signer that holds the private key in a file, read before the run whose results it will sign."""
         try:
             return import_module("reports.attestation.signing").Notary(key, lambda: FrontDoor.known(pack))
-        except import_module("reports.given_files").ReportError as error:
+        except import_module("reports.errors").ReportError as error:
             raise click.UsageError(str(error)) from error
 
     @staticmethod
@@ -221,7 +221,7 @@ class FrontDoor:
         pages = import_module("reports.cli.pages")
         try:
             code: int = pages.tell_change(old, new, threshold)
-        except import_module("reports.given_files").ReportError as error:
+        except import_module("reports.errors").ReportError as error:
             click.echo(f"not compared: {error.format_message()}", err=True)
             return int(pages.EXIT_INVALID)
         return code

@@ -4,7 +4,7 @@ import pytest
 
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
-from proof.selftest.generated import mutant, whens
+from proof.selftest.generated import whens
 from proof.selftest.generated.adversary import composed, kinds_in_requests, unreached
 from proof.selftest.generated.catalogue import generated_mutants
 from proof.selftest.generated.mutant import Tally
@@ -86,7 +86,7 @@ def test_times_of_texts_and_formats(faults):
 
 def test_times_pass(faults, monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(mutant.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(whens.time, "monotonic", lambda: now[0])
     pause, spell = (faults[f"status@{when}:getVelocity:200-500"] for when in ("after-pause", "now-and-then"))
     for fault, moments, struck in ((pause, [0, 0.5, 1.6, 2], [2]), (spell, [0, 7, 8.5, 9.5, 11], [2, 3])):
         change, found = fault.make(Tally()), []
