@@ -32,9 +32,9 @@ _COMMANDS = {
     "load": ("loadtests.cli", "Measure how fast a robot responds."),
     "replay": ("conformance.cli.replay", "Send a finding's requests again, and report whether it persists."),
     "judge": ("conformance.cli.judge", "Judge a stored run again, without the robot."),
-    "report": ("reports.cli.pages", "Write the pages from the result files again."),
-    "compare": ("reports.cli.pages", "Show whether a robot got slower between two load tests."),
-    "diff": ("reports.cli.pages", "Show what changed between two results, or between two descriptions of an API."),
+    "report": ("reports.cli.results", "Write the pages from the result files again."),
+    "compare": ("reports.cli.results", "Show whether a robot got slower between two load tests."),
+    "diff": ("reports.cli.results", "Show what changed between two results, or between two descriptions of an API."),
     "keygen": ("reports.cli.attestation", "Make a key pair for signing results."),
     "sign": ("reports.cli.signing", "Sign a result, so that others can verify the signer."),
     "verify": ("reports.cli.attestation", "Check a signed certificate, and whether it meets your policy."),
@@ -218,7 +218,7 @@ class FrontDoor:
     @staticmethod
     def compare(old: Path, new: Path, threshold: float) -> int:
         """Print what changed between two latency result files; return the exit code."""
-        pages = import_module("reports.cli.pages")
+        pages = import_module("reports.cli.results")
         try:
             code: int = pages.tell_change(old, new, threshold)
         except import_module("reports.errors").ReportError as error:

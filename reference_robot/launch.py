@@ -30,7 +30,7 @@ from reference_robot.simulation.delivery import Delivery, DeliveryRequests
 from reference_robot.webservices.assembly import Endpoints
 from reference_robot.webservices.configuration import Configuration, load_configuration
 from reference_robot.webservices.endpoint import PortInUseError
-from reference_robot.webservices.http.authorization import Authorization, TokenFileError, read_tokens
+from reference_robot.webservices.http.access import Authorization, TokenFileError, read_tokens
 from reference_robot.webservices.http.hosts import is_loopback
 from reference_robot.webservices.http.listening import (
     Listening,

@@ -13,7 +13,7 @@ from reports.certificate.states_shown import grid
 from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
 from reports.fleet.page import fleet_html, fleet_markdown
 from reports.formats.catalogue import FORMATS
-from reports.formats.junit import latency_junit
+from reports.formats.ci_systems import latency_junit
 from reports.given_files import read_octets, showing
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result

@@ -11,7 +11,7 @@ from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, Source, Topic, topics
 from proof.mutation.self_test import self_test_of
-from reports.formats.sarif import page_of as clause_page
+from reports.formats.code_hosts import page_of as clause_page
 
 _INDEX = """# Requirements
 

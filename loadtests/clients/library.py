@@ -2,8 +2,8 @@
 
 SOAP goes through zeep: one Document (the parsed WSDL) for each process, because it takes milliseconds to build, and one
 transport for each user. REST goes through `requests`. Both use a urllib3 adapter that counts the requests sent: two
-requests for one call are a silent retry, which makes a run invalid.
-Responses of the library clients, up to a size: `requests` has no limit for lines, bodies and what they unpack to.
+requests for one call are a silent retry, which makes a run invalid. Responses are read up to a size: `requests` has no
+limit for lines, bodies and what they unpack to.
 """
 
 import io

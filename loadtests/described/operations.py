@@ -22,6 +22,11 @@ _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.D
 MOST = 16
 _SHOWN = 12
 _LONGEST = 300
+#: What a scenario decides by itself, or what needs requests at set times; by name in Python, with the value by default.
+_OTHERWISE = {
+    "operations": (), "rate": None, "stages": (), "arrivals": "constant", "knee": False, "against": None,
+    "restart_command": None,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -139,13 +144,6 @@ def refused(device: Device, operation: Operation) -> str:
     if not operation.label.isprintable() or len(operation.label) > _LONGEST:
         return "its path is too long, or is not printable"
     return ""
-
-
-#: What a scenario decides by itself, or what needs requests at set times; by name in Python, with the value by default.
-_OTHERWISE = {
-    "operations": (), "rate": None, "stages": (), "arrivals": "constant", "knee": False, "against": None,
-    "restart_command": None,
-}  # fmt: skip
 
 
 def scenario_of(file: str, options: Mapping[str, Any]) -> Scenario:

@@ -1,6 +1,6 @@
 """The requests of described operations: values as `roaas certify` picks them, kept where the device accepts them.
 
-The messages to the operations of a WSDL: made by its schema as `roaas certify` makes them, kept where accepted.
+The messages to the operations of a WSDL are made by its schema, likewise.
 """
 
 from collections.abc import Collection, Iterator
@@ -27,6 +27,9 @@ from loadtests.settings.settings import SettingsError
 
 #: Messages of an acting operation that are tried until the device accepts one.
 _TRIED = 4
+_STREAM = "its response does not end, as that of a stream"
+_FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)
+_ANY_SUCCESS = range(200, 300)
 
 
 def _found(messages: DescribedMessages, operation: Operation) -> tuple[SoapPort, SoapOperation]:
@@ -96,11 +99,6 @@ def bytes_of(request: Request) -> bytes:
         *(f"{name}: {text}" for name, text in fields),
     ]
     return "\r\n".join([*lines, "", ""]).encode() + request.body
-
-
-_STREAM = "its response does not end, as that of a stream"
-_FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)
-_ANY_SUCCESS = range(200, 300)
 
 
 def robot_of(device: Device, operations: Collection[Operation]) -> Robot:

@@ -1,7 +1,4 @@
-"""One run, from the first call to the written result.
-
-Carry out one run and write its result, also where the run fails or the process is killed.
-"""
+"""Carry out one run and write its result, also where the run fails or the process is killed."""
 
 import logging
 import sys

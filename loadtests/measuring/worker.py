@@ -3,10 +3,8 @@
 The object contains the robots' credentials, which are not sent over the network, and the folder for the worker's
 records when its master dies: `{"secrets": […], "folder": "…"}`.
 
-The file that a worker leaves when its master is gone: the figures of its own share, for people to read.
-
-Nothing reads the file, and it contains no verdict, because the other workers' shares are missing. But the figures of a
-long run are not lost.
+When its master is gone, a worker leaves the figures of its own share in a file for people to read. The file contains no
+verdict, because the other workers' shares are missing. But the figures of a long run are not lost.
 """
 
 import logging
@@ -42,6 +40,9 @@ if TYPE_CHECKING:
     from loadtests.measuring.scenario import ScenarioSession
 
 FORMAT = "roaas-worker/1"
+#: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
+MASTER_SILENT_S = 20.0
+_LOOK_S = 0.5
 
 
 class LeftBehind:
@@ -96,11 +97,6 @@ class LeftBehind:
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"worker-{platform.node()}-{os.getpid()}.json"
         return write_json(path, document, indent=1, allow_nan=False)
-
-
-#: The master answers a heartbeat each second. If it is silent for this long, it is dead, or the network to it is.
-MASTER_SILENT_S = 20.0
-_LOOK_S = 0.5
 
 
 class _Told(msgspec.Struct, frozen=True):

@@ -32,6 +32,15 @@ from loadtests.statistics.recorder import Recorder
 from loadtests.statistics.rounds import between_runs
 from loadtests.statistics.streams import SHARED
 
+CLIENT_WORDS = {
+    "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests are built "
+    "beforehand and each is sent once",
+    "zeep": "what an ordinary user's program calls: zeep over SOAP, the requests library over REST",
+}
+_SCENARIO = (
+    "our own HTTP/1.1 client on gevent and llhttp; requests are built when the scenario sends them, each is sent once"
+)
+
 
 def process_figures(members: list[Member]) -> tuple[list[dict[str, Any]], list[str]]:
     """Return an entry for each process, and remarks on those that did not do their share."""
@@ -80,16 +89,6 @@ def _remarks(member: Member, missing: int | None) -> list[str]:
             "send over the next"
         )
     return said
-
-
-CLIENT_WORDS = {
-    "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests are built "
-    "beforehand and each is sent once",
-    "zeep": "what an ordinary user's program calls: zeep over SOAP, the requests library over REST",
-}
-_SCENARIO = (
-    "our own HTTP/1.1 client on gevent and llhttp; requests are built when the scenario sends them, each is sent once"
-)
 
 
 def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[str, Any]:

@@ -1,6 +1,6 @@
-"""The settings of a run, in frozen groups: each group goes to the code that needs it.
+"""The settings of a run, in frozen groups, and the options of the command line that become settings.
 
-The options of the command line.
+Each group goes to the code that needs it.
 """
 
 import re
@@ -18,6 +18,10 @@ from loadtests.clients.robot import Robot, Stream
 from loadtests.schedule.plan import Load
 
 STEP_S = 3.0
+TOLERANCE = 0.05
+KNEE_SEARCHES = 5
+_UNITS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0}
+_STAGE = re.compile(r"(\d+(?:\.\d+)?):(\d+(?:\.\d+)?)(ms|s|m|h)")
 
 
 @dataclass(frozen=True)
@@ -216,10 +220,6 @@ class SettingsError(ValueError):
     """Settings that are impossible or not allowed; the message says what to change."""
 
 
-TOLERANCE = 0.05
-KNEE_SEARCHES = 5
-
-
 @dataclass(frozen=True)
 class CliOptions:
     """The options as given; None or empty where an option was not given.
@@ -278,10 +278,6 @@ def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Contex
             raise click.BadParameter(f"{value!r} is not {expected}") from None
 
     return callback
-
-
-_UNITS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0}
-_STAGE = re.compile(r"(\d+(?:\.\d+)?):(\d+(?:\.\d+)?)(ms|s|m|h)")
 
 
 def _stages(text: str) -> tuple[tuple[float, float], ...]:

@@ -13,6 +13,17 @@ from loadtests.settings.settings import Against, CliOptions, Limits, Output, Set
 _MOST_RATE = 1_000_000.0
 _MOST_USERS = 10_000
 _MOST_DURATION_S = 24 * 3600.0
+DEFAULT_RATE = 200.0
+DEFAULT_DURATION_S = 20.0
+# Two robots share the time. It goes on, up to four times as long, while the comparison is undecided.
+DEFAULT_AGAINST_S = 40.0
+AGAINST_LOOKS = (1, 2, 4)
+DEFAULT_WARMUP_S = 2.0
+#: Limits on operations that move the robot, unless its statement's [load] says otherwise.
+MOTION_RATE = 500.0
+MOTION_DURATION_S = 120.0
+_MOST_TOLERANCE = 10.0
+_DEFAULT_LIMIT = "the default limit for operations that move the robot; the statement's [load] {} lifts it"
 
 
 def contradiction(options: CliOptions) -> str | None:
@@ -64,19 +75,6 @@ def _restarting(options: CliOptions) -> str | None:
     if not words:
         return f"--restart-command {command!r} names no program"
     return None
-
-
-DEFAULT_RATE = 200.0
-DEFAULT_DURATION_S = 20.0
-# Two robots share the time. It goes on, up to four times as long, while the comparison is undecided.
-DEFAULT_AGAINST_S = 40.0
-AGAINST_LOOKS = (1, 2, 4)
-DEFAULT_WARMUP_S = 2.0
-#: Limits on operations that move the robot, unless its statement's [load] says otherwise.
-MOTION_RATE = 500.0
-MOTION_DURATION_S = 120.0
-_MOST_TOLERANCE = 10.0
-_DEFAULT_LIMIT = "the default limit for operations that move the robot; the statement's [load] {} lifts it"
 
 
 def settle(options: CliOptions, statement: RobotStatement, target: Target | None = None) -> Settings:

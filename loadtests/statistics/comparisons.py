@@ -21,6 +21,9 @@ from loadtests.statistics.rounds import Interval, Unit
 BASE = "rest"
 WEB_SERVICES = (BASE, "soap")
 COMPARED = ("mean", "p50", "p90", "p99")
+Verdict = Literal["differs", "bounded", "noise", "none"]
+#: An interval that includes both twice as long and half as long is inconclusive.
+_SHARP = 2.0
 
 
 class Ratio(msgspec.Struct, kw_only=True):
@@ -180,11 +183,6 @@ def compared(measured: Measured, first: Side, second: Side, quantile: str, devia
         "rounds": rounds_of(result.replicates, measured.pair_s(first.phase, first.name)) if result else None,
         "reason": reason,
     }
-
-
-Verdict = Literal["differs", "bounded", "noise", "none"]
-#: An interval that includes both twice as long and half as long is inconclusive.
-_SHARP = 2.0
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ A search brackets the knee between a rate that met the criterion and one that mi
 step that missed is tried again, a bracket ends only where a second, higher rate missed too, and there are several
 searches. Of n searches' estimates the lowest and the highest enclose the median with probability 1 - 2^(1 - n) (the
 sign test's interval); the brackets' own ends make it no narrower.
-One rate for a few seconds, and whether the robot met the criterion: a step of the search for the knee.
+
+A step of the search is one rate for a few seconds, and whether the robot met the criterion.
 """
 
 import math
@@ -26,6 +27,12 @@ _MOST_ERRORS = 0.01
 _LEAST_ACHIEVED = 0.95
 #: From this share of a core on, the generator may be what limits the rate.
 BUSY = 0.9
+RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
+_GROWTH = 2.0
+_NEAR = 1.5  # the next search begins this far from an earlier one's bracket
+#: The end of a bracket needs a second rate, higher by no more than this factor, that missed too.
+_CONFIRMED = 1.25
+_MISSES, _MOST_TRIALS = 2, 5  # of one rate: misses in which the generator was on time; trials in all
 
 
 @dataclass(frozen=True)
@@ -120,14 +127,6 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
         p99_ms=rounded(response.figure_ms("p99")),
         max_ms=rounded(response.figure_ms("max")),
     )
-
-
-RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
-_GROWTH = 2.0
-_NEAR = 1.5  # the next search begins this far from an earlier one's bracket
-#: The end of a bracket needs a second rate, higher by no more than this factor, that missed too.
-_CONFIRMED = 1.25
-_MISSES, _MOST_TRIALS = 2, 5  # of one rate: misses in which the generator was on time; trials in all
 
 
 @dataclass

@@ -210,7 +210,7 @@ def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
 
 def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]) -> None:
     """Judge generated mutants of the device that starts fastest; compare with Schemathesis only if requested."""
-    from proof.cli.selftest_api import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
+    from proof.cli.selftest_generated import chosen_mutants, run_generated  # noqa: PLC0415 - see _by_hand()
     from proof.mutation.self_test import self_test_of  # noqa: PLC0415 - see _by_hand()
     from proof.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
 
@@ -227,7 +227,7 @@ def _by_rule(context: click.Context, contract: Contract, options: dict[str, Any]
 
 def _by_api(context: click.Context, options: dict[str, Any]) -> None:
     """Judge generated mutants of a running device by its description."""
-    from proof.cli.selftest_api import chosen_of_api, described_device, run_api  # noqa: PLC0415 - see _by_hand()
+    from proof.cli.selftest_generated import chosen_of_api, described_device, run_api  # noqa: PLC0415 - see _by_hand()
     from proof.selftest.report import Report  # noqa: PLC0415 - see _by_hand()
 
     if not (options["generated"] or options["adversary"]):

@@ -7,8 +7,8 @@ starts::
     LAMP = GoodDevice("lamp", lambda _: [sys.executable, str(Path(__file__).with_name("lamp.py")), "0"])
     SELFTEST = SelfTest(devices=(LAMP,))
 
-The suite then generates mutants from the pack's descriptions. Everything else has a default.
-Find the programs and packages that good devices are made of, and build programs in Go.
+The suite then generates mutants from the pack's descriptions. Everything else has a default. A device that needs
+a program, a package or a build in Go asks for it here, and gets NotInstalledError where it is not installed.
 """
 
 import os
@@ -31,6 +31,8 @@ from proof.mutation.messages import Change
 from proof.mutation.table import Mutant
 
 MODULE = "selftest.py"
+# Go compiles its standard library once, on a slow machine in more than a minute.
+_BUILD_S = 300.0
 
 
 @dataclass(frozen=True)
@@ -196,10 +198,6 @@ def self_test_of(contract: Contract) -> SelfTest:
 def _renewed(mutant: Mutant, renamed: Mapping[str, str]) -> Mutant:
     """Return a mutant with the present ids of the requirements that must kill it."""
     return replace(mutant, catches=tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in mutant.catches)))
-
-
-# Go compiles its standard library once, on a slow machine in more than a minute.
-_BUILD_S = 300.0
 
 
 class NotInstalledError(Exception):

@@ -1,4 +1,6 @@
-"""A table of mutants: each row names a mutant, the requirement that kills it, its fault, and the change that makes it.
+"""Mutants by hand, and the tables of them: each row has a name, a requirement that kills it, a fault and a change.
+
+A mutant is a good device with one change between it and its clients.
 
 A row ends with an operator that makes the change, or decorates the change if that is a function or a class::
 
@@ -11,7 +13,6 @@ A row ends with an operator that makes the change, or decorates the change if th
     class _Lingering: ...
 
 Rows whose change is made of words alone are data: see read_rows().
-A mutant: a good device with one change between it and its clients, and the requirements that must kill it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from proof.mutation.messages import Change, IncompleteRequest, Request, Response
+
+_Decorated = TypeVar("_Decorated", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -63,9 +66,6 @@ class Mutant:
     serial: bool = False
     backwards: bool = False
     forgetful: bool = False
-
-
-_Decorated = TypeVar("_Decorated", bound=Callable[..., Any])
 
 
 class Table:

@@ -36,6 +36,87 @@ _ROBOTS = _HERE / "independent_robots"
 _REFERENCE_ROBOT = _HERE.parents[1] / "reference_robot"
 _FREE_PORTS = ("--rest-port", "0", "--soap-port", "0")
 _MESSAGE_S, _FORGOTTEN_S = 0.05, 2.0
+_OWN = rest("POST", POSE)
+_GOAL_PUT = rest("PUT", GOAL)
+_AT_POSE = rest("", POSE)
+_ORDERS = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
+_OPEN_PLACES = (
+    OpenPlace(
+        r"(freeze|delay|scale|ulp|swap)(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?"
+        r"\.header\.stamp(\.\w+)?:\w+"
+        r"|negate(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp\.sec:\w+",
+        "A planner chooses the stamp of its plan: the contract names its frame and its poses (contract.md#plans). Each "
+        "request makes a new plan, so formats need not agree on the stamp.",
+    ),
+    OpenPlace(
+        r"(default|scale|single|ulp|ignore|lag|clamp|round):[gG]etPlan:request\.tolerance:\w+",
+        "A path that ends at the requested pose itself is within every tolerance (contract.md#plans): such a planner's "
+        "response does not depend on the tolerance. Of other planners, plan-end judges the path by the tolerance sent.",
+    ),
+    OpenPlace(
+        r"forward(@[\w-]+)?:[gG]etPlan:request\.(?!start_yaw)\w+:\w+"
+        r"|(default|scale|negate|ulp|single|round|clamp)(@[\w-]+)?:[gG]etPlan:request\.start_yaw:\w+",
+        "A path starts at the asked position (contract.md#plans); what start_yaw does to it, no clause says.",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        "A robot responds with the goal as it understood it: it may bring a quaternion to unit length, and transform a "
+        "pose to another frame and back (contract.md#goals requires the goal, not its last bit).",
+    ),
+    OpenPlace(
+        r"(default|scale|negate|ulp|ignore|lag|clamp):ExecuteCoffeeRequest:request\.arg0\.message_code:soap",
+        "ExecuteCoffeeRequest publishes code 4, whatever code it is given (contract.md#soap-publishers).",
+    ),
+    OpenPlace(
+        r"(default|scale|single|ulp|ignore|lag|clamp|round)(@[\w-]+)?:putGoal:request\."
+        r"(goal_id|header|goal\.target_pose\.header)\.stamp\.\w+:\w+",
+        "A robot may stamp a goal itself, as it does where the stamp is left out: it must show the same id and pose "
+        "(contract.md#goals).",
+    ),
+    OpenPlace(
+        r"(freeze|delay|ulp)(@[\w-]+)?:putGoal:answer\.(goal_id|header|goal\.target_pose\.header)\.stamp(\.\w+)?:\w+",
+        "The response to a PUT acknowledges the goal; which time its stamps show there, no clause says.",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:getDeliveries:answer\[\]\.accepted\.\w+:\w+",
+        "When a delivery counts as accepted, to the nanosecond, is the robot's own affair (contract.md#deliveries).",
+    ),
+    OpenPlace(
+        r"[\w-]+@first:[gG]et(Sensors|NavigationServices):answer(\.return)?(\[\]\.\w+)?:\w+",
+        "The lists show what is on the robot's graph, which may change after any response: one that differs from all "
+        "later ones is no breach (contract.md#sensors-and-services).",
+    ),
+    OpenPlace(
+        r"(truncate|freeze|delay|fold|strip)(@[\w-]+)?:putGoal:answer\.status\.text:\w+",
+        "The text of a status is in the robot's own words (contract.md#goals names the codes).",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:putGoal:answer\.status\.code:\w+",
+        "Which code of an active goal the response to its PUT shows, no clause says.",
+    ),
+    OpenPlace(
+        r"body-empty(@[\w-]+)?:putGoal:body:\w+",
+        "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
+    ),
+    OpenPlace(
+        r"(single|ulp)(@[\w-]+)?:putGoal:request\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
+        "A robot responds with the goal as it understood it, and may have transformed it (contract.md#goals): only "
+        "deliveries are the same to the last bit.",
+    ),
+    OpenPlace(
+        r"ulp(@[\w-]+)?:put(Linear)?Velocity:request\.[\w.]+:\w+",
+        "A velocity is reached within the declared tolerance (contract.md#velocity), and 204 is a full response.",
+    ),
+    OpenPlace(r"status:putDelivery:2\d\d-2\d\d", "A delivery responds 2xx; 204 is preferred (contract.md#rest)."),
+    OpenPlace(
+        r"reorder:[gG]et(Sensors|NavigationServices):answer(\.return)?:\w+",
+        "What is on the robot's graph has no order (contract.md#sensors-and-services).",
+    ),
+    OpenPlace(
+        r"status:\w+:(400|422)-4\d\d",
+        "Input that is no JSON is 400, of the wrong shape 422; other 4xx conform too (contract.md#input-json).",
+    ),
+)
 
 
 def _on_ros(start: Start, *options: str) -> list[str]:
@@ -133,12 +214,6 @@ class _Behind:
         del self._known[request.body]
 
 
-_OWN = rest("POST", POSE)
-_GOAL_PUT = rest("PUT", GOAL)
-_AT_POSE = rest("", POSE)
-_ORDERS = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
-
-
 def _extended(request: Request, forward: Forward) -> Response:
     """Add a method of the vendor's own at the pose, and ignore the status in a goal that is put back."""
     if _OWN(request):
@@ -169,84 +244,6 @@ class _FullQueue:
             problem(status, "the queue is full", after) if request.side == "rest" else plain(status, b"", "", after)
         )(request)
 
-
-_OPEN_PLACES = (
-    OpenPlace(
-        r"(freeze|delay|scale|ulp|swap)(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?"
-        r"\.header\.stamp(\.\w+)?:\w+"
-        r"|negate(@[\w-]+)?:[gG]etPlan:answer(\.return)?\.plan(\.poses\[\])?\.header\.stamp\.sec:\w+",
-        "A planner chooses the stamp of its plan: the contract names its frame and its poses (contract.md#plans). Each "
-        "request makes a new plan, so formats need not agree on the stamp.",
-    ),
-    OpenPlace(
-        r"(default|scale|single|ulp|ignore|lag|clamp|round):[gG]etPlan:request\.tolerance:\w+",
-        "A path that ends at the requested pose itself is within every tolerance (contract.md#plans): such a planner's "
-        "response does not depend on the tolerance. Of other planners, plan-end judges the path by the tolerance sent.",
-    ),
-    OpenPlace(
-        r"forward(@[\w-]+)?:[gG]etPlan:request\.(?!start_yaw)\w+:\w+"
-        r"|(default|scale|negate|ulp|single|round|clamp)(@[\w-]+)?:[gG]etPlan:request\.start_yaw:\w+",
-        "A path starts at the asked position (contract.md#plans); what start_yaw does to it, no clause says.",
-    ),
-    OpenPlace(
-        r"ulp(@[\w-]+)?:putGoal:answer\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
-        "A robot responds with the goal as it understood it: it may bring a quaternion to unit length, and transform a "
-        "pose to another frame and back (contract.md#goals requires the goal, not its last bit).",
-    ),
-    OpenPlace(
-        r"(default|scale|negate|ulp|ignore|lag|clamp):ExecuteCoffeeRequest:request\.arg0\.message_code:soap",
-        "ExecuteCoffeeRequest publishes code 4, whatever code it is given (contract.md#soap-publishers).",
-    ),
-    OpenPlace(
-        r"(default|scale|single|ulp|ignore|lag|clamp|round)(@[\w-]+)?:putGoal:request\."
-        r"(goal_id|header|goal\.target_pose\.header)\.stamp\.\w+:\w+",
-        "A robot may stamp a goal itself, as it does where the stamp is left out: it must show the same id and pose "
-        "(contract.md#goals).",
-    ),
-    OpenPlace(
-        r"(freeze|delay|ulp)(@[\w-]+)?:putGoal:answer\.(goal_id|header|goal\.target_pose\.header)\.stamp(\.\w+)?:\w+",
-        "The response to a PUT acknowledges the goal; which time its stamps show there, no clause says.",
-    ),
-    OpenPlace(
-        r"ulp(@[\w-]+)?:getDeliveries:answer\[\]\.accepted\.\w+:\w+",
-        "When a delivery counts as accepted, to the nanosecond, is the robot's own affair (contract.md#deliveries).",
-    ),
-    OpenPlace(
-        r"[\w-]+@first:[gG]et(Sensors|NavigationServices):answer(\.return)?(\[\]\.\w+)?:\w+",
-        "The lists show what is on the robot's graph, which may change after any response: one that differs from all "
-        "later ones is no breach (contract.md#sensors-and-services).",
-    ),
-    OpenPlace(
-        r"(truncate|freeze|delay|fold|strip)(@[\w-]+)?:putGoal:answer\.status\.text:\w+",
-        "The text of a status is in the robot's own words (contract.md#goals names the codes).",
-    ),
-    OpenPlace(
-        r"ulp(@[\w-]+)?:putGoal:answer\.status\.code:\w+",
-        "Which code of an active goal the response to its PUT shows, no clause says.",
-    ),
-    OpenPlace(
-        r"body-empty(@[\w-]+)?:putGoal:body:\w+",
-        "A goal is acknowledged by the status (contract.md#goals); no clause requires a response body.",
-    ),
-    OpenPlace(
-        r"(single|ulp)(@[\w-]+)?:putGoal:request\.goal\.target_pose\.pose\.(position|orientation)\.\w+:\w+",
-        "A robot responds with the goal as it understood it, and may have transformed it (contract.md#goals): only "
-        "deliveries are the same to the last bit.",
-    ),
-    OpenPlace(
-        r"ulp(@[\w-]+)?:put(Linear)?Velocity:request\.[\w.]+:\w+",
-        "A velocity is reached within the declared tolerance (contract.md#velocity), and 204 is a full response.",
-    ),
-    OpenPlace(r"status:putDelivery:2\d\d-2\d\d", "A delivery responds 2xx; 204 is preferred (contract.md#rest)."),
-    OpenPlace(
-        r"reorder:[gG]et(Sensors|NavigationServices):answer(\.return)?:\w+",
-        "What is on the robot's graph has no order (contract.md#sensors-and-services).",
-    ),
-    OpenPlace(
-        r"status:\w+:(400|422)-4\d\d",
-        "Input that is no JSON is 400, of the wrong shape 422; other 4xx conform too (contract.md#input-json).",
-    ),
-)
 
 SELFTEST = SelfTest(
     devices=(REFERENCE, PLAIN, BAROQUE, LEGACY, REALISTIC, DEADMAN, *BODIES, *ON_SERVERS),

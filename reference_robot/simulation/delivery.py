@@ -46,6 +46,11 @@ _QOS: Final = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=Reliability
 # A batch occupies a processor: the messages of 50 ms for 3 ms, the messages of 5 ms for 0.3 ms.
 _PAUSE_S: Final = 0.005
 _MOST: Final = 5000  # messages that Fast DDS keeps; others may arrive while a batch is read
+_CODES: Final = frozenset({COURIER, COFFEE})
+_REPORT_PERIOD_S: Final = 0.05  # shortest time between two reports
+_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while the navigation is not running
+_CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
+_REMEMBERED: Final = 100  # goal ids of legs, and of other clients' cancelled goals
 
 
 class DeliveryRequests:
@@ -65,14 +70,6 @@ class DeliveryRequests:
     def waiting(self) -> Iterator[DeliveryRequest]:
         """Yield the waiting requests, oldest first, and remove them from the subscription's queue."""
         return map(DeliveryRequest.of, islice(waiting_messages(self._subscription), _MOST))
-
-
-_CODES: Final = frozenset({COURIER, COFFEE})
-_REPORT_PERIOD_S: Final = 0.05  # shortest time between two reports
-_RETRY_PERIOD_S: Final = 0.2  # after a refused leg, and while the navigation is not running
-
-_CANCELED: Final = frozenset({GoalStatus.STATUS_CANCELING, GoalStatus.STATUS_CANCELED})
-_REMEMBERED: Final = 100  # goal ids of legs, and of other clients' cancelled goals
 
 
 class Delivery:

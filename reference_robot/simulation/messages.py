@@ -1,7 +1,4 @@
-"""Conversions between ROS messages and the plain values of the simulation.
-
-The robot's present pose, read from its odometry topic.
-"""
+"""Conversions between ROS messages and the plain values of the simulation, such as the pose in the latest odometry."""
 
 import math
 from typing import TYPE_CHECKING, Any, Final

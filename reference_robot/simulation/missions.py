@@ -11,6 +11,8 @@ from typing import Any, Final
 
 from reference_robot.deliveries import DeliveryRequest
 
+_REMEMBERED: Final = 100  # changes kept between two reports
+
 
 class MissionState(StrEnum):
     """The state of a mission."""
@@ -22,7 +24,6 @@ class MissionState(StrEnum):
     DROPPED = "dropped"
 
 
-_REMEMBERED: Final = 100  # changes kept between two reports
 _ALIVE: Final = frozenset({MissionState.QUEUED, MissionState.ACTIVE})
 
 

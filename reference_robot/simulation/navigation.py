@@ -39,6 +39,8 @@ _NEARER_M: Final = 0.05
 # A control step follows each odometry message, 50 times a second. A longer interval means that the processes were
 # delayed, which must not count as a lack of progress.
 _STEP_S: Final = 0.1
+_FEEDBACK_PERIOD_S: Final = 0.2
+_FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on
 
 
 class Progress:
@@ -62,10 +64,6 @@ class Progress:
         if remaining < self._nearest - _NEARER_M:
             self._nearest, self._waited_s = remaining, 0.0
         return self._waited_s > PATIENCE_S
-
-
-_FEEDBACK_PERIOD_S: Final = 0.2
-_FAILED_TO_MAKE_PROGRESS: Final = 105  # code of nav2_msgs/FollowPath, which Nav2's navigator passes on
 
 
 class _DeferringActionServer(ActionServer):

@@ -24,6 +24,9 @@ from reference_robot.simulation.pursuit import EXACT
 from reference_robot.simulation.realism import NEAR_ENOUGH, Realism
 from reference_robot.simulation.sensors import Sensors
 
+_PLACES: Final = ((68.0, 39.0, 0.0), (72.0, 39.0, 3.0))  # of the corridor
+_RETRY_PERIOD_S: Final = 0.2
+
 
 class Simulation:
     """The simulated robot: the ROS nodes ``base``, ``navigation`` and ``delivery`` on a runtime. ROS time is wall time.
@@ -59,10 +62,6 @@ class Simulation:
         self.delivery = Delivery(ros.create_node("delivery", apart=True), requests, names)
         if body.patrols:
             self.patrol = Patrol(navigation_node, names)
-
-
-_PLACES: Final = ((68.0, 39.0, 0.0), (72.0, 39.0, 3.0))  # of the corridor
-_RETRY_PERIOD_S: Final = 0.2
 
 
 class Patrol:

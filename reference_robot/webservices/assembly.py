@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from typing import Final, NamedTuple
 
 from reference_robot.webservices.configuration import Configuration
-from reference_robot.webservices.http.authorization import Admission, Scope
+from reference_robot.webservices.http.access import Admission, Scope
 from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.listening import REST, SOAP, Listening
@@ -19,7 +19,7 @@ from reference_robot.webservices.representation.problems import Problem
 from reference_robot.webservices.resources.about import Health as HealthResource
 from reference_robot.webservices.resources.about import OpenApi, Wadl
 from reference_robot.webservices.resources.resource import Resource
-from reference_robot.webservices.resources.state import (
+from reference_robot.webservices.resources.robot import (
     Delivery,
     DeliveryList,
     Goal,
@@ -28,7 +28,7 @@ from reference_robot.webservices.resources.state import (
     Plan,
     Pose,
 )
-from reference_robot.webservices.resources.state import Velocity as VelocityResource
+from reference_robot.webservices.resources.robot import Velocity as VelocityResource
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.health import Health
@@ -42,6 +42,7 @@ from reference_robot.webservices.soap.subscribers import SubscribersWebService
 Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
 
 _DELIVERY_PATHS: Final = b"/robot/app/delivery/"
+_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to report its state
 
 
 class RestInterface(Interface):
@@ -81,9 +82,6 @@ class RestInterface(Interface):
             return self._delivery.handlers()
         hint = "; its path ends with a slash" if path + b"/" in self._fixed else ""
         raise Problem(404, f"there is no resource at {path.decode('ascii')[:200]!a}{hint}")
-
-
-_STATE_DEADLINE: Final = 1.0  # seconds for a managed node to report its state
 
 
 class Endpoints(NamedTuple):

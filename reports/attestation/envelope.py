@@ -1,4 +1,4 @@
-"""Parse the envelope file of a signed certificate: DSSE v1 (Dead Simple Signing Envelope), one signature.
+"""Sign a statement into an envelope, and verify an envelope: DSSE v1 (Dead Simple Signing Envelope), one signature.
 
 This module checks what securesystemslib does not: the payload type is in-toto's, there is exactly one signature, the
 base64 is canonical, and the envelope has no other members. An envelope that includes a key, for example, is refused,

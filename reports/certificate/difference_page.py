@@ -1,7 +1,4 @@
-"""Write the output of `roaas diff`: text for the terminal, an HTML page, and Markdown.
-
-Show what changed between two descriptions of an API: text for the terminal, an HTML page, and Markdown.
-"""
+"""Write the output of `roaas diff`, of two results or two descriptions: for the terminal, as HTML, and as Markdown."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -14,6 +11,8 @@ from reports.pages.untrusted import on_a_line
 SHOWN = 50
 """Requirements of one kind of change that are listed; the rest are counted."""
 _TONES = {Kind.NEW_FAILURE: "bad", Kind.LOST: "warning", Kind.FIXED: "good"}
+_OPERATIONS_NAMED = 5
+_NAME_SHOWN = 200
 
 
 def headline(found: Difference) -> str:
@@ -66,10 +65,6 @@ def _values(found: Difference, names: tuple[str, str]) -> dict[str, Any]:
         "tones": _TONES,
         "shown": SHOWN,
     }
-
-
-_NAMED = 5
-_SHOWN = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +132,13 @@ def changes_text(found: DescriptionChanges) -> str:
 
 
 def _named(operations: list[str]) -> str:
-    more = f" and {len(operations) - _NAMED} more" if len(operations) > _NAMED else ""
-    return ", ".join(operations[:_NAMED]) + more
+    more = f" and {len(operations) - _OPERATIONS_NAMED} more" if len(operations) > _OPERATIONS_NAMED else ""
+    return ", ".join(operations[:_OPERATIONS_NAMED]) + more
 
 
 def changes_pages(found: DescriptionChanges, names: tuple[str, str], stem: str) -> dict[str, str]:
     """Return the pages with the changes, by file name; ``names`` say where the descriptions are from."""
-    values: dict[str, Any] = {"found": found, "names": names, "shown": _SHOWN, "named": _NAMED}
+    values: dict[str, Any] = {"found": found, "names": names, "shown": _NAME_SHOWN, "named": _OPERATIONS_NAMED}
     return {
         f"{stem}.html": html_page("description-changes.html.j2", **values),
         f"{stem}.md": markdown_page("description-changes.md.j2", **values),

@@ -1,11 +1,10 @@
-"""Write the certificate: a conformance result as an HTML page that a vendor can hand to a customer.
+"""Write the certificate, a conformance result that a vendor can hand to a customer, as an HTML page and as Markdown.
 
 This module computes the content of all forms of the certificate; the templates lay it out. The page calls itself a
 certificate only if every claimed class passed.
 
-Write the certificate as Markdown of limited size, for a pull request or the summary of a CI job.
-
-GitHub drops a job summary of more than 1 MiB, so without a limit a run with many failures would show nothing.
+The Markdown, for a pull request or the summary of a CI job, is of limited size: GitHub drops a job summary of more than
+1 MiB, so without a limit a run with many failures would show nothing.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,6 +52,13 @@ VIEWS = {
 _ORDER = ("fail", "error", "warn", "skip", "pass", "not-claimed")
 _COLUMNS = ("pass", "fail", "warn", "error", "skip", "not-claimed")
 _CLASS_ORDER = ("fail", "inconclusive", "pass", "not-claimed")
+MOST_OCTETS = 512 * 1024
+"""Limit of the Markdown for details of single requirements; verdicts, classes and reasons are limited in number."""
+_MOST_SHOWN = 30
+_MOST_NAMED = 500
+_MOST_GROUPS = 30
+_LIMITS = {"in_full": 10, "most_named": _MOST_NAMED}
+_HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,15 +369,6 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         "shown_curl": SHOWN_CURL,
         "shown_ids": SHOWN_IDS,
     }
-
-
-MOST_OCTETS = 512 * 1024
-"""Limit for the details of single requirements; the number of verdicts, classes and reasons is limited as well."""
-_MOST_SHOWN = 30
-_MOST_NAMED = 500
-_MOST_GROUPS = 30
-_LIMITS = {"in_full": 10, "most_named": _MOST_NAMED}
-_HEADINGS = {"fail": "What failed", "warn": "Warnings"}
 
 
 class _Part(NamedTuple):

@@ -1,6 +1,6 @@
 """List all output formats by the name that `roaas report --format` takes, with their file names.
 
-Write a badge as JSON for shields.io's endpoint; the badge is green only if the robot is conformant.
+The shortest is here too: a badge for shields.io's endpoint, green only if the robot is conformant.
 """
 
 import json
@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from reports.certificate.page import certificate_markdown, verdict_words
-from reports.formats.junit import ctrf, junit
-from reports.formats.sarif import annotations, gitlab, sarif
+from reports.formats.ci_systems import ctrf, junit
+from reports.formats.code_hosts import annotations, gitlab, sarif
 
 _COLOURS = {"conformant": "brightgreen", "not-conformant": "red", "inconclusive": "lightgrey"}
 

@@ -1,6 +1,6 @@
-"""Decide for each robot whether its latest certificate counts, that is, whether it meets the registry's policy.
+"""Decide for each robot whether its latest certificate counts, and what changed since the firmware before.
 
-Compare the certificates of a robot's firmware versions by the rules of `roaas diff`.
+A certificate counts if it meets the registry's policy. Changes are found by the rules of `roaas diff`.
 """
 
 import datetime as dt

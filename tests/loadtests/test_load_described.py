@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 from toy_api import LOGIN, TOKEN
 
-from reports.formats.junit import latency_junit
+from reports.formats.ci_systems import latency_junit
 from reports.latency.noticed import noticed
 from reports.latency.page import latency_html, latency_markdown
 

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 from latencies import scaled
 
-from reports.cli.pages import compare, report
+from reports.cli.results import compare, report
 from reports.errors import ResultMissingError
 from reports.rendering import render
 

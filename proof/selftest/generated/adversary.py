@@ -1,11 +1,8 @@
 """Faults that are composed: an effect, a place where it works, and a time, client or value for which it does.
 
 Effects and places are those of the mutants by rule that work always; so each composed fault breaks a clause as they do,
-if less often.
-
-Which composed faults a run would meet at all: each is tried on the messages of a run of the good device.
-
-A fault that alters none of them cannot be noticed, and a run that shows it takes as long as any.
+if less often. Each is first tried on the messages of a run of the good device: a run takes as long as any to show a
+fault that alters none of them, and so cannot be noticed.
 """
 
 import re
@@ -27,6 +24,11 @@ _NUMBERS = frozenset({"number", "integer"})
 _LASTING = frozenset({"hang", "slower"})
 # Effects that repeat what came before: the first time there is nothing.
 _REPEATING = frozenset({"freeze", "delay", "ignore", "lag", "crossed"})
+# Larger messages are attacks by their size, which no generated fault is about.
+_LARGEST: Final = 100_000
+# Conditions that the clock or other requests decide, which messages alone do not show.
+_OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})
+Message = tuple[Request, Response]
 
 
 def kinds_in_requests(contract: Contract) -> Mapping[str, frozenset[str]]:
@@ -81,13 +83,6 @@ def _composed(mutant: GeneratedMutant, kinds: frozenset[str]) -> Iterator[Genera
 
 def _make(mutant: GeneratedMutant, when: When, tally: Tally) -> Change:
     return striking(partial(mutant.make, tally), mutant.exchange, when)
-
-
-# Larger messages are attacks by their size, which no generated fault is about.
-_LARGEST: Final = 100_000
-# Conditions that the clock or other requests decide, which messages alone do not show.
-_OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})
-Message = tuple[Request, Response]
 
 
 class Recorder:

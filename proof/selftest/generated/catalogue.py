@@ -6,7 +6,7 @@ from functools import cache
 
 from conformance.contract.pack import Contract
 from proof.mutation.self_test import OpenPlace, self_test_of
-from proof.selftest.generated import heads, lenience
+from proof.selftest.generated import lenience, responses
 from proof.selftest.generated.described import described_mutants
 from proof.selftest.generated.mutant import MODES, GeneratedMutant, classes_of_answers, of_answer, of_request
 from proof.selftest.generated.operators import NUMERIC, OPERATORS, Operator
@@ -14,7 +14,33 @@ from proof.selftest.generated.places import Exchange, Place, exchanges, places
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
 # What happens to whole answers now and then.
-_WHOLE = {"crossed": heads.crossed, "failing": heads.failing, "cut": heads.cut}
+_WHOLE = {"crossed": responses.crossed, "failing": responses.failing, "cut": responses.cut}
+_UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
+#: What norms leave open, whatever the contract.
+BY_NORM = (
+    OpenPlace(
+        r"body-bom:[^:]+:body:xml",
+        "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
+        "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"body-bom:[^:]+:body:text",
+        "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); what "
+        "forbids one is RFC 8259 8.1, of JSON.",
+    ),
+    OpenPlace(
+        r"header-(drop|change):[^:]+:Vary",
+        "Vary tells caches which clients a response is fit for: a response that may be cached needs it "
+        "(RFC 9110 12.5.5), and the response to an unsafe method may not (9.2.3).",
+        side="rest",
+        methods=_UNSAFE,
+    ),
+    OpenPlace(
+        r"header-more:[^:]+:Allow",
+        "A method that Allow names in every response is the vendor's own (RFC 9110 10.2.1). The suite does not send "
+        "it, as it may do anything.",
+    ),
+)
 
 
 @cache
@@ -77,9 +103,9 @@ def _classes(place: Place) -> tuple[str, ...]:
 def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
     numeric = {one.exchange.name for one in places(contract) if one.part == "answer" and one.kind in NUMERIC}
     for exchange in exchanges(contract):
-        yield from heads.of_statuses(exchange)
-        yield from heads.of_headers(exchange)
-        yield from heads.of_bodies(exchange, numbers=exchange.name in numeric)
+        yield from responses.of_statuses(exchange)
+        yield from responses.of_headers(exchange)
+        yield from responses.of_bodies(exchange, numbers=exchange.name in numeric)
         for what, make in _WHOLE.items():
             if what == "cut" and not exchange.formats:
                 continue
@@ -87,7 +113,7 @@ def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
                 yield _whole(exchange, what, mode, when, make)
 
 
-def _whole(exchange: Exchange, what: str, mode: str, when: str, make: heads.Whole) -> GeneratedMutant:
+def _whole(exchange: Exchange, what: str, mode: str, when: str, make: responses.Whole) -> GeneratedMutant:
     name = f"{what}@{mode}" if mode else what
     return GeneratedMutant(
         f"{name}:{exchange.name}:answer",
@@ -97,34 +123,6 @@ def _whole(exchange: Exchange, what: str, mode: str, when: str, make: heads.Whol
         classes_of_answers(exchange),
         make(exchange, mode),
     )
-
-
-_UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
-#: What norms leave open, whatever the contract.
-BY_NORM = (
-    OpenPlace(
-        r"body-bom:[^:]+:body:xml",
-        "A document of XML may begin with a byte order mark (XML 1.0 4.3.3), and every receiver has to take it "
-        "(BP R4001); what forbids one is RFC 8259 8.1, of JSON.",
-    ),
-    OpenPlace(
-        r"body-bom:[^:]+:body:text",
-        "A stream of YAML may begin with a byte order mark, which is no part of its content (YAML 1.2.2 5.2); what "
-        "forbids one is RFC 8259 8.1, of JSON.",
-    ),
-    OpenPlace(
-        r"header-(drop|change):[^:]+:Vary",
-        "Vary tells caches which clients a response is fit for: a response that may be cached needs it "
-        "(RFC 9110 12.5.5), and the response to an unsafe method may not (9.2.3).",
-        side="rest",
-        methods=_UNSAFE,
-    ),
-    OpenPlace(
-        r"header-more:[^:]+:Allow",
-        "A method that Allow names in every response is the vendor's own (RFC 9110 10.2.1). The suite does not send "
-        "it, as it may do anything.",
-    ),
-)
 
 
 def open_places(contract: Contract) -> tuple[OpenPlace, ...]:

@@ -1,24 +1,26 @@
-"""List the mutants of a device of which only its description is known: answers, requests and HTTP itself."""
+"""List the mutants of a device of which only its description is known: members, answers, requests and HTTP itself."""
 
 import json
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 from conformance.api.rest.samples import sample
 from conformance.contract.pack import Contract
+from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import Operation, is_json, operations_of
+from conformance.documents.representation import flat
 from proof.mutation.messages import Change, Request, Response
+from proof.selftest.generated import described_collections, described_http, described_promises, described_requests
 from proof.selftest.generated import described_failures as failures
-from proof.selftest.generated import described_http, described_lists, described_promises, described_requests
 from proof.selftest.generated.breaches import breaks, undeclared_status, undeclared_type
-from proof.selftest.generated.described_inputs import FIELD_OPERATORS
-from proof.selftest.generated.heads import BODIES, crossed
 from proof.selftest.generated.mutant import MODES, Alter, GeneratedMutant, Tally, answers, in_mode
+from proof.selftest.generated.operators import OPERATORS
 from proof.selftest.generated.places import Exchange, Place, fields_of, rest_exchange
-from proof.selftest.generated.slots import edit_message
+from proof.selftest.generated.responses import BODIES, crossed
+from proof.selftest.generated.slots import Edit, Slot, edit_message, same
 
 _STATUSES = (200, 202, 204, 299, 400, 404, 409, 418, 422, 500, 502)
 _TYPES = ("text/html", "text/plain", "application/xml", "application/octet-stream")
@@ -56,8 +58,8 @@ def _of_operation(operation: Operation, exchange: Exchange) -> Iterator[Generate
     yield from _of_types(operation, description)
     yield from _of_bodies(operation, description)
     yield from _whole(operation, replace(exchange, classes=("robustness",)))
-    yield from described_lists.of_lists(operation, description)
-    yield from described_lists.of_things(operation, description)
+    yield from described_collections.of_lists(operation, description)
+    yield from described_collections.of_things(operation, description)
     yield from described_promises.of_promises(operation, description)
     yield from described_requests.lenient(operation, description)
     yield from described_requests.strict(operation, description)
@@ -206,3 +208,92 @@ def _halved(_: Any, response: Response) -> Response | None:
     altered = response.copy()
     altered.body = altered.body[: len(altered.body) // 2]
     return altered if response.status in _SUCCESS else None
+
+
+@dataclass(frozen=True)
+class FieldOperator:
+    """One way to alter a member.
+
+    Attributes:
+        name: first part of the names of its mutants.
+        says: the effect, as a clause about the member.
+        make: makes the edit of a place with a schema.
+    """
+
+    name: str
+    says: str
+    make: Callable[[Place, Schema], Edit]
+
+
+def _put(value_of: Callable[[Schema, Any], Any]) -> Callable[[Place, Schema], Edit]:
+    """Return an edit that puts in a value made from the schema and the present value, or None to alter nothing."""
+
+    def make(_place: Place, schema: Schema) -> Edit:
+        flatter = flat(schema)
+
+        def edit(slots: list[Slot]) -> bool:
+            altered = False
+            for slot in slots:
+                before = slot.value()
+                after = value_of(flatter, before)
+                if after is not None and not same(before, after):
+                    slot.put(after)
+                    altered = True
+            return altered
+
+        return edit
+
+    return make
+
+
+def _above(schema: Schema, _value: Any) -> Any:
+    bound = schema.get("maximum", schema.get("exclusiveMaximum"))
+    return bound + 1 if isinstance(bound, int | float) and not isinstance(bound, bool) else None
+
+
+def _below(schema: Schema, _value: Any) -> Any:
+    bound = schema.get("minimum", schema.get("exclusiveMinimum"))
+    return bound - 1 if isinstance(bound, int | float) and not isinstance(bound, bool) else None
+
+
+def _long(schema: Schema, value: Any) -> Any:
+    if isinstance(schema.get("maxLength"), int) and schema["maxLength"] <= 1 << 16:
+        return "a" * (schema["maxLength"] + 1)
+    if isinstance(schema.get("maxItems"), int) and isinstance(value, list) and value:
+        return [value[0]] * (schema["maxItems"] + 1)
+    return None
+
+
+def _empty(schema: Schema, value: Any) -> Any:
+    if isinstance(value, str) and (schema.get("minLength") or "pattern" in schema or "format" in schema):
+        return ""
+    return [] if isinstance(value, list) and schema.get("minItems") else None
+
+
+def _item(_schema: Schema, value: Any) -> Any:
+    return [*value[:-1], {"roaas": "x"}] if isinstance(value, list) and value else None
+
+
+def _usual(name: str) -> FieldOperator:
+    found = next(one for one in OPERATORS if one.name == name and "json" in one.media)
+    return FieldOperator(name, found.says, lambda place, _schema: found.make(place))
+
+
+FIELD_OPERATORS = (
+    *(_usual(name) for name in ("drop", "null", "retype", "rename", "comma")),
+    FieldOperator(
+        "enum", "is none of the declared values", _put(lambda schema, _: "roaas" if "enum" in schema else None)
+    ),
+    FieldOperator(
+        "format",
+        "has not the declared format",
+        _put(lambda schema, _: "roaas 17" if {"format", "pattern"} & schema.keys() else None),
+    ),
+    FieldOperator("above", "is above its maximum", _put(_above)),
+    FieldOperator("below", "is below its minimum", _put(_below)),
+    FieldOperator("long", "is longer than its maximum", _put(_long)),
+    FieldOperator("empty", "is empty", _put(_empty)),
+    FieldOperator("fraction", "is no whole number", _put(lambda _, value: value + 0.5 if type(value) is int else None)),
+    FieldOperator("wrap", "is in a list", _put(lambda _, value: [value])),
+    FieldOperator("item", "has an item of another type", _put(_item)),
+)

@@ -13,6 +13,12 @@ from proof.selftest.generated.slots import edit_message
 from proof.selftest.generated.whens import ERROR, RARE
 
 Alter = Callable[[Request, Response], Response | None]
+# What follows a mode's name, of what is altered.
+MODES = {
+    "rarely": f"one time in {RARE}",
+    "together": "while another request is under way",
+    "after-error": "after an answer with 4xx or 5xx",
+}
 
 
 class Tally:
@@ -89,14 +95,6 @@ class Mode:
             self._under_way -= 1
             if response is not None:
                 self._error = response.status >= ERROR
-
-
-# What follows a mode's name, of what is altered.
-MODES = {
-    "rarely": f"one time in {RARE}",
-    "together": "while another request is under way",
-    "after-error": "after an answer with 4xx or 5xx",
-}
 
 
 def in_mode(mode_name: str, alter: Alter) -> Callable[[Tally], Change]:

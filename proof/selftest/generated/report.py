@@ -1,6 +1,6 @@
 """Report the results of generated mutants: in selftest.json, on the terminal, and in docs/coverage.md.
 
-The page of mutants by rule before a described device: this suite beside other tools, in one table.
+Of mutants before a described device, a page compares this suite with other tools.
 """
 
 from collections import Counter
@@ -16,6 +16,9 @@ from proof.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 # The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
 _WRITTEN = {KILLED: "caught"}
 _KEYS = ("class", "clause", "operation", "when", "operator", "effort")
+_COUNTED = frozenset({KILLED, SURVIVED})
+# False alarms of a tool that the table names.
+_ALARMS = 5
 
 
 def _figures(rate: Rate) -> dict[str, Any]:
@@ -142,11 +145,6 @@ def page_part(contract: Contract) -> list[str]:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-_COUNTED = frozenset({KILLED, SURVIVED})
-# False alarms of a tool that the table names.
-_ALARMS = 5
 
 
 def tools(

@@ -4,10 +4,9 @@ A response that is available at once is written before the parser returns. Other
 further requests from the client wait in a queue. When the queue is full, or while the client does not read its
 responses, nothing more is read from the connection.
 
-The turns of HTTP connections: a client with many requests at once does not keep the robot from others.
-
-The parser does not stop between the requests of one segment, and a segment may hold more than a thousand. So only the
-first request is parsed at once. The rest waits in the port's queue, and reading pauses meanwhile.
+Connections take turns, so that a client with many requests at once does not keep the robot from others. The parser does
+not stop between the requests of one segment, and a segment may hold more than a thousand. So only the first request is
+parsed at once. The rest waits in the port's queue, and reading pauses meanwhile.
 """
 
 import asyncio
@@ -33,6 +32,9 @@ FIELD_BYTES: Final = 200  # bytes of memory per field besides its text: two Pyth
 _LINGER: Final = 2.0  # seconds for which data from a refused client is read and dropped
 _PIPELINED: Final = 16  # waiting requests at which reading from the connection pauses
 _NO_LINGER: Final = struct.pack("ii", 1, 0)  # SO_LINGER: closing resets the connection
+DRAINED: Final = 16 * BODY_LIMIT  # bytes that are dropped after a refusal, before the connection is closed
+_HEAD_END: Final = b"\r\n\r\n"
+_AT_ONCE: Final = 4  # postponed requests of one client that are parsed in its turn
 
 
 class AnsweringConnection(asyncio.Protocol, ABC):
@@ -277,11 +279,6 @@ def _weight(request: Request) -> int:
     fields = request.headers.items()
     head = sum(FIELD_BYTES + len(name) + len(value) for name, value in fields)
     return len(request.path) + len(request.query) + head + len(request.body)
-
-
-DRAINED: Final = 16 * BODY_LIMIT  # bytes that are dropped after a refusal, before the connection is closed
-_HEAD_END: Final = b"\r\n\r\n"
-_AT_ONCE: Final = 4  # postponed requests of one client that are parsed in its turn
 
 
 class PacedConnection(AnsweringConnection):

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from functools import partial
 from typing import Any, Final
 
-from reference_robot.webservices.http.authorization import SAFE, Admission, Scope
+from reference_robot.webservices.http.access import SAFE, Admission, Scope
 from reference_robot.webservices.http.messages import Request, Response, content, problem_format
 from reference_robot.webservices.representation.problems import Problem
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 from urllib.parse import urlsplit
 
-from reference_robot.webservices.http.authorization import Admission, Authorization
+from reference_robot.webservices.http.access import Admission, Authorization
 from reference_robot.webservices.http.hosts import AllowedHosts, TrustedProxies, is_host_pattern, is_loopback, own_names
 
 REST: Final = "rest"

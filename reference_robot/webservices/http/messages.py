@@ -1,7 +1,4 @@
-"""HTTP requests as resources and services get them, and HTTP responses.
-
-Content negotiation: the response format that a client's Accept field selects (RFC 9110 12.5.1).
-"""
+"""HTTP requests as resources and services get them, and HTTP responses, in the format that Accept selects."""
 
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,6 +1,6 @@
 """Delivery requests from REST and SOAP: publishing them to ROS, and listing them with their states.
 
-The mission reports of the delivery application, and the mission of each accepted request.
+The state of a request is that of its mission, which the delivery application reports.
 """
 
 import math
@@ -17,7 +17,12 @@ from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.problems import Problem, not_yet, shown
 
-_REMEMBERED_OF_MISSIONS: Final = 300
+_MOST_MISSIONS: Final = 300
+_CODES: Final = frozenset({COURIER, COFFEE})
+_REMEMBERED: Final = 100  # the contract requires the last 50
+_REPORTS: Final = 50  # mission reports that may wait to be read
+_NANOSECONDS: Final = 10**9
+Sender = Literal["rest", "soap"]
 
 
 class _Time(msgspec.Struct):
@@ -66,7 +71,7 @@ class MissionTable:
             return
         for key, mission in reversed(found):  # a report lists the newest first
             self._missions[key] = mission
-        while len(self._missions) > _REMEMBERED_OF_MISSIONS:
+        while len(self._missions) > _MOST_MISSIONS:
             del self._missions[next(iter(self._missions))]
 
     def finder(self) -> Callable[[DeliveryRequest, int], Mission]:
@@ -96,12 +101,6 @@ def _mission(entry: _ReportedMission) -> tuple[tuple[int, int], Mission]:
     return (nanoseconds, entry.number), mission
 
 
-_CODES: Final = frozenset({COURIER, COFFEE})
-_REMEMBERED: Final = 100  # the contract requires the last 50
-_REPORTS: Final = 50  # mission reports that may wait to be read
-_NANOSECONDS: Final = 10**9
-
-
 class UnusableFieldError(ValueError):
     """An error for a field with an invalid value; ``rule`` says what the value must be."""
 
@@ -113,9 +112,6 @@ class UnusableFieldError(ValueError):
     def refusal(self, name: str, sent: str) -> Problem:
         """Return the Problem 422 with the interface's own name of the field and the text that the client sent."""
         return Problem(422, f"{name} {self.rule}, not {shown(sent)}")
-
-
-Sender = Literal["rest", "soap"]
 
 
 class Deliveries:

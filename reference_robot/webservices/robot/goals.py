@@ -39,6 +39,17 @@ GOAL: Final = Record(
 _REMEMBERED: Final = 100
 _REASON_COMES_WITHIN: Final = 0.3  # seconds to wait for the reason of a refusal
 _REASON_STEP: Final = 0.02
+STATUS_TEXTS: Final = {
+    GoalStatus.STATUS_ACCEPTED: "accepted",
+    GoalStatus.STATUS_EXECUTING: "executing",
+    GoalStatus.STATUS_CANCELING: "canceling",
+}
+ENDED_TEXTS: Final = {
+    GoalStatus.STATUS_SUCCEEDED: "succeeded",
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "aborted",
+}
+_ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
 @dataclass(frozen=True)
@@ -279,19 +290,6 @@ class Goals:
 def _destination(goal: dict[str, Any]) -> tuple[str, Any]:
     target = goal["goal"]["target_pose"]
     return target["header"]["frame_id"], target["pose"]
-
-
-STATUS_TEXTS: Final = {
-    GoalStatus.STATUS_ACCEPTED: "accepted",
-    GoalStatus.STATUS_EXECUTING: "executing",
-    GoalStatus.STATUS_CANCELING: "canceling",
-}
-ENDED_TEXTS: Final = {
-    GoalStatus.STATUS_SUCCEEDED: "succeeded",
-    GoalStatus.STATUS_CANCELED: "canceled",
-    GoalStatus.STATUS_ABORTED: "aborted",
-}
-_ORIGIN: Final = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
 def goal_from_report(report: str) -> dict[str, Any] | None:

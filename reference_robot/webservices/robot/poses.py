@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 _UNIT_TOLERANCE: Final = 1e-3  # contract, fine print
+_Vector: TypeAlias = tuple[float, float, float]
 
 
 def planar_pose(x: float, y: float, yaw: float) -> Pose:
@@ -39,9 +40,6 @@ def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
     orientation = stamped["pose"]["orientation"]
     if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
         raise refused(f"{where}.pose.orientation", orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
-
-
-_Vector: TypeAlias = tuple[float, float, float]
 
 
 def moved(transform: Transform, pose: Pose) -> Pose:

@@ -7,7 +7,7 @@ from lxml import etree
 
 from conformance.papers_robot.delivery import COFFEE
 from reference_robot.deliveries import DeliveryRequest
-from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.access import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
 from reference_robot.webservices.soap.envelope import client_fault

@@ -8,7 +8,7 @@ from typing import Any, Final
 from lxml import etree
 
 from conformance.papers_robot.statement import CONTRACT_DIR
-from reference_robot.webservices.http.authorization import Admission, Scope
+from reference_robot.webservices.http.access import Admission, Scope
 from reference_robot.webservices.http.interface import Interface, awaited
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.problems import Problem, shown
@@ -22,6 +22,12 @@ Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: 
 _LOGGER: Final = logging.getLogger(__name__)
 _MEDIA_TYPE: Final = "text/xml"
 _SERVERS_FAULT: Final = 500
+_WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
+_XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
+_ERRORS_SHOWN: Final = 3
+_ALLOW: Final = (b"allow", b"POST, OPTIONS")
+_ALLOW_DESCRIPTION: Final = (b"allow", b"GET, HEAD, POST, OPTIONS")
+_READ: Final = frozenset({"GET", "HEAD"})
 
 
 class SoapService:
@@ -92,11 +98,6 @@ def _faulted(root: etree._Element, error: Exception) -> Response:
     return content(500, _MEDIA_TYPE, error.envelope())
 
 
-_WSDL_SOAP: Final = "{http://schemas.xmlsoap.org/wsdl/soap/}"
-_XSD: Final = "{http://www.w3.org/2001/XMLSchema}"
-_ERRORS_SHOWN: Final = 3
-
-
 class ServiceDescription:
     """The WSDL and XSD of one service of the contract, ``publishers`` or ``subscribers``, at a path."""
 
@@ -123,11 +124,6 @@ class ServiceDescription:
             log: Any = self._schema.error_log
             errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
             raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")
-
-
-_ALLOW: Final = (b"allow", b"POST, OPTIONS")
-_ALLOW_DESCRIPTION: Final = (b"allow", b"GET, HEAD, POST, OPTIONS")
-_READ: Final = frozenset({"GET", "HEAD"})
 
 
 class SoapInterface(Interface):

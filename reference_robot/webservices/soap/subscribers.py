@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.http.authorization import Scope
+from reference_robot.webservices.http.access import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.problems import shown

@@ -1,6 +1,7 @@
-"""Draw ratios with their intervals: of SOAP to REST, of a new run to an old one, or of one robot to another.
+"""Draw what compares: ratios with their intervals, and the parts of a request's time side by side.
 
-Draw the time that requests spend in each span (build, wire, server, parse), stacked, for each client.
+A ratio is of SOAP to REST, of a new run to an old one, or of one robot to another. The parts of a request's time
+(build, wire, server, parse) are stacked, for each client.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +23,8 @@ from reports.latency.figures.canvas import (
     milliseconds,
     picture,
 )
+
+SPANS = ("build", "wire", "server", "parse")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +96,6 @@ def _ticks(low: float, high: float) -> list[float]:
     )
     scale = next((scale for scale in scales if scale[0] * 0.8 <= low and high <= scale[-1] * 1.2), scales[-1])
     return [tick for tick in scale if low <= tick <= high]
-
-
-SPANS = ("build", "wire", "server", "parse")
 
 
 @picture(

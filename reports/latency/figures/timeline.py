@@ -1,7 +1,4 @@
-"""Draw latency over the run, with the robot's stalls marked.
-
-Draw latency over the run: a heat map of all requests, and the median of each block.
-"""
+"""Draw latency over the run: a heat map of all requests, the median of each block, and the robot's stalls."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +15,7 @@ _MOST_POINTS = 240
 _STALL_FACTOR = 20
 _STALL_FLOOR_MS = 20.0
 _STALL_COLOUR = "#F0E442"
+_MAPS = {"rest": "Blues", "soap": "Oranges", "rosbridge": "Greens"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,9 +195,6 @@ def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
         log_time_axis(panel.axes, "service time, ms")
         panel.axes.set_xlabel("seconds since the start")
         yield panel
-
-
-_MAPS = {"rest": "Blues", "soap": "Oranges", "rosbridge": "Greens"}
 
 
 @picture("blocks", "The median of each short block of one interface. The confidence intervals come from their scatter.")

@@ -14,7 +14,7 @@ from web_robot import eventually, problem, running_robot, usage_error
 from conformance.contract.pack import Contract
 from proof.selftest.certifying import Job, run_job
 from proof.table1.selftest import REFERENCE
-from reference_robot.webservices.http.authorization import Admission, Authorization
+from reference_robot.webservices.http.access import Admission, Authorization
 from reference_robot.webservices.http.hosts import Address, AllowedHosts, TrustedProxies, is_loopback, take_forwarded
 from reference_robot.webservices.http.messages import Request
 from reference_robot.webservices.representation.problems import Problem

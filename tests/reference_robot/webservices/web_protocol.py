@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 import uvloop
 
 from reference_robot.webservices.endpoint import bound
-from reference_robot.webservices.http.authorization import Admission, Authorization
+from reference_robot.webservices.http.access import Admission, Authorization
 from reference_robot.webservices.http.hosts import AllowedHosts
 from reference_robot.webservices.http.interface import Interface
 from reference_robot.webservices.http.messages import content

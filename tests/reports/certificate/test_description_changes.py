@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from reports.certificate.difference_page import changes_pages, changes_text, description_changes
-from reports.cli.pages import diff
+from reports.cli.results import diff
 
 GONE = (True, "GET /a", "status 404 is gone")
 UNKNOWN = (None, "GET /a", "not compared: xml")

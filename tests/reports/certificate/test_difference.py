@@ -10,7 +10,7 @@ from vendors import requirement
 
 from reports.certificate.difference import Kind, difference
 from reports.certificate.difference_page import SHOWN, difference_html, difference_markdown, difference_text
-from reports.cli.pages import diff
+from reports.cli.results import diff
 
 ACCEPTED = {"expected_failure": {"reason": "ticket 7", "expires": "2027-01-01"}}
 

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from lxml import html
 
 from reports.certificate.runs import MOST, history_html
-from reports.cli.pages import report
+from reports.cli.results import report
 
 
 def text(element):

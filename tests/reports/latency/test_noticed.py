@@ -5,7 +5,7 @@ import copy
 import pytest
 from lxml import etree, html
 
-from reports.formats.junit import latency_junit
+from reports.formats.ci_systems import latency_junit
 from reports.latency.noticed import noticed
 from reports.latency.page import latency_html, latency_markdown
 

@@ -1,6 +1,6 @@
-"""REST as elaborate as the contract lets it be, and the robot's own descriptions of it.
+"""REST as elaborate as the contract lets it be: its resources, its unusual notation of values, its own descriptions.
 
-Write values in three formats, each in a valid but unusual notation.
+Values are written in three formats, each in a valid but unusual notation.
 """
 
 import json
@@ -19,6 +19,17 @@ from proof.table1.independent_robots.plain.server import Answer
 from proof.table1.independent_robots.plain.writing import choose
 
 _ROOTS = {"Sensors": "sensor_list", "NavigationServices": "services", "Deliveries": "history"}
+SENSORS = [
+    {"name": "front laser", "topic": "/front/scan", "type": "sensor_msgs/msg/LaserScan"},
+    {"name": "odometry", "topic": "/odom", "type": "nav_msgs/msg/Odometry"},
+    {"name": "battery", "topic": "/battery", "type": "sensor_msgs/msg/BatteryState"},
+]
+SERVICES = [
+    {"name": "compute_path_to_pose", "type": "nav2_msgs/action/ComputePathToPose"},
+    {"name": "navigate_to_pose", "type": "nav2_msgs/action/NavigateToPose"},
+]
+_ACTIVE_S = 0.5
+_DESCRIPTIONS = {"/openapi.json", "/application.wadl"}
 
 
 def as_json(value: Any) -> bytes:
@@ -98,19 +109,6 @@ def problem(status: int, detail: str, *, xml: bool = False) -> Answer:
     else:
         body, media_type = as_json(value), "application/problem+json; charset=utf-8"
     return Answer(status, body, media_type, {"vary": "accept"})
-
-
-SENSORS = [
-    {"name": "front laser", "topic": "/front/scan", "type": "sensor_msgs/msg/LaserScan"},
-    {"name": "odometry", "topic": "/odom", "type": "nav_msgs/msg/Odometry"},
-    {"name": "battery", "topic": "/battery", "type": "sensor_msgs/msg/BatteryState"},
-]
-SERVICES = [
-    {"name": "compute_path_to_pose", "type": "nav2_msgs/action/ComputePathToPose"},
-    {"name": "navigate_to_pose", "type": "nav2_msgs/action/NavigateToPose"},
-]
-_ACTIVE_S = 0.5
-_DESCRIPTIONS = {"/openapi.json", "/application.wadl"}
 
 
 class Rest(rest.Rest):

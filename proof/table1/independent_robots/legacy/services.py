@@ -1,7 +1,4 @@
-"""The delivery over Jersey's REST and over JAX-WS RI's SOAP, with their leniency.
-
-WSGI on wsgiref, a thread for each request.
-"""
+"""The delivery over Jersey's REST and over JAX-WS RI's SOAP, with their leniency: WSGI, a thread for each request."""
 
 import re
 import threading

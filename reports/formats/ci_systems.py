@@ -1,30 +1,21 @@
-"""Write junit.xml: a conformance result in the format that most CI systems read.
+"""Write what CI systems show of tests: JUnit XML of a certification and of a load test, and CTRF.
 
-It has a test suite for each conformance class and a test case for each requirement. It is valid by the junit-10.xsd of
-Jenkins' xUnit plugin, without the extensions that other readers refuse.
+junit.xml has a test suite for each conformance class and a test case for each requirement. It is valid by the
+junit-10.xsd of Jenkins' xUnit plugin, without the extensions that other readers refuse. CTRF, the Common Test Report
+Format, is one JSON format for many tools. Readers show its `other` without a colour, and a case without a verdict must
+not look green.
 
-| outcome | becomes |
-|---|---|
-| passed | a passed test case |
-| accepted | skipped: the baseline accepts the failure until the date in the message |
-| warning | a passed test case with the warning in its output: a SHOULD breaks no build |
-| failed | a failure |
-| error | an error |
-| skipped | skipped, with the reason |
+| outcome | in junit.xml | in CTRF |
+|---|---|---|
+| passed | a passed test case | `passed` |
+| accepted | skipped: the baseline accepts the failure until the date in the message | `other` |
+| warning | a passed test case with the warning in its output: a SHOULD breaks no build | `passed`, with its message |
+| failed | a failure | `failed` |
+| error | an error | `failed` |
+| skipped | skipped, with the reason | `skipped` |
 
-Write CTRF, the Common Test Report Format: one JSON format for the many tools that show test results.
-
-| outcome | becomes |
-|---|---|
-| passed, warning | `passed`; a warning has its message |
-| failed, error | `failed`: readers show `other` without a colour, and a case without a verdict must not look green |
-| accepted | `other` |
-| skipped | `skipped` |
-
-Write latency-junit.xml: a latency result in the format that most CI systems read.
-
-Its test cases are the run itself (whether its figures are valid), each limit of a service level, and the
-comparison with another robot. What is not known is an error, because it is neither a success nor a failure.
+The test cases of latency-junit.xml are the run itself (whether its figures are valid), each limit of a service level,
+and the comparison with another robot. What is not known is an error, because it is neither a success nor a failure.
 """
 
 import datetime as dt
@@ -39,6 +30,18 @@ from reports.formats.cases import MESSAGE, Case, Outcome, cases, places_of
 from reports.pages.untrusted import excerpt, visible
 
 _ELEMENTS = {Outcome.FAILED: "failure", Outcome.ERROR: "error", Outcome.ACCEPTED: "skipped", Outcome.SKIPPED: "skipped"}
+_CTRF_VERSION = "0.0.0"
+_CTRF_STATUSES = {
+    Outcome.PASSED: "passed",
+    Outcome.WARNING: "passed",
+    Outcome.FAILED: "failed",
+    Outcome.ERROR: "failed",
+    Outcome.ACCEPTED: "other",
+    Outcome.SKIPPED: "skipped",
+}
+_LATENCY_GOOD = {"kept", "not slower", "valid"}
+_LATENCY_FAILED = {"broken", "slower"}
+_LATENCY_MESSAGE = 1000
 
 
 def junit(result: Mapping[str, Any]) -> str:
@@ -108,17 +111,6 @@ def _count(found: Sequence[Case], element: str) -> str:
     return str(sum(_ELEMENTS.get(case.outcome) == element for case in found))
 
 
-_SPEC = "0.0.0"
-_STATUSES = {
-    Outcome.PASSED: "passed",
-    Outcome.WARNING: "passed",
-    Outcome.FAILED: "failed",
-    Outcome.ERROR: "failed",
-    Outcome.ACCEPTED: "other",
-    Outcome.SKIPPED: "skipped",
-}
-
-
 def ctrf(result: Mapping[str, Any]) -> str:
     """Return a valid `roaas-result/1` document as a CTRF report (JSON text)."""
     tests = [_test(result, case) for case in cases(result)]
@@ -127,7 +119,7 @@ def ctrf(result: Mapping[str, Any]) -> str:
     counts = {name: statuses.count(name) for name in ("passed", "failed", "skipped", "pending", "other")}
     report = {
         "reportFormat": "CTRF",
-        "specVersion": _SPEC,
+        "specVersion": _CTRF_VERSION,
         "generatedBy": "roaas",
         "results": {
             "tool": {"name": "RoAAS", "version": result["suite"]["version"]},
@@ -149,7 +141,7 @@ def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
     place = places_of(result, case)[0]
     return {
         "name": case.name,
-        "status": _STATUSES[case.outcome],
+        "status": _CTRF_STATUSES[case.outcome],
         "rawStatus": case.outcome,
         # The time of a single requirement is not measured.
         "duration": 0,
@@ -172,11 +164,6 @@ def _milliseconds(time: str) -> int:
     return round(dt.datetime.fromisoformat(time).timestamp() * 1000)
 
 
-_GOOD = {"kept", "not slower", "valid"}
-_FAILED = {"broken", "slower"}
-_MESSAGE = 1000
-
-
 @dataclass(frozen=True, slots=True)
 class _Case:
     """One test case: its group, its name, its outcome in a word, and the reason."""
@@ -189,9 +176,9 @@ class _Case:
     @property
     def element(self) -> str | None:
         """Return the element of a case that did not pass, or None."""
-        if self.outcome in _GOOD:
+        if self.outcome in _LATENCY_GOOD:
             return None
-        return "failure" if self.outcome in _FAILED else "error"
+        return "failure" if self.outcome in _LATENCY_FAILED else "error"
 
 
 def latency_junit(result: Mapping[str, Any]) -> str:
@@ -209,7 +196,7 @@ def latency_junit(result: Mapping[str, Any]) -> str:
         element = etree.SubElement(
             suite, "testcase", classname=f"roaas.{case.group}", name=excerpt(case.name, 300), time="0"
         )
-        message = excerpt(case.reason, _MESSAGE)
+        message = excerpt(case.reason, _LATENCY_MESSAGE)
         if case.element:
             etree.SubElement(element, case.element, message=message, type=case.outcome.replace(" ", "-"))
         else:

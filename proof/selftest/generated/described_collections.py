@@ -1,6 +1,7 @@
-"""Mutants of the lists of a described device: parameters without effect, and totals that go wrong in time.
+"""Mutants of the lists of a described device, and of the items in them.
 
-Mutants of items of a described device: a request to one item reaches another, or a refused one is performed.
+A parameter of a list has no effect, or a total goes wrong in time. A request to one item reaches another, or a refused
+one is performed.
 """
 
 import json
@@ -24,6 +25,9 @@ from proof.selftest.generated.places import Exchange
 _RIGHT = 10
 _DEPTH = 2
 _Differs = Callable[[Page, Page], bool]
+_SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
+# What a mutant does after a request to an item: request, response, another item, and the way to the device.
+_Act = Callable[[Request, Response, str, Forward], Response | None]
 
 
 def of_lists(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
@@ -127,11 +131,6 @@ def _added(response: Response, page: Page) -> bool:
 def _page_in(response: Response) -> Page | None:
     """Return the list in a message, as the checkers read it."""
     return page_of(transport.Response(response.status, tuple(response.fields), response.body, 0.0))
-
-
-_SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
-# What a mutant does after a request to an item: request, response, another item, and the way to the device.
-_Act = Callable[[Request, Response, str, Forward], Response | None]
 
 
 def of_things(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:

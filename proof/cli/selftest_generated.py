@@ -1,7 +1,4 @@
-"""``roaas selftest --api``: mutants by rule before any running device with a description.
-
-``roaas selftest --generated``: judge a sample of generated mutants instead of the hand-written ones.
-"""
+"""Judge generated mutants: a pack's (``roaas selftest --generated``), or those of any running device (``--api``)."""
 
 from __future__ import annotations
 

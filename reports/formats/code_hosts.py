@@ -1,15 +1,12 @@
-"""Write SARIF 2.1.0 (OASIS, errata 01), which code hosts show beside a repository's files.
+"""Write what code hosts show beside a change: SARIF, GitLab's code quality report, and GitHub's annotations.
 
-The log has a result for each case that needs attention. Passed and skipped cases are left out, because some hosts show
-every result as a problem, whatever its kind. A case without a verdict is of kind `open`; the run is then another result
-of level `error`, so that a host that counts errors does not show an inconclusive run as green.
+SARIF 2.1.0 (OASIS, errata 01) has a result for each case that needs attention. Passed and skipped cases are left out,
+because some hosts show every result as a problem, whatever its kind. A case without a verdict is of kind `open`; the
+run is then another result of level `error`, so that a host that counts errors does not show an inconclusive run as
+green. Failures that the baseline accepts are warnings, because hosts hide suppressed results.
 
-Failures that the baseline accepts are warnings and not suppressed results, because hosts hide suppressed results.
-
-Write what code hosts show beside a change: GitLab's code quality report, and GitHub's annotations.
-
-A fingerprint depends only on the requirement, so that the same failure is the same entry in every run, whatever values
-the robot returned. A requirement without a verdict is an entry as well.
+GitLab's fingerprint depends only on the requirement, so that the same failure is the same entry in every run, whatever
+values the robot returned. A requirement without a verdict is an entry as well.
 """
 
 import json
@@ -25,6 +22,21 @@ from reports.pages.untrusted import excerpt, on_a_line, visible
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _DETAIL = 6000
 _LEVELS = {Outcome.FAILED: "error", Outcome.ERROR: "none", Outcome.ACCEPTED: "warning", Outcome.WARNING: "warning"}
+# Beginning of a source as the ledger writes it, and the page of the clause.
+_PAGES = (
+    (r"RFC (\d+) (\d+(?:\.\d+)*)", "https://www.rfc-editor.org/rfc/rfc{0}#section-{1}"),
+    (r"RFC (\d+) Appendix ([A-Z])", "https://www.rfc-editor.org/rfc/rfc{0}#appendix-{1}"),
+    (r"RFC (\d+)", "https://www.rfc-editor.org/rfc/rfc{0}"),
+    (r"CWE-(\d+)", "https://cwe.mitre.org/data/definitions/{0}.html"),
+    (r"BP (R\d+)", "https://www.ws-i.org/Profiles/BasicProfile-1.1.html#{0}"),
+    (r"SOAP 1\.1", "https://www.w3.org/TR/2000/NOTE-SOAP-20000508/"),
+    (r"WSDL 1\.1", "https://www.w3.org/TR/2001/NOTE-wsdl-20010315"),
+    (r"XML Schema 1\.0 Part 2", "https://www.w3.org/TR/xmlschema-2/"),
+    (r"Namespaces in XML", "https://www.w3.org/TR/xml-names/"),
+    (r"XML 1\.0", "https://www.w3.org/TR/xml/"),
+)
+_SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEPTED: "minor", Outcome.WARNING: "minor"}
+MOST = 10  # GitHub shows ten errors and ten warnings of a step, and silently drops the rest
 
 
 def sarif(result: Mapping[str, Any]) -> str:
@@ -112,21 +124,6 @@ def _text(text: str) -> str:
     return line.replace("{", "{{").replace("}", "}}").replace("\\", "\\\\").replace("[", "\\[").replace("]", "\\]")
 
 
-# Beginning of a source as the ledger writes it, and the page of the clause.
-_PAGES = (
-    (r"RFC (\d+) (\d+(?:\.\d+)*)", "https://www.rfc-editor.org/rfc/rfc{0}#section-{1}"),
-    (r"RFC (\d+) Appendix ([A-Z])", "https://www.rfc-editor.org/rfc/rfc{0}#appendix-{1}"),
-    (r"RFC (\d+)", "https://www.rfc-editor.org/rfc/rfc{0}"),
-    (r"CWE-(\d+)", "https://cwe.mitre.org/data/definitions/{0}.html"),
-    (r"BP (R\d+)", "https://www.ws-i.org/Profiles/BasicProfile-1.1.html#{0}"),
-    (r"SOAP 1\.1", "https://www.w3.org/TR/2000/NOTE-SOAP-20000508/"),
-    (r"WSDL 1\.1", "https://www.w3.org/TR/2001/NOTE-wsdl-20010315"),
-    (r"XML Schema 1\.0 Part 2", "https://www.w3.org/TR/xmlschema-2/"),
-    (r"Namespaces in XML", "https://www.w3.org/TR/xml-names/"),
-    (r"XML 1\.0", "https://www.w3.org/TR/xml/"),
-)
-
-
 def page_of(source: str) -> str | None:
     """Return the https URL of the first source in a "; "-separated list that has a known web page, or None."""
     for part in source.split("; "):
@@ -134,9 +131,6 @@ def page_of(source: str) -> str | None:
             if found := re.match(pattern, part):
                 return page.format(*found.groups())
     return None
-
-
-_SEVERITIES = {Outcome.FAILED: "critical", Outcome.ERROR: "major", Outcome.ACCEPTED: "minor", Outcome.WARNING: "minor"}
 
 
 def gitlab(result: Mapping[str, Any]) -> str:
@@ -153,9 +147,6 @@ def _entry(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
         "severity": _SEVERITIES[case.outcome],
         "location": {"path": place.file, "lines": {"begin": place.line}},
     }
-
-
-MOST = 10  # GitHub shows ten errors and ten warnings of a step, and silently drops the rest
 
 
 def annotations(result: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
-"""Bearer tokens (RFC 6750): with a token file, REST and SOAP require a valid token with the necessary scope.
+"""Access control by the head of a request: host name, bearer token and scope, and origin of a web page.
 
-Access control by the head of a request: host name, bearer token and scope, and origin of a web page.
+With a token file, REST and SOAP require a valid token (RFC 6750) with the necessary scope.
 """
 
 import hmac
@@ -21,6 +21,8 @@ _INVALID: Final = ((b"www-authenticate", _REALM + b', error="invalid_token"'),)
 
 _TOKEN: Final = re.compile(r"[!-~]+")  # printable ASCII without spaces
 _COMMENT: Final = "# "  # cannot be the start of a token, because tokens contain no space
+SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
+_SHOWN: Final = 100  # characters of a client's text in error messages
 
 
 class Scope(StrEnum):
@@ -106,11 +108,6 @@ def read_tokens(path: Path) -> dict[str, frozenset[Scope]]:
     if not tokens:
         raise TokenFileError(f"the token file {path} holds no token")
     return tokens
-
-
-SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})  # RFC 9110 9.2.1
-
-_SHOWN: Final = 100  # characters of a client's text in error messages
 
 
 class Admission:

@@ -1,7 +1,7 @@
-"""What the robot does and has: velocity, which clients command; pose, from its odometry; and lists of the ROS graph.
+"""The resources below /robot/, as the paper's table lists them: what a request asks of the robot, and what is returned.
 
-/robot/navigation/: the active goal, which clients read, send and cancel; and a path to a pose in the query.
-The delivery application's resources: the paper's PUT request, and the list of accepted deliveries.
+Clients command the velocity, send and cancel a goal, ask for a path, and request deliveries. They read the pose and the
+lists of the ROS graph.
 """
 
 import math
@@ -33,6 +33,25 @@ from reference_robot.webservices.robot.goals import GOAL, Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
+
+_ODOMETRY_WRITERS: Final = {
+    media_type: partial(represented, root="Odometry", media_type=media_type) for media_type in FORMATS
+}
+_CREATED: Final = 201
+_NUMBER: Final = re.compile(NUMBER)
+_PLAN_NEEDS: Final = ("x", "y")
+_PLAN_NUMBERS: Final = (*_PLAN_NEEDS, "yaw", "tolerance", "start_x", "start_y", "start_yaw")
+# The path template's names of the values, in the order of the message's fields.
+_DELIVERY_NAMES: Final = ("code", *PATH_NAMES)
+_DELIVERIES: Final = "/robot/app/delivery/"
+_ANY_DELIVERY: Final = re.compile(
+    (f"{_DELIVERIES}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode()
+)
+_WELL_FORMED_DELIVERY: Final = re.compile(
+    (f"{_DELIVERIES}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in PATH_NAMES)).encode()
+)
+_CODE: Final = re.compile(rb"[+-]?[0-9]{1,40}")
+_COORDINATE: Final = re.compile(NUMBER.encode())
 
 
 class Velocity(Resource):
@@ -75,9 +94,6 @@ class LinearVelocity(Resource):
         return represented(linear, "Vector3", media_type)
 
 
-_WRITERS: Final = {media_type: partial(represented, root="Odometry", media_type=media_type) for media_type in FORMATS}
-
-
 class Pose(Resource):
     """The latest odometry as a complete nav_msgs/Odometry."""
 
@@ -88,7 +104,7 @@ class Pose(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the odometry; raise the Problem 503 before the first message."""
-        return self._odometry.written(_WRITERS[wanted_format(request)])
+        return self._odometry.written(_ODOMETRY_WRITERS[wanted_format(request)])
 
 
 class GraphList(Resource):
@@ -102,9 +118,6 @@ class GraphList(Resource):
     def get(self, request: Request) -> Response:
         """Return the list in the format that the client prefers."""
         return represented(self._entries(), self._root, wanted_format(request))
-
-
-_CREATED: Final = 201
 
 
 class Goal(Resource):
@@ -132,11 +145,6 @@ class Goal(Resource):
         """Cancel the active goal and return 204; raise the Problem 404 if there is none."""
         await self._goals.cancel()
         return NO_CONTENT
-
-
-_NUMBER: Final = re.compile(NUMBER)
-_REQUIRED: Final = ("x", "y")
-_NUMBERS: Final = (*_REQUIRED, "yaw", "tolerance", "start_x", "start_y", "start_yaw")
 
 
 class Plan(Resource):
@@ -167,8 +175,8 @@ def _query(raw: bytes) -> PlanQuery:
         if name in found:
             raise Problem(400, f"the parameter {shown(name)} occurs more than once")
         found[name] = value
-    given: dict[str, Any] = {name: _number(name, found[name]) for name in _NUMBERS if name in found}
-    for name in _REQUIRED:
+    given: dict[str, Any] = {name: _number(name, found[name]) for name in _PLAN_NUMBERS if name in found}
+    for name in _PLAN_NEEDS:
         if name not in given:
             raise Problem(422, f"missing parameter {name}")
     if "frame_id" in found:
@@ -183,21 +191,10 @@ def _number(name: str, text: str) -> float:
     return number
 
 
-# The path template's names of the values, in the order of the message's fields.
-_NAMES: Final = ("code", *PATH_NAMES)
-_PREFIX: Final = "/robot/app/delivery/"
-_ANY: Final = re.compile((f"{_PREFIX}([^/]*)" + "".join(f"/{name}/([^/]*)" for name in PATH_NAMES)).encode())
-_WELL_FORMED: Final = re.compile(
-    (f"{_PREFIX}([+-]?[0-9]{{1,40}})" + "".join(f"/{name}/({NUMBER})" for name in PATH_NAMES)).encode()
-)
-_CODE: Final = re.compile(rb"[+-]?[0-9]{1,40}")
-_NUMBER_OF_DELIVERY: Final = re.compile(NUMBER.encode())
-
-
 class Delivery(Resource):
     """The resource whose PUT publishes one DeliveryRequestMsg; its path contains the message's values."""
 
-    path = _PREFIX + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
+    path = _DELIVERIES + "{code}" + "".join(f"/{name}/{{{name}}}" for name in PATH_NAMES)
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
@@ -205,24 +202,24 @@ class Delivery(Resource):
     @staticmethod
     def owns(path: bytes) -> bool:
         """Return whether a raw URL path has the form of a delivery path, whatever its values."""
-        return _ANY.fullmatch(path) is not None
+        return _ANY_DELIVERY.fullmatch(path) is not None
 
     def put(self, request: Request) -> Response:
         """Publish a delivery and return 204; raise the Problem 422 for an unknown code or an invalid number."""
-        match = _WELL_FORMED.fullmatch(request.path)
+        match = _WELL_FORMED_DELIVERY.fullmatch(request.path)
         sent = _spelled_out(request.path) if match is None else match.groups()
         try:
             self._deliveries.accept(DeliveryRequest(int(sent[0]), *map(float, sent[1:])), "rest")
         except UnusableFieldError as error:
             place = DeliveryRequest._fields.index(error.field)
-            raise error.refusal(_NAMES[place], _text(sent[place])) from error
+            raise error.refusal(_DELIVERY_NAMES[place], _text(sent[place])) from error
         return NO_CONTENT
 
 
 class DeliveryList(Resource):
     """The resource that lists the latest accepted deliveries with their states: an extension of the contract."""
 
-    path = _PREFIX
+    path = _DELIVERIES
 
     def __init__(self, deliveries: Deliveries) -> None:
         self._deliveries = deliveries
@@ -234,14 +231,14 @@ class DeliveryList(Resource):
 
 def _spelled_out(path: bytes) -> tuple[bytes, ...]:
     """Return the percent-decoded values of a delivery path; raise the Problem 422 that names an invalid value."""
-    match = _ANY.fullmatch(path)
+    match = _ANY_DELIVERY.fullmatch(path)
     if match is None:
         raise Problem(404, "there is no resource at this delivery path")
     code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
         raise Problem(422, f"code must be an integer, not {shown(_text(code))}")
     for name, value in zip(PATH_NAMES, coordinates, strict=True):
-        if not _NUMBER_OF_DELIVERY.fullmatch(value):
+        if not _COORDINATE.fullmatch(value):
             raise Problem(422, f"{name} must be a number, not {shown(_text(value))}")
     return values
 

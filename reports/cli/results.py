@@ -1,4 +1,4 @@
-"""Define the commands `roaas report`, `roaas compare` and `roaas diff`."""
+"""Define the commands that read result files: `roaas report`, `roaas compare` and `roaas diff`."""
 
 import os
 from pathlib import Path

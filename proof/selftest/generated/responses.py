@@ -1,6 +1,7 @@
-"""Generated mutants of status codes and headers: other statuses, and dropped, doubled or changed header fields.
+"""Generated mutants that alter a whole response: its status, its header fields, or its body.
 
-Generated mutants that alter the body as a whole or replace the whole response, always or intermittently.
+A status becomes another; a field is dropped, doubled or changed; a body is malformed, or the response another's, always
+or now and then.
 """
 
 import re
@@ -17,8 +18,17 @@ from proof.selftest.generated.places import Exchange
 
 _KNOWN = frozenset(status.value for status in HTTPStatus)
 _SUCCESS = range(200, 300)
-
-# Statuses.
+# Makes a mutant of an operation's whole answers, in a mode.
+Whole = Callable[[Exchange, str], Callable[[Tally], Change]]
+_NUMBER = re.compile(rb"-?\d+\.\d+(?:[eE][+-]?\d+)?")
+BODIES: dict[str, Callable[[bytes], bytes]] = {
+    "body-truncate": lambda body: body[: len(body) // 2],
+    "body-empty": lambda _: b"",
+    "body-duplicate": lambda body: body + body,
+    "body-rest": lambda body: body + b"\nok",
+    "body-bom": lambda body: b"\xef\xbb\xbf" + body,
+    "body-latin": lambda body: body + "<!-- \u00e9 -->".encode("latin-1"),
+}
 
 
 def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
@@ -41,9 +51,6 @@ def of_statuses(exchange: Exchange) -> Iterator[GeneratedMutant]:
                 classes_of_answers(exchange),
                 in_mode("", answers(exchange, status_is(status), becomes(other))),
             )
-
-
-# Header fields.
 
 
 def _set(name: str, value: Callable[[str], str]) -> Callable[[Response], None]:
@@ -147,23 +154,10 @@ def _of_allow(exchange: Exchange) -> Iterator[GeneratedMutant]:
         )
 
 
-# Makes a mutant of an operation's whole answers, in a mode.
-Whole = Callable[[Exchange, str], Callable[[Tally], Change]]
-_NUMBER = re.compile(rb"-?\d+\.\d+(?:[eE][+-]?\d+)?")
-
-
 def _numbers(change: Callable[[float], str]) -> Callable[[bytes], bytes]:
     return lambda body: _NUMBER.sub(lambda found: change(float(found[0])).encode(), body)
 
 
-BODIES: dict[str, Callable[[bytes], bytes]] = {
-    "body-truncate": lambda body: body[: len(body) // 2],
-    "body-empty": lambda _: b"",
-    "body-duplicate": lambda body: body + body,
-    "body-rest": lambda body: body + b"\nok",
-    "body-bom": lambda body: b"\xef\xbb\xbf" + body,
-    "body-latin": lambda body: body + "<!-- \u00e9 -->".encode("latin-1"),
-}
 _NUMBERS: dict[str, Callable[[bytes], bytes]] = {
     "comma": _numbers(lambda number: repr(number).replace(".", ",")),
     "single": _numbers(lambda number: repr(single(number))),
