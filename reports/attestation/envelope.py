@@ -1,8 +1,8 @@
-"""Sign a statement into an envelope, and verify an envelope: DSSE v1 (Dead Simple Signing Envelope), one signature.
+"""Parse the envelope file of a signed certificate: DSSE v1 (Dead Simple Signing Envelope), one signature.
 
 This module checks what securesystemslib does not: the payload type is in-toto's, there is exactly one signature, the
 base64 is canonical, and the envelope has no other members. An envelope that includes a key, for example, is refused,
-because only the recipient decides whom to trust. securesystemslib verifies the signature.
+because only the recipient decides whom to trust. `verifying.unseal` verifies the signature.
 """
 
 import base64
@@ -13,9 +13,6 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
-from securesystemslib.dsse import Envelope
-from securesystemslib.exceptions import VerificationError
-from securesystemslib.signer import Key, Signature, Signer
 
 from reports.attestation.statement import PAYLOAD_TYPE, PREDICATE_TYPE, STATEMENT_TYPE, Statement
 from reports.errors import EnvelopeRefusedError
@@ -70,7 +67,7 @@ def open_envelope(octets: bytes) -> Opened:
     """Parse the bytes of an envelope and return its payload, key id and signature, without verifying the signature.
 
     Raises:
-        EnvelopeRefusedError: the envelope is larger than 4 MiB, malformed, or not as `signature.seal` writes envelopes.
+        EnvelopeRefusedError: the envelope is larger than 4 MiB, malformed, or not as `signing.seal` writes envelopes.
     """
     if len(octets) > _MOST_BYTES:
         raise EnvelopeRefusedError(f"not a certificate: the file is larger than {_MOST_BYTES} bytes. {_ASK}")
@@ -130,33 +127,3 @@ def _octets(text: str, what: str) -> bytes:
     if base64.b64encode(octets).decode() != text:
         raise EnvelopeRefusedError(f"the {what} is not canonical base64. {_ASK}")
     return octets
-
-
-def seal(statement: Statement, signer: Signer) -> str:
-    """Sign a statement and return the signed DSSE envelope as indented JSON text."""
-    envelope = Envelope(msgspec.json.encode(statement), PAYLOAD_TYPE, {})
-    envelope.sign(signer)
-    return msgspec.json.format(msgspec.json.encode(envelope.to_dict()), indent=1).decode() + "\n"
-
-
-def unseal(octets: bytes, key: Key) -> Statement:
-    """Verify an envelope's signature by a trusted public key, and return the signed statement.
-
-    Raises:
-        EnvelopeRefusedError: the envelope is not signed by that key, or is not as `seal` writes envelopes.
-    """
-    opened = open_envelope(octets)
-    if opened.keyid != key.keyid:
-        raise EnvelopeRefusedError(
-            f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
-            "If the vendor has a new key, compare its fingerprint over a second channel, and use that key"
-        )
-    signature = Signature(opened.keyid, opened.signature.hex())
-    try:
-        Envelope(opened.payload, PAYLOAD_TYPE, {opened.keyid: signature}).verify([key], 1)
-    except VerificationError as error:
-        raise EnvelopeRefusedError(
-            "the signature was not made by your key over this content: somebody changed it, or signed it "
-            "with another key. Do not rely on it; ask the vendor for the file as `roaas sign` wrote it"
-        ) from error
-    return statement_in(opened)

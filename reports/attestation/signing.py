@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from securesystemslib.dsse import Envelope
+from securesystemslib.signer import Signer
 
-from reports.attestation.envelope import seal, strict_json
+from reports.attestation.envelope import strict_json
 from reports.attestation.files import DESCRIPTION, RECORDED, digests_in
 from reports.attestation.keys import signer_of
 from reports.attestation.outcomes import Entry, contradictions, departures, named
 from reports.attestation.policy import Known
-from reports.attestation.statement import run_of, sha256, statement_of
+from reports.attestation.statement import PAYLOAD_TYPE, Statement, run_of, sha256, statement_of
 from reports.errors import ResultUnsignableError
 
 
@@ -136,3 +138,10 @@ def _disagreeing(result: Mapping[str, Any]) -> list[str]:
     except ValueError:
         return [*found, "the calendar has no such time as that of the run"]
     return [*found, "the run ended before it started; set the clock"] if ended < began else found
+
+
+def seal(statement: Statement, signer: Signer) -> str:
+    """Sign a statement and return the signed DSSE envelope as indented JSON text."""
+    envelope = Envelope(msgspec.json.encode(statement), PAYLOAD_TYPE, {})
+    envelope.sign(signer)
+    return msgspec.json.format(msgspec.json.encode(envelope.to_dict()), indent=1).decode() + "\n"

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from securesystemslib.signer import Key
+from securesystemslib.dsse import Envelope
+from securesystemslib.exceptions import VerificationError
+from securesystemslib.signer import Key, Signature
 
-from reports.attestation.envelope import strict_json, unseal
+from reports.attestation.envelope import open_envelope, statement_in, strict_json
 from reports.attestation.files import compared, remarks_on
 from reports.attestation.judging import Point, judge
 from reports.attestation.policy import Known, Policy
-from reports.attestation.statement import RESULT_SUBJECT, Statement, run_of
-from reports.errors import ResultMissingError
+from reports.attestation.statement import PAYLOAD_TYPE, RESULT_SUBJECT, Statement, run_of
+from reports.errors import EnvelopeRefusedError, ResultMissingError
 from reports.given_files import read_octets
 
 PROVED = (
@@ -114,3 +116,26 @@ def _agreement(statement: Statement, result: Any) -> Point:
         other = ["all"]
     text = f"the certificate says otherwise than result.json: {', '.join(other)}" if other else "the same facts in both"
     return Point("agreement", not other, text, "a certificate that says what result.json says", "do not rely on it")
+
+
+def unseal(octets: bytes, key: Key) -> Statement:
+    """Verify an envelope's signature by a trusted public key, and return the signed statement.
+
+    Raises:
+        EnvelopeRefusedError: the envelope is not signed by that key, or is not as `signing.seal` writes envelopes.
+    """
+    opened = open_envelope(octets)
+    if opened.keyid != key.keyid:
+        raise EnvelopeRefusedError(
+            f"foreign key: it is signed by {opened.keyid[:64]!r}, but your key is {key.keyid}. "
+            "If the vendor has a new key, compare its fingerprint over a second channel, and use that key"
+        )
+    signature = Signature(opened.keyid, opened.signature.hex())
+    try:
+        Envelope(opened.payload, PAYLOAD_TYPE, {opened.keyid: signature}).verify([key], 1)
+    except VerificationError as error:
+        raise EnvelopeRefusedError(
+            "the signature was not made by your key over this content: somebody changed it, or signed it "
+            "with another key. Do not rely on it; ask the vendor for the file as `roaas sign` wrote it"
+        ) from error
+    return statement_in(opened)

@@ -12,9 +12,10 @@ from pathlib import Path
 import msgspec
 from securesystemslib.signer import SSlibKey
 
-from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, unseal
+from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope
 from reports.attestation.keys import public_key
 from reports.attestation.statement import Run, Statement, sha256
+from reports.attestation.verifying import unseal
 from reports.errors import EnvelopeRefusedError, KeyUnusableError, ReportError, ResultMissingError
 from reports.given_files import read_octets
 

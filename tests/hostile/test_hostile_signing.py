@@ -14,8 +14,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from signed_results import COUNT, Vendor, conformant, dropped, failures, outcomes, roaas, run
 
-from reports.attestation.envelope import unseal
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
+from reports.attestation.verifying import unseal
 from reports.errors import EnvelopeRefusedError, KeyUnusableError
 
 _SETS = Path(__file__).parents[2] / "conformance" / "packs" / "table1" / "sets"

@@ -192,7 +192,7 @@ def sign_another_text(host, monkeypatch, pattern, instead):
     """Sign what this suite would never write: what a pattern finds in the statement is replaced."""
     encode = msgspec.json.encode
     monkeypatch.setattr(
-        "reports.attestation.envelope.msgspec.json.encode", lambda value: re.sub(pattern, instead, encode(value))
+        "reports.attestation.signing.msgspec.json.encode", lambda value: re.sub(pattern, instead, encode(value))
     )
     host.sign("one")
     monkeypatch.undo()
