@@ -29,7 +29,7 @@ _BROKEN = frozenset({_FAIL, "warn"})
     "--statement",
     "statement_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="The robot's statement, as it is now: limits and the motion map that the run was judged by.",
+    help="The robot's statement, as it is now: limits and the maps that the run was judged by.",
 )
 @click.option(
     "--contract",
@@ -55,10 +55,8 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
     except MALFORMED as error:
         raise click.UsageError(str(not_well_made(result, error))) from error
     before = {one["id"]: one for one in document["requirements"]}
-    chosen = judged.verdicts
-    if requirement:
-        known = {alias: id_ for id_, one in before.items() for alias in one.get("aliases", ())}
-        chosen = tuple(one for one in chosen if one.requirement.id == known.get(requirement, requirement))
+    requirement = next((id_ for id_, one in before.items() if requirement in one.get("aliases", ())), requirement)
+    chosen = tuple(one for one in judged.verdicts if requirement in {None, one.requirement.id})
     for one in chosen:
         then = str(before.get(one.requirement.id, {}).get("verdict", "not judged"))
         if requirement or one.value in _BROKEN or then in _BROKEN:
@@ -66,6 +64,8 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
             for finding in one.evidence.findings.values():
                 click.echo(f"  {inert(finding.text)}")
     click.echo(_summary(judged, chosen))
+    if lacking := [id_ for id_ in judged.lacking if requirement in {None, id_}]:
+        click.echo(f"not judged, as the statement's map is needed (--statement): {', '.join(lacking)}", err=True)
     for fault in judged.faults:
         click.echo(inert(fault), err=True)
     if not chosen:

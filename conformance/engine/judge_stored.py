@@ -40,12 +40,14 @@ class Judged:
         requests: the requests in the history.
         ended: whether the history is whole: the run was not killed.
         faults: what could not be judged, because of an error of the suite.
+        lacking: the requirements with a trace that is judged by a map, which the statement does not have.
     """
 
     verdicts: tuple[Verdict, ...]
     requests: int
     ended: bool
     faults: tuple[str, ...]
+    lacking: tuple[str, ...]
 
 
 def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path) -> Judged:
@@ -61,18 +63,18 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     """
     run, requests, ended = robot.run, 0, True
     there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
-    rules = _rules(robot) if TRACES_NAME in there else []
+    marks = (item.get_closest_marker("rule") for item in collected(robot)) if TRACES_NAME in there else ()
+    rules = [mark.args for mark in marks if mark is not None]
     known = [scenario for _, scenario in rules]
     traces = read_traces(folder / TRACES_NAME, known, run.judge.fault) if known else Recordings()
     if HISTORY_NAME in there or not there:
         requests, ended = _judge_history(robot, result, folder / HISTORY_NAME)
-    _judge_traces(robot, rules, traces)
+    lacking = _judge_traces(robot, rules, traces)
     for evidence in run.judge.evidence.values():
         # A part that takes an experiment is the run's affair.
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
-    verdicts, _ = draw_verdicts(run)
-    judged = tuple(one for one in verdicts if one.evidence.cases)
-    return Judged(judged, requests, ended, tuple(run.judge.faults))
+    judged = tuple(one for one in draw_verdicts(run)[0] if one.evidence.cases)
+    return Judged(judged, requests, ended, tuple(run.judge.faults), lacking)
 
 
 def _judge_history(robot: RobotUnderTest, result: Mapping[str, Any], path: Path) -> tuple[int, bool]:
@@ -92,9 +94,8 @@ def _judge_history(robot: RobotUnderTest, result: Mapping[str, Any], path: Path)
             requests += 1
             if event.request is not None and event.request.raw is not None:
                 tell(listeners, event.request.raw)
-            outcome = None if event.id in withdrawn else event.outcome
-            if outcome is not None and _is_heard(event, outcome):
-                _tell(judge, listeners, outcome)
+            if event.outcome is not None and event.id not in withdrawn and _is_heard(event, event.outcome):
+                _tell(judge, listeners, event.outcome)
     return requests, bool(events) and isinstance(events[-1], Ended)
 
 
@@ -140,19 +141,16 @@ def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Soap
             yield SoapService(name, HttpClient(base, Connection()), below, contract_wsdl_path=path)
 
 
-def _rules(robot: RobotUnderTest) -> list[tuple[Rule, Scenario]]:
-    """Return the contract's rules on traces."""
-    marks = (item.get_closest_marker("rule") for item in collected(robot))
-    return [mark.args for mark in marks if mark is not None]
-
-
-def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], traces: Recordings) -> None:
-    """Judge the traces of scenarios by the contract's rules."""
-    run = robot.run
-    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort}
+def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], traces: Recordings) -> tuple[str, ...]:
+    """Judge the traces of scenarios by the contract's rules; return the requirements whose map is not there."""
+    run, lacking = robot.run, dict[str, None]()
     maps = {"motion": run.statement.motion_map, "ros": run.statement.ros_map, "state_map": run.statement.state_map}
+    known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort} | maps
     for rule, scenario in rules:
-        recording = traces.played.get(scenario.name)
-        lacking = any(name in rule.fixtures for name, found in maps.items() if found is None)
-        if recording is not None and not lacking:
-            record(run.judge, rule.requirement, rule.outcomes(recording.trace, (known | maps).__getitem__))
+        if (recording := traces.played.get(scenario.name)) is None:
+            continue
+        if any(name in rule.fixtures for name, found in maps.items() if found is None):
+            lacking[rule.requirement] = None
+        else:
+            record(run.judge, rule.requirement, rule.outcomes(recording.trace, known.__getitem__))
+    return tuple(lacking)
