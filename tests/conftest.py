@@ -28,7 +28,7 @@ if hasattr(signal, "SIGQUIT"):
 # What takes longest begins first; a module that began last would run alone at the end. Load tests are two chains of
 # minutes, the modules named here take one to three, and tests of these folders start whole commands.
 _LONGEST = (
-    "test_ros_gateway.py", "test_wired_device.py", "test_ros_gateways.py", "test_lost_device.py", "test_servers.py",
+    "test_ros_gateway.py", "test_wired_device.py", "test_lost_device.py", "test_servers.py",
     "test_stateful_devices.py", "test_motion_drive.py", "test_wheel.py", "test_web_servers.py", "test_gateway.py",
     "test_load_secrets.py", "test_certify_command.py", "test_soap.py", "test_lost_robot.py", "test_bombs.py",
 )  # fmt: skip

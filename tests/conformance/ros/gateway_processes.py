@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from subprocess import DEVNULL
@@ -26,14 +26,14 @@ openapi = "{url}/openapi.json"
 
 
 @contextmanager
-def gateway(style: str, domain_id: int, folder: Path, fault: str = "") -> Iterator[Path]:
+def gateway(style: str, domain_id: int, folder: Path, faults: Iterable[str] = ()) -> Iterator[Path]:
     """Start a gateway, and yield its statement.
 
     Args:
         style: its name in `surface.STYLES`.
         domain_id: the ROS domain.
         folder: where its statement is written.
-        fault: what it does wrong.
+        faults: what it does wrong.
     """
     environment = os.environ | {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -41,14 +41,20 @@ def gateway(style: str, domain_id: int, folder: Path, fault: str = "") -> Iterat
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     }
     if style == "rosbridge":
-        yield from _bridge(domain_id, folder, fault, environment)
+        yield from _bridge(domain_id, folder, ",".join(faults), environment)
         return
     subprocess.run([sys.executable, _GATEWAYS / "surface.py", style, str(domain_id), folder], check=True)
     port, bridge = free_port(), free_port()
     script = "rosbridge.py" if style == "node" else f"on_{style}.py"
-    python = [sys.executable, _GATEWAYS / script, str(bridge if style == "node" else port), str(domain_id), fault]
+    python = [
+        sys.executable,
+        _GATEWAYS / script,
+        str(bridge if style == "node" else port),
+        str(domain_id),
+        ",".join(faults),
+    ]
     node = ["node", "--experimental-websocket", _GATEWAYS / "over_rosbridge.js", port, bridge]
-    commands = [python] + ([[*node, folder / "surface.json", fault]] if style == "node" else [])
+    commands = [python] + ([[*node, folder / "surface.json"]] if style == "node" else [])
     url = f"http://127.0.0.1:{port}"
     with ExitStack() as stack:
         for command in commands:
@@ -61,11 +67,11 @@ def gateway(style: str, domain_id: int, folder: Path, fault: str = "") -> Iterat
         yield statement
 
 
-def _bridge(domain_id: int, folder: Path, fault: str, environment: dict[str, str]) -> Iterator[Path]:
+def _bridge(domain_id: int, folder: Path, faults: str, environment: dict[str, str]) -> Iterator[Path]:
     """Start the rosbridge alone, and yield its statement."""
     port = free_port()
     url = f"ws://127.0.0.1:{port}"
-    command = [sys.executable, _GATEWAYS / "rosbridge.py", str(port), str(domain_id), fault]
+    command = [sys.executable, _GATEWAYS / "rosbridge.py", str(port), str(domain_id), faults]
     with subprocess.Popen([*map(str, command)], env=environment, stdout=DEVNULL, stderr=DEVNULL) as process:
         try:
             until = time.monotonic() + _STARTS_S

@@ -22,7 +22,6 @@ from rosidl_parser.definition import (
 _FLOATS = {"float", "double", "long double"}
 _WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 _FLOAT32_MOST = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
-_FAULTY_LENGTH = 64
 
 
 class RefusedError(ValueError):
@@ -38,23 +37,20 @@ class Forms:
         integers: number or string, for 64 bits.
         bytes: base64 or array, for uint8[] and byte[].
         required: whether a body has to name all fields.
-        fault: what is done wrong.
+        faults: what is done wrong.
     """
 
     non_finite: str = "null"
     integers: str = "number"
     bytes: str = "base64"
     required: bool = False
-    fault: str = ""
+    faults: frozenset[str] = frozenset()
 
     def write(self, message: Any) -> dict[str, Any]:
         """Return a message as JSON."""
         slots = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
         fields = {name: self._out(getattr(message, name), slot) for name, slot in slots.items()}
-        last = list(slots)[-1]
-        if self.fault == "field dropped" and len(slots) > 1:
-            fields[last] = self._out(getattr(type(message)(), last), slots[last])
-        if self.fault == "fields swapped" and "y" in slots:
+        if "fields swapped" in self.faults and "y" in slots:
             fields["x"], fields["y"] = fields["y"], fields["x"]
         return fields
 
@@ -75,9 +71,7 @@ class Forms:
         given = {name: self._in(value[name], slots[name], f"{place}/{name}") for name in value}
         for name, field in given.items():
             setattr(message, name, field)
-        if self.fault == "field dropped" and len(slots) > 1:
-            setattr(message, list(slots)[-1], getattr(kind(), list(slots)[-1]))
-        if self.fault == "fields swapped" and "y" in slots:
+        if "fields swapped" in self.faults and "y" in slots:
             message.x, message.y = message.y, message.x
         return message
 
@@ -102,42 +96,23 @@ class Forms:
         return bool(value) if kind.typename == "boolean" else int(value)
 
     def _array_out(self, value: Any, kind: AbstractNestedType) -> Any:
-        if self.fault == "truncated":
-            value = value[:_FAULTY_LENGTH]
-        if self.fault == "reversed":
-            value = value[::-1]
         if _octets(kind):
             octets = b"".join(one if isinstance(one, bytes) else bytes([int(one) & 255]) for one in value)
-            if self.fault == "bytes through text":
-                octets = octets.decode("utf-8", "replace").encode()
             return base64.b64encode(octets).decode() if self.bytes == "base64" else list(octets)
-        if self.fault == "empty as null" and not len(value):
-            return None
         return [self._out(one, kind.value_type) for one in value]
 
     def _wide(self, value: int) -> Any:
-        if self.fault == "2^53":
+        if "2^53" in self.faults:
             value = int(float(value))
-        if self.fault == "signed" and value >= 2**63:
-            value -= 2**64
         return str(value) if self.integers == "string" else value
 
     def _text(self, value: str) -> str:
-        if self.fault == "ascii":
-            return value.encode("ascii", "replace").decode()
-        return value[:_FAULTY_LENGTH] if self.fault == "truncated" else value
-
-    def _rounded(self, value: float) -> float:
-        if self.fault == "float32" and abs(value) <= _FLOAT32_MOST:
-            return struct.unpack("<f", struct.pack("<f", value))[0]
-        if self.fault == "6 digits":
-            return round(value, 6)
-        return value
+        return value.encode("ascii", "replace").decode() if "ascii" in self.faults else value
 
     def _number(self, value: float) -> Any:
         if math.isfinite(value):
-            return self._rounded(value)
-        if self.fault == "NaN as 0":
+            return round(value, 6) if "6 digits" in self.faults else value
+        if "NaN as 0" in self.faults:
             return 0.0
         if self.non_finite == "null":
             return None
@@ -179,15 +154,13 @@ class Forms:
             raise RefusedError(f"{place} has {len(items)} items, not {kind.size}")
         if isinstance(kind, BoundedSequence) and len(items) > kind.maximum_size:
             raise RefusedError(f"{place} has over {kind.maximum_size} items")
-        if isinstance(kind, Array):
-            return items
-        return {"truncated": items[:_FAULTY_LENGTH], "reversed": items[::-1]}.get(self.fault, items)
+        return items
 
     def _float(self, value: Any, name: str, place: str) -> float:
         if value is None and self.non_finite == "null":
-            return 0.0 if self.fault == "NaN as 0" else math.nan
+            return 0.0 if "NaN as 0" in self.faults else math.nan
         if isinstance(value, str) and self.non_finite == "string" and value in _WORDS:
-            return 0.0 if self.fault == "NaN as 0" else _WORDS[value]
+            return 0.0 if "NaN as 0" in self.faults else _WORDS[value]
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RefusedError(f"{place} is not a number")
         try:
@@ -196,7 +169,7 @@ class Forms:
             number = math.inf
         if not math.isfinite(number) or (name == "float" and abs(number) > _FLOAT32_MOST):
             raise RefusedError(f"{place} is beyond what ROS can hold")
-        return self._rounded(number)
+        return number
 
     def _integer(self, value: Any, name: str, place: str) -> Any:
         wide = name in {"int64", "uint64"}
@@ -205,12 +178,9 @@ class Forms:
         if isinstance(value, bool) or not isinstance(value, int):
             raise RefusedError(f"{place} is not an integer")
         lowest, highest = _range(name)
-        if self.fault == "wraps" and name != "octet":
-            span = highest - lowest + 1
-            return (value - lowest) % span + lowest
         if not lowest <= value <= highest:
             raise RefusedError(f"{place} is not from {lowest} to {highest}")
-        if wide and self.fault == "2^53":
+        if wide and "2^53" in self.faults:
             return max(lowest, min(int(float(value)), highest))
         return bytes([value]) if name == "octet" else value
 

@@ -5,9 +5,9 @@ const { createServer } = require("http");
 const { randomUUID } = require("crypto");
 const { readFileSync } = require("fs");
 
-const [port, bridgePort, file, fault = ""] = process.argv.slice(2);
+const [port, bridgePort, file] = process.argv.slice(2);
 const { reads, publishes, services, action, deadline_s: deadlineS, openapi } = JSON.parse(readFileSync(file, "utf8"));
-const deadline = fault === "no deadline" ? 600e3 : deadlineS * 1000;
+const deadline = deadlineS * 1000;
 const ends = (all) => new Map(all.map((end) => [end.name, end]));
 const [readsBy, publishesBy, servicesBy] = [ends(reads), ends(publishes), ends(services)];
 
@@ -17,7 +17,7 @@ const parse = (text) => {
   return JSON.parse(marked, (_, value) => (value && typeof value === "object" && typeof value["\0"] === "string" ? BigInt(value["\0"]) : value));
 };
 const write = (value) => {
-  if (typeof value === "bigint") return fault === "2^53" ? String(Number(value)) : String(value);
+  if (typeof value === "bigint") return String(value);
   if (Object.is(value, -0)) return "-0.0";
   if (Array.isArray(value)) return `[${value.map(write).join(",")}]`;
   if (value && typeof value === "object") return `{${Object.entries(value).filter(([, item]) => item !== undefined).map(([name, item]) => `${JSON.stringify(name)}:${write(item)}`).join(",")}}`;
@@ -46,7 +46,7 @@ const connect = () => {
 };
 const came = (said) => {
   const goal = goals.get(said.id);
-  if (said.op === "publish" && !(fault === "first message for ever" && last.has(said.topic))) last.set(said.topic, { message: said.msg, at: performance.now() });
+  if (said.op === "publish") last.set(said.topic, { message: said.msg, at: performance.now() });
   else if (said.op === "action_feedback" && goal) goal.feedback = said.values;
   else if (said.op === "action_result" && goal) ended(goal, said);
   if (said.id && waiting.has(said.id)) waiting.get(said.id)(said);
@@ -72,11 +72,8 @@ const member = (body, name) => {
 };
 const newest = (end) => {
   const found = last.get(end.ros);
-  if (!found && fault === "absent crashes") throw new Error(end.ros);
-  if (!found && fault === "empty at first") return {};
   const late = found && end.max_age_s && performance.now() - found.at > end.max_age_s * 1000;
-  if (late && fault === "empty when stale") return {};
-  if (!found || (late && fault !== "stale")) throw new Problem(503, "no fresh message");
+  if (!found || late) throw new Problem(503, "no fresh message");
   return found.message;
 };
 const publish = async (end, message) => {
@@ -102,14 +99,14 @@ const begin = async (args) => {
   return goal;
 };
 const goalOf = (id) => {
-  const goal = fault === "goals mixed" ? [...goals.values()].at(-1) : goals.get(id);
+  const goal = goals.get(id);
   if (!goal) throw new Problem(404, "no such goal");
   return goal;
 };
 const cancel = async (goal) => {
   if (goal.status !== "RUNNING") throw new Problem(409, "it has ended");
   if (socket.readyState !== WebSocket.OPEN) throw new Problem(503, "the bridge is away");
-  if (fault !== "cancel lost") socket.send(write({ op: "cancel_action_goal", id: goal.id, action: action.ros }));
+  socket.send(write({ op: "cancel_action_goal", id: goal.id, action: action.ros }));
   return { ok: true };
 };
 const shown = ({ id, status, feedback = null, result = null }) => ({ id, status: status === "MISSING" ? "REJECTED" : status, feedback, result });
@@ -148,7 +145,7 @@ createServer(async (request, response) => {
   };
   let status, value;
   try {
-    const responding = fault === "deadlock" ? before.then(() => respond(request.method, path, body)) : respond(request.method, path, body);
+    const responding = respond(request.method, path, body);
     before = responding.catch(() => {});
     [status, value] = await responding;
   } catch (error) {

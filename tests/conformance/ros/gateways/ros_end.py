@@ -28,7 +28,6 @@ from surface import ACTION, DEADLINE_S, PUBLISHES, READS, SERVICES, STYLES, End
 
 _LOOK_S = 0.1
 _DEPTH = 100
-_LEAKED = 1
 # So many messages within a second are a crowd, and so many calls at once: more than any but a crowd sends. A busy
 # machine hardly brings about more of these at one moment.
 _MANY, _WAITING = 17, 9
@@ -38,7 +37,7 @@ _MANY, _WAITING = 17, 9
 class Goal:
     """A goal and what has become of it: `status` as GoalStatus has it."""
 
-    fault: str = ""
+    faults: frozenset[str] = frozenset()
     handle: Any = None
     status: int = GoalStatus.STATUS_EXECUTING
     feedback: list[Any] = field(default_factory=list)
@@ -48,9 +47,7 @@ class Goal:
         """Return the last feedback, or None."""
         if not self.feedback:
             return None
-        if self.fault == "feedback reordered" and len(self.feedback) > 1:
-            return self.feedback[-1 - len(self.feedback) % 2]
-        return self.feedback[0 if self.fault == "first feedback for ever" else -1]
+        return self.feedback[0 if "first feedback for ever" in self.faults else -1]
 
 
 @dataclass
@@ -67,16 +64,15 @@ class RosEnd:
     Args:
         domain_id: the ROS domain.
         forms: how JSON writes messages.
-        fault: what is done wrong.
+        faults: what is done wrong.
     """
 
-    def __init__(self, domain_id: int, forms: Forms, fault: str = "") -> None:
-        self.fault, self.forms = fault, replace(forms, fault=fault)
-        self.deadline_s = 600.0 if fault == "no deadline" else DEADLINE_S
+    def __init__(self, domain_id: int, forms: Forms, faults: frozenset[str] = frozenset()) -> None:
+        self.faults, self.forms = faults, replace(forms, faults=faults)
+        self.deadline_s = DEADLINE_S
         self.goals: dict[str, Goal] = {}
-        self._busy = threading.Lock()
-        self._absent: set[str] = set()
-        self._deaf: set[str] = set()
+        self._before: dict[str, Any] = {}
+        self._reads = 0
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node("gateway", context=self._context, start_parameter_services=False, enable_rosout=False)
@@ -84,7 +80,6 @@ class RosEnd:
         self._last: dict[str, tuple[Any, float]] = {}
         self._ends: dict[str, Any] = {}
         self._held: list[Any] = []
-        self._streams: list[list[str]] = []
         self._waiting, self._recent = 0, deque(maxlen=_MANY)
         self._topics: dict[str, str] = {}
         self._creating = threading.Lock()
@@ -112,9 +107,7 @@ class RosEnd:
         try:
             return self.forms.read(value, kind)
         except RefusedError:
-            if self.fault == "invalid accepted":
-                return kind()
-            if self.fault == "invalid published" and "/msg/" in end.type:
+            if "invalid published" in self.faults and "/msg/" in end.type:
                 self.publish(end, kind())
             raise
 
@@ -137,44 +130,32 @@ class RosEnd:
         def came(message: Any) -> None:
             nonlocal next_s
             now = time.monotonic()
-            if now < next_s and self.fault != "stream throttle ignored":
+            if now < next_s and "stream throttle ignored" not in self.faults:
                 return
             next_s = now + throttle_s
             held.append(json.dumps(self.forms.write(message), ensure_ascii=False))
-            if self.fault == "stream drops" and len(held) % 4 == 0:
+            if "stream drops" in self.faults and len(held) % 4 == 0:
                 return
-            if self.fault == "stream reorders" and not throttle_s:
+            if "stream reorders" in self.faults and not throttle_s:
                 if len(held) % 2 == 0:
                     send(held[-1])
                     send(held[-2])
                 return
-            if self.fault == "stream for one client" and self._streams[-1] is not held:
-                return
-            send(held[0 if self.fault == "stream of the first" else -1])
-            if self.fault == "stream doubles":
-                send(held[-1])
+            send(held[-1])
 
-        self._streams.append(held)
-        if self.fault == "stream once only" and len(self._streams) > len(READS):
-            return lambda: None
         return self.subscribe(end.ros, end.type, came)
 
     def last(self, end: End) -> Any:
         """Return the last message of a topic; None without one, or if it is too old."""
         topic, kind, max_age_s = end.ros, end.type, end.max_age_s
-        with self._busy:
-            pass
-        if self.fault == "subscriptions leak":
-            self._held.append(self.node.create_subscription(interface(kind), topic, lambda _: None, _LEAKED))
         message, at = self._last.get(topic, (None, 0.0))
         if message is None:
-            if self.fault == "absent crashes":
-                raise KeyError(topic)
-            return interface(kind)() if self.fault == "empty at first" else None
+            return interface(kind)() if "empty at first" in self.faults else None
         if max_age_s is not None and time.monotonic() - at > max_age_s:
-            return {"stale": message, "empty when stale": interface(kind)()}.get(self.fault)
-        if self.fault == "restamped" and hasattr(message, "header"):
-            message.header.stamp = self.node.get_clock().now().to_msg()
+            return message if "stale" in self.faults else None
+        if "goes back" in self.faults:
+            self._reads += 1
+            return self._before[topic] if self._reads % 3 == 0 else message
         return message
 
     def publisher(self, end: End) -> Any:
@@ -185,11 +166,11 @@ class RosEnd:
         """Publish a message."""
         publisher = self.publisher(end)
         with self._creating:
-            if self.fault == "message dropped":
+            if "message dropped" in self.faults and end.name == "say":
                 self._held.append(message)
                 if len(self._held) % 3 == 0:
                     return
-            if self.fault == "reordered":
+            if "reordered" in self.faults:
                 self._held.append(message)
                 if len(self._held) == 2:
                     publisher.publish(self._held.pop())
@@ -199,12 +180,12 @@ class RosEnd:
                 return
             self._recent.append(time.monotonic())
             is_crowd = len(self._recent) == _MANY and self._recent[-1] - self._recent[0] < 1
-            if is_crowd and self.fault == "reordered in a crowd":
+            if is_crowd and "reordered in a crowd" in self.faults:
                 threading.Timer(0.3 * (len(self._held) % 2), publisher.publish, [message]).start()
                 self._held.append(message)
                 return
             publisher.publish(message)
-            if self.fault == "message doubled" or (is_crowd and self.fault == "message doubled in a crowd"):
+            if "message doubled" in self.faults:
                 publisher.publish(message)
 
     def client(self, end: End) -> Any:
@@ -218,49 +199,34 @@ class RosEnd:
     def call(self, end: End, request: Any) -> Future | None:
         """Call a service; return the future of its response, or None if there is none."""
         client, empty, future = self.client(end), interface(end.type).Response, Future()
-        if not client.service_is_ready() or end.ros in self._absent:
-            if self.fault == "absence remembered":
-                self._absent.add(end.ros)
-            if self.fault != "absent service as success":
+        if not client.service_is_ready():
+            if "absent service as success" not in self.faults:
                 return None
             future.set_result(empty())
             return future
-        if self.fault == "call dropped":
-            future.set_result(empty())
-            return future
         self._waiting += 1
-        is_crowd = self._waiting >= _WAITING
-        if self.fault == "call doubled" or (is_crowd and self.fault == "call doubled in a crowd"):
+        if "call doubled" in self.faults:
             client.call_async(request)
-        if self.fault == "late as success":
-            threading.Timer(self.deadline_s / 2, lambda: future.done() or future.set_result(empty())).start()
-        if self.fault == "deadlock":
-            self._busy.acquire(timeout=self.deadline_s)
-            future.add_done_callback(lambda _: self._busy.release())
         _passed_on(client.call_async(request), future, lambda response: self._served(end.ros, response))
         return future
 
     def send_goal(self, end: End, request: Any) -> tuple[str, Goal, Future] | None:
         """Send a goal; return its id, it, and the future of whether it is accepted; None if there is no server."""
         client = self.action_client(end)
-        if not client.server_is_ready() or end.ros in self._absent:
-            if self.fault == "absence remembered":
-                self._absent.add(end.ros)
+        if not client.server_is_ready():
             return None
-        goal, accepted, name = Goal(self.fault), Future(), uuid.uuid4().hex
+        goal, accepted, name = Goal(self.faults), Future(), uuid.uuid4().hex
         self.goals[name] = goal
-        if self.fault == "goal doubled":
+        if "goal doubled" in self.faults:
             client.send_goal_async(request)
 
         def responded(handle: Any) -> bool:
             goal.handle = handle
             if not handle.accepted:
                 goal.status = GoalStatus.STATUS_UNKNOWN
-                if self.fault == "refused goal as accepted":
+                if "refused goal as accepted" in self.faults:
                     goal.status = GoalStatus.STATUS_EXECUTING
-                if self.fault == "refused goal as aborted":
-                    goal.status = GoalStatus.STATUS_ABORTED
-                return "refused goal" in self.fault
+                return "refused goal as accepted" in self.faults
             handle.get_result_async().add_done_callback(lambda done: self._finished(goal, done.result()))
             return True
 
@@ -270,37 +236,25 @@ class RosEnd:
 
     def goal(self, name: str) -> Goal | None:
         """Return a goal by its id."""
-        if self.fault == "goals mixed" and self.goals:
-            return list(self.goals.values())[-1]
         return self.goals.get(name)
 
     def cancel(self, goal: Goal) -> Future:
         """Cancel a goal; return the future of whether its server does so."""
         canceled: Future = Future()
-        if self.fault == "cancel lost":
+        if "cancel lost" in self.faults:
             canceled.set_result(result=True)
             return canceled
-        if self.fault == "cancel of another":
-            goal = list(self.goals.values())[-1]
-        refused = self.fault == "cancel as refused"
         cancelled = goal.handle.cancel_goal_async()
-        _passed_on(cancelled, canceled, lambda response: bool(response.goals_canceling) and not refused)
+        _passed_on(cancelled, canceled, lambda response: bool(response.goals_canceling))
         return canceled
 
     def topics(self) -> dict[str, str]:
         """Return the topics of the graph, with their types."""
         found = {name: kinds[0] for name, kinds in self.node.get_topic_names_and_types()}
         there = {name: kind for name, kind in found.items() if self._ends_of(name)}
-        if self.fault == "list of the start":
-            self._topics = self._topics or there
-            return self._topics
-        if self.fault == "list keeps what is gone":
+        if "list keeps what is gone" in self.faults:
             self._topics |= there
             return self._topics
-        if self.fault == "list with wrong types":
-            return dict.fromkeys(there, "std_msgs/msg/String")
-        if self.fault == "list without namespaces":
-            return {"/" + name.rsplit("/", 1)[-1]: kind for name, kind in there.items()}
         return there
 
     def _late(self, publisher: Any, message: Any) -> None:
@@ -310,33 +264,24 @@ class RosEnd:
 
     def _served(self, service: str, response: Any) -> Any:
         is_crowd, self._waiting = self._waiting >= _WAITING, self._waiting - 1
-        if self.fault == "last response" or (is_crowd and self.fault == "last response in a crowd"):
+        if "last response" in self.faults or (is_crowd and "last response in a crowd" in self.faults):
             response, self._last[service] = self._last.get(service, (response, 0.0))[0], (response, 0.0)
-        if self.fault == "response as success" and hasattr(response, "success"):
-            response.success = True
         return response
 
     def _finished(self, goal: Goal, done: Any) -> None:
-        status = done.status
-        wrong = {
-            "aborted as succeeded": (GoalStatus.STATUS_ABORTED, GoalStatus.STATUS_SUCCEEDED),
-            "canceled as aborted": (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_ABORTED),
-            "canceled as succeeded": (GoalStatus.STATUS_CANCELED, GoalStatus.STATUS_SUCCEEDED),
-            "succeeded as aborted": (GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_ABORTED),
-            "never ends": (status, GoalStatus.STATUS_EXECUTING),
-        }.get(self.fault, (0, 0))
-        goal.result = type(done.result)() if self.fault == "result lost" else done.result
-        goal.status = wrong[1] if wrong[0] == status else status
+        is_wrong = "aborted as succeeded" in self.faults and done.status == GoalStatus.STATUS_ABORTED
+        goal.result = type(done.result)() if "result lost" in self.faults else done.result
+        goal.status = GoalStatus.STATUS_SUCCEEDED if is_wrong else done.status
 
     def _came(self, topic: str, message: Any) -> None:
-        if topic in self._deaf:
-            return
-        if self.fault == "first message for ever" and topic in self._last:
+        if "first message for ever" in self.faults and topic in self._last:
             message = self._last[topic][0]
-        if self.fault == "messages mixed":
+        if "messages mixed" in self.faults:
             topics = [name for name, heard in self._heard.items() if heard[0].kind is type(message)]
             for name in topics:
                 self._last[name] = message, time.monotonic()
+        goes_back = "goes back" in self.faults and topic in self._last and message != self._last[topic][0]
+        self._before[topic] = self._last[topic][0] if goes_back else message
         self._last[topic] = message, time.monotonic()
 
     def _look(self) -> None:
@@ -351,15 +296,11 @@ class RosEnd:
     def _connect(self, topic: str, heard: _Heard) -> None:
         """Subscribe with the reliability and durability of the topic's publishers."""
         found = [one.qos_profile for one in self.node.get_publishers_info_by_topic(topic)]
-        if self.fault == "deaf after the first publisher" and topic in self._last and not found:
-            self._deaf.add(topic)
         reliable = all(one.reliability == ReliabilityPolicy.RELIABLE for one in found)
         latched = bool(found) and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in found)
         quality = (
-            ReliabilityPolicy.RELIABLE if reliable or self.fault == "reliable only" else ReliabilityPolicy.BEST_EFFORT,
-            DurabilityPolicy.TRANSIENT_LOCAL
-            if latched and self.fault != "volatile only"
-            else DurabilityPolicy.VOLATILE,
+            ReliabilityPolicy.RELIABLE if reliable or "reliable only" in self.faults else ReliabilityPolicy.BEST_EFFORT,
+            DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
         if quality == heard.quality or (heard.quality and not found):
             return
@@ -388,13 +329,13 @@ class RosEnd:
 
 
 def begun(style: str) -> tuple[RosEnd, int]:
-    """Return the ROS end and the port that the command line names: `PORT DOMAIN [FAULT]`."""
+    """Return the ROS end and the port that the command line names: `PORT DOMAIN [FAULT,…]`."""
     parser = argparse.ArgumentParser()
     parser.add_argument("port", type=int)
     parser.add_argument("domain", type=int)
-    parser.add_argument("fault", nargs="?", default="")
+    parser.add_argument("faults", nargs="?", default="")
     given = parser.parse_args()
-    end = RosEnd(given.domain, STYLES[style].forms, given.fault)
+    end = RosEnd(given.domain, STYLES[style].forms, frozenset(given.faults.split(",")))
     end.prepare(keep=style != "node")
     return end, given.port
 

@@ -32,27 +32,11 @@ class _Subscription:
     next_s: float = 0.0
     timer: asyncio.TimerHandle | None = None
     end: Callable[[], None] = lambda: None
-    fault: str = ""
-    count: int = 0
-    held: list[dict[str, Any]] = field(default_factory=list)
+    faults: frozenset[str] = frozenset()
 
     def came(self, message: dict[str, Any]) -> None:
         now = time.monotonic()
-        self.count += 1
-        if self.fault == "stream drops" and self.count % 4 == 0:
-            return
-        if self.fault == "stream reorders" and not self.throttle_s:
-            self.held.append(message)
-            if len(self.held) == 2:
-                self.send(self.held.pop())
-                self.send(self.held.pop())
-            return
-        self.held = self.held or [message]
-        if self.fault == "stream of the first":
-            message = self.held[0]
-        if self.fault == "stream doubles":
-            self.send(message)
-        if (now >= self.next_s or self.fault == "stream throttle ignored") and not self.kept:
+        if (now >= self.next_s or "stream throttle ignored" in self.faults) and not self.kept:
             self.next_s = now + self.throttle_s
             self.send(message)
         elif self.kept.maxlen:
@@ -76,7 +60,6 @@ class _Client:
     sending: asyncio.Queue[dict[str, Any]] = field(default_factory=lambda: asyncio.Queue(_WAITING))
     subscriptions: dict[str, _Subscription] = field(default_factory=dict)
     goals: dict[str, tuple[Goal, Any]] = field(default_factory=dict)
-    last_id: str = ""
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message, unless a slow client has too many waiting."""
@@ -123,7 +106,7 @@ class _Client:
             raise RefusedError(f"{topic} is not served, or subscribed already")
         kept: deque[dict[str, Any]] = deque(maxlen=int(said.get("queue_length", 0)))
         heard = _Subscription(self.send, self.loop, int(said.get("throttle_rate", 0)) / 1000, kept)
-        heard.fault = self.ros.fault
+        heard.faults = self.ros.faults
         self.subscriptions[topic] = heard
 
         def came(message: Any) -> None:
@@ -134,16 +117,14 @@ class _Client:
 
     async def _unsubscribe(self, said: dict[str, Any]) -> None:
         subscription = self.subscriptions.pop(said["topic"])
-        if self.ros.fault != "unsubscribe ignored":
+        if "unsubscribe ignored" not in self.ros.faults:
             subscription.end()
 
     async def _call_service(self, said: dict[str, Any]) -> None:
         service = said["service"]
         result: dict[str, Any] = {"op": "service_response", "service": service, "result": False}
         result |= {"id": said["id"]} if "id" in said else {}
-        if self.ros.fault == "wrong id" and "id" in said:
-            self.last_id, result["id"] = said["id"], self.last_id or said["id"]
-        if self.ros.fault == "service error as success":
+        if "service error as success" in self.ros.faults:
             result["result"] = True
         if service == "/rosapi/topics":
             topics = self.ros.topics()
@@ -188,7 +169,7 @@ class _Client:
         while goal.result is None or goal.status not in _ENDED:
             for one in goal.feedback[told:] if said.get("feedback") else ():
                 told += 1
-                values = self.ros.forms.write(goal.latest() if goal.fault else one)
+                values = self.ros.forms.write(one)
                 self.send({"op": "action_feedback", "id": name, "action": end.ros, "values": values})
             await asyncio.sleep(0.02)
         values = self.ros.forms.write(goal.result)

@@ -196,6 +196,7 @@ def ros_map(style: Style, domain_id: int) -> str:
             "publishes": end.ros,
             "type": end.type,
             "at": style.publish_at,
+            "timeout_s": 2.5 * DEADLINE_S,
         }
     for end in SERVICES:
         operations[f"POST {style.services.format(end.name)}"] = {
