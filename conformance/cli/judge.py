@@ -41,15 +41,15 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
     """Judge again what a run sent and saw, by this version's rules. Nothing is sent.
 
     RESULT is a result.json, or its folder, with the history of the run; also that of a run that was killed.
-    REQUIREMENT is an id such as http/date; by default all. Only what the history shows is judged: a requirement that
-    needs an experiment keeps its verdict of the run, and is not told.
+    REQUIREMENT is an id such as http/date; by default all of the classes that the run was for. Only what the history
+    shows is judged: a requirement that needs an experiment keeps its verdict of the run, and is not told.
 
     Exit code: 0 all that was judged holds, 1 something fails, 2 usage, 4 nothing could be judged.
     """
     folder = result if result.is_dir() else result.parent
     try:
         document = read_result(result / "result.json" if result.is_dir() else result)
-        judged = _judged(document, folder, statement_file, pack)
+        judged = _judged(document, folder, statement_file, pack, claimed=requirement is None)
     except (StoredResultError, StatementError) as error:
         raise click.UsageError(str(error)) from error
     except MALFORMED as error:
@@ -91,8 +91,10 @@ def _summary(judged: "Judged", chosen: tuple["Verdict", ...]) -> str:
     return f"{kinds}, of {counted(len(chosen), 'requirement')} that this run shows ({counted(cases, 'case')}; {told})"
 
 
-def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None) -> "Judged":
-    """Judge what is in the folder.
+def _judged(
+    document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, *, claimed: bool
+) -> "Judged":
+    """Judge what is in the folder, or what of it the run claimed alone.
 
     Raises:
         click.UsageError: the contract is not at hand, or the history or the traces cannot be read.
@@ -109,7 +111,8 @@ def _judged(document: dict[str, Any], folder: Path, statement_file: Path | None,
     if contract is None:
         raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
     statement = load_statement(statement_file, contract) if statement_file else empty_statement(contract)
-    run = Run(statement, contract, claims=tuple(contract.classes), allow_motion=True)
+    then = document["statement"]["claims"] if claimed else contract.classes
+    run = Run(statement, contract, claims=tuple(name for name in contract.classes if name in then), allow_motion=True)
     try:
         return judge_stored(RobotUnderTest(run), document, folder)
     except (HistoryError, TracesError) as error:

@@ -69,6 +69,18 @@ def test_verdicts_cases_and_causes_are_those_of_the_run(run):
     assert f"{done.result['requests']} requests in the history" in text.replace(",", "")
 
 
+def test_a_class_that_the_run_was_not_for_is_not_judged(tmp_path):
+    async def state(_):
+        return web.json_response({"on": True}, headers={"Last-Modified": "yesterday"})
+
+    with small_device(described({"/state": reading(_STATE)}), {"/state": {"GET": state}}) as url:
+        done = certified(url, tmp_path / "out", "--class", "description")
+    assert done.exit_code == 0, done.text
+    code, text = _judged(tmp_path / "out")
+    assert (code, "http/date-format" in text) == (0, False), text
+    assert _judged(tmp_path / "out", "http/date-format")[0] == 1
+
+
 @pytest.mark.parametrize("crashes", [{"HEAD"}, {"GET", "HEAD"}])
 def test_a_crash_is_judged_once_whichever_check_met_it(tmp_path, crashes):
     """A survey's rule judges GET; no scenario records HEAD."""
