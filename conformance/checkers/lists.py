@@ -278,8 +278,9 @@ def is_before(one: Any, other: Any) -> bool | None:
 
 
 def _natural(text: str) -> list[tuple[int, int, str]]:
-    parts = re.findall(r"\d+|\D+", text.casefold())
-    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in parts]
+    parts = [part.lstrip("0") or "0" if part.isdecimal() else part for part in re.findall(r"\d+|\D+", text.casefold())]
+    # The longer number is the larger one; it may have more digits than int takes.
+    return [(0, len(part), part) if part.isdecimal() else (1, 0, part) for part in parts]
 
 
 def _without_punctuation(text: str) -> str:

@@ -5,6 +5,7 @@ What comes of it is judged by the checkers of every exchange (checkers/soap_memo
 
 from __future__ import annotations
 
+import re
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -231,7 +232,7 @@ class _Changes:
         known = [
             own,
             *self.caller.given.get(name.lower(), []),
-            *(str(int(own) + more) for more in (1, 2) if own.isdecimal()),
+            *(str(int(own) + more) for more in (1, 2) if re.fullmatch(r"\d{1,18}", own)),
         ]
         things = [with_text(node, keys[0], text) for text in list(dict.fromkeys(known))[: _THINGS + 1]]
         told = [(thing, self._read(readers, thing)) for thing in things]

@@ -1,6 +1,7 @@
 """Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
 import itertools
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -15,8 +16,8 @@ from conformance.transport.passage import Heard
 
 # More concurrent clients would be a load test, and exceed a small robot's sockets.
 MOST_CLIENTS: Final = 8
-# Statuses by which an overloaded server refuses any request (RFC 9110 15.6.4, RFC 6585 4).
-_BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
+#: Statuses by which an overloaded server refuses any request (RFC 9110 15.6.4, RFC 6585 4).
+BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
 
 
 #: A request with the interface to send it to.
@@ -25,7 +26,7 @@ Addressed = tuple[HttpClient, Outgoing]
 
 def is_busy(attempt: Attempt) -> bool:
     """Return whether the robot was overloaded: it responded 503 or the like, or accepted no further connection."""
-    return not isinstance(attempt, Exchange) or attempt.response.status in _BUSY
+    return not isinstance(attempt, Exchange) or attempt.response.status in BUSY
 
 
 def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
@@ -165,6 +166,7 @@ _Attempt = TypeVar("_Attempt", bound=Attempt)
 # Times that a deferred request is sent in all; longest wait that the device may ask for, s.
 _TRIES: Final = 6
 _LONGEST_WAIT_S: Final = 10
+_SECONDS: Final = re.compile(r"\d{1,9}", re.ASCII)
 
 
 def put_off_s(attempt: Attempt) -> int | None:
@@ -172,7 +174,7 @@ def put_off_s(attempt: Attempt) -> int | None:
     if not isinstance(attempt, Exchange) or not is_busy(attempt):
         return None
     after = attempt.response.header("retry-after") or ""
-    return int(after) if after.isdecimal() and after.isascii() else None
+    return int(after) if _SECONDS.fullmatch(after) else None
 
 
 def until_taken(connection: Connection, send: Callable[[], _Attempt]) -> Iterator[_Attempt]:

@@ -38,7 +38,8 @@ TOTALS: Final = frozenset(
 )  # fmt: skip
 _HEADERS: Final = ("x-total-count", "x-total", "total-count", "x-pagination-total", "x-wp-total")
 COUNTS: Final = frozenset({"count", "itemcount", "itemscount", "recordcount", "numitems", "length"})
-_RANGE: Final = re.compile(r"\s*[A-Za-z]+\s+(?:\d+-\d+|\*)/(\d+)\s*")
+_COUNT: Final = re.compile(r"\s*(\d{1,18})\s*", re.ASCII)
+_RANGE: Final = re.compile(r"\s*[A-Za-z]+\s+(?:\d+-\d+|\*)/(\d{1,18})\s*")
 # Names that are a member's as well, and do not choose items by it: how a response is written, and texts to search for.
 _NO_FILTERS: Final = frozenset(
     {"format", "lang", "language", "locale", "unit", "units", "currency", "timezone", "tz", "fields", "view", "include",
@@ -255,8 +256,8 @@ def page_of(response: Response, operation: Operation | None = None) -> Page | No
     for part in reversed(beside):
         totals |= {key: one for key, one in part.items() if plain_name(key) in TOTALS | COUNTS and type(one) is int}
     for name in _HEADERS:
-        if (told := (response.header(name) or "").strip()).isdecimal():
-            totals[name] = int(told)
+        if told := _COUNT.fullmatch(response.header(name) or ""):
+            totals[name] = int(told[1])
     if within := _RANGE.fullmatch(response.header("content-range") or ""):
         totals["content-range"] = int(within[1])
     links = [response.header("link") or ""]

@@ -19,7 +19,7 @@ from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import Outgoing, Response
-from conformance.transport.parallel import Addressed
+from conformance.transport.parallel import BUSY, Addressed
 
 # Begins the values in a question that only one client sends.
 _MARK: Final = "roaas-client-"
@@ -52,7 +52,7 @@ class Question:
 def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Question]:
     """Send each question alone; return those with a matching response. Other requirements judge the others.
 
-    One that is answered by a crash now and then has no usual response.
+    One that is answered by a crash or a 429 now and then has no usual response.
 
     Args:
         api: the robot's REST interface.
@@ -62,17 +62,17 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
     alone = _reads(api)
     alone += [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in others]
     usual = [(item, answer.status) for item, answer in alone if not item.mismatch(answer)]
-    return [_of_status(item, status) for item, status in usual if status not in CRASHES]
+    return [_of_status(item, status) for item, status in usual if status not in CRASHES | BUSY]
 
 
 def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
     """Return why a response cannot be the one to this question; empty where it can.
 
     The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends. A crash
-    is nobody's response; robustness/no-server-error judges it.
+    is nobody's response; robustness/no-server-error judges it. Neither is that of an overloaded device.
     """
     mismatch = question.mismatch(answer)
-    if not mismatch or answer.status in CRASHES:
+    if not mismatch or answer.status in CRASHES | BUSY:
         return ""
     alone = api.client.send("GET", question.path, headers=(("Accept", question.accept),)).response
     return "" if question.mismatch(alone) and alone.status == answer.status else mismatch

@@ -11,6 +11,7 @@ from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
+from conformance.transport.parallel import BUSY
 
 #: Statuses by which a server says that it, or one behind it, failed; 503 means not now, 501 never.
 CRASHES = frozenset({500, 502, 504})
@@ -82,10 +83,10 @@ def is_taken(exchange: Exchange) -> bool:
 
 
 def usual_status(send: Callable[[], Exchange]) -> int:
-    """Return the status of a request that others are compared with: not that of a server error now and then."""
+    """Return the status of a request that others are compared with: neither a server error nor a 429 now and then."""
     for _ in range(_TRIES):
         status = send().response.status
-        if status < HTTPStatus.INTERNAL_SERVER_ERROR:
+        if status < HTTPStatus.INTERNAL_SERVER_ERROR and status not in BUSY:
             break
     return status
 

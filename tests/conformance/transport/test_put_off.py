@@ -37,3 +37,4 @@ def test_a_run_does_not_wait_for_ever():
 def test_for_how_long_a_request_is_put_off():
     assert put_off_s(_exchange(429, "7")) == 7
     assert put_off_s(_exchange(204, "7")) is None
+    assert put_off_s(_exchange(429, "9" * 5000)) is None  # more digits than int takes

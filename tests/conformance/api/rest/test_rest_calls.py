@@ -83,6 +83,7 @@ def test_an_answer_is_another_one_s_unless_the_robot_gives_it_alone_as_well(alon
     assert misplaced(api, goal, _answer(200)) == ""
     assert bool(misplaced(api, goal, _answer(404))) is misplaced_too
     assert misplaced(api, goal, _answer(500)) == ""
+    assert misplaced(api, goal, _answer(429)) == ""  # a rate limit refuses any request
 
 
 @pytest.mark.parametrize(
