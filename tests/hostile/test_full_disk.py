@@ -16,7 +16,7 @@ from small_device import small_device
 
 _MOUNTED = 'mount -t tmpfs -o size=4m none "$0" && exec "$@"'
 _CERTIFY = ("certify", "--effort", "quick", "--class", "motion")
-_LOAD = ("load", "--operation", "PUT /velocity", "--call", "PUT /velocity", "--rate=50", "--duration=3", "--warmup=0")
+_LOAD = ("load", "--operation", "PUT /velocity", "--call", "PUT /velocity", "--rate=50", "--duration=10", "--warmup=0")
 
 
 def _fill(pid: int, folder: Path) -> None:
@@ -28,8 +28,8 @@ def _fill(pid: int, folder: Path) -> None:
 
 def _forbid(pid: int, _: Path) -> None:
     """Let the process and its children write no octet to any file: EFBIG, as Python ignores SIGXFSZ."""
-    lines = ended("ps", "-A", "-o", "ppid=,pid=").stdout.splitlines()
-    for of in (pid, *(int(child) for parent, child in map(str.split, lines) if int(parent) == pid)):
+    children = (path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children"))
+    for of in (pid, *(int(child) for told in children for child in told.split())):
         resource.prlimit(of, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
 
 
