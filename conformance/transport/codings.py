@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 _GZIP: Final = frozenset({"gzip", "x-gzip"})
 # zlib's arguments for gzip data with its checksum, for zlib's data, and for the bare data that some servers send as
-# deflate (RFC 9110 8.4.1.2); octets of decoded content that are read.
-_GZIP_BITS, _DEFLATE_BITS, _LARGEST = 31, (15, -15), 1 << 25
+# deflate (RFC 9110 8.4.1.2); octets of decoded content that are read, and members, each of which copies what is left.
+_GZIP_BITS, _DEFLATE_BITS, _LARGEST, _MEMBERS = 31, (15, -15), 1 << 25, 100
 
 
 class Content(NamedTuple):
@@ -28,7 +28,8 @@ class Content(NamedTuple):
 def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Content:
     """Return the content of a response that has these octets and this Content-Encoding.
 
-    Content of another coding than gzip and deflate, of more than 32 MiB, or that is a part of one is not decoded.
+    Content of another coding than gzip and deflate, of more than 32 MiB, of 100 members, or that is a part of one is
+    not decoded.
     """
     coding = (encoding or "").strip().lower()
     coding = "" if coding == "identity" else coding
@@ -44,7 +45,9 @@ def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Conten
 def _unpacked(octets: bytes, bits: int) -> tuple[bytes | None, str]:
     """Return what was packed, or None if it is too much or none; and what is wrong with it, or an empty text."""
     left, found = octets, bytearray()
-    while left:  # several members of gzip are one content (RFC 1952 2.2)
+    for _ in range(_MEMBERS):  # several members of gzip are one content (RFC 1952 2.2)
+        if not left:
+            return bytes(found), ""
         unpacker = zlib.decompressobj(bits)
         try:
             found += unpacker.decompress(left, _LARGEST - len(found) + 1)
@@ -55,4 +58,4 @@ def _unpacked(octets: bytes, bits: int) -> tuple[bytes | None, str]:
         if not unpacker.eof:
             return None, f"{len(octets)} bytes of gzip data that end before their checksum"
         left = unpacker.unused_data
-    return bytes(found), ""
+    return None, ""
