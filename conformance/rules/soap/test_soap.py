@@ -11,7 +11,7 @@ from conformance.documents.multipart import parts_of
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
-from conformance.documents.xml import elements, local, text_of
+from conformance.documents.xml import ENVELOPE, clark, elements, local, text_of
 from conformance.rules.soap.own_state import entries, unexplained
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.scenarios.soap_changes import soap_changes
@@ -26,6 +26,7 @@ _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
 _CHILDREN_11 = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
+_LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 # A message that shows no version of SOAP may be answered by a fault of any version, or by none.
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
 # Values in an error text, which differ within one cause; names of elements and prefixes do not.
@@ -164,6 +165,8 @@ def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
             return None
         wrong = _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
         known = [one for one in entries(found) if types and types.shape(str(one.tag)) is not None]
+        if known and _code_of(found) == (ENVELOPE, "MustUnderstand"):
+            return f"{known[0].tag} in the detail, which is for errors of the Body"
         return wrong or next(filter(None, (types.invalid(one) for one in known if types)), "")
 
     return _told(trace, "a well-made fault", wrong)
@@ -177,12 +180,18 @@ def _wrong_fault_11(found: etree._Element) -> str:
             return f"no {name} without a namespace"
     if strange := [name for name in by_name if not name.startswith("{") and name not in _CHILDREN_11]:
         return f"the child {strange[0]} without a namespace, which SOAP 1.1 does not have"
-    prefix, colon, _ = text_of(by_name["faultcode"]).strip().rpartition(":")
-    return (
-        f"faultcode with the prefix {prefix!r}, which is not declared"
-        if colon and not (by_name["faultcode"].nsmap.get(prefix))
-        else ""
-    )
+    if undeclared := _undeclared(by_name["faultcode"]):
+        return undeclared
+    # Other names in SOAP's namespace are allowed: 4.4 recommends it for codes of one's own.
+    space, name = _code_of(found)
+    is_other = space == ENVELOPE and name in {"Sender", "Receiver"}
+    return f"the code {name!r}, which is one of SOAP 1.2" if is_other else ""
+
+
+def _undeclared(code: etree._Element) -> str:
+    """Return that a code's prefix is not declared, or an empty text."""
+    prefix, colon, _ = text_of(code).strip().rpartition(":")
+    return f"a code with the prefix {prefix!r}, which is not declared" if colon and not code.nsmap.get(prefix) else ""
 
 
 def _code_of(found: etree._Element) -> tuple[str, str]:
@@ -201,8 +210,12 @@ def _wrong_fault_12(found: etree._Element) -> str:
     prefix, _, name = (text_of(value).strip() if value is not None else "").rpartition(":")
     if value is None or value.nsmap.get(prefix or None) != ENVELOPE_12 or name not in _CODES_12:
         return f"the code {text_of(value).strip() if value is not None else ''!r}, which SOAP 1.2 does not have"
+    if wrong := next(filter(None, map(_undeclared, found.iter(clark(ENVELOPE_12, "Value")))), ""):
+        return wrong
     texts = [one for one in elements(by_name["Reason"]) if local(str(one.tag)) == "Text"]
-    return "" if texts and text_of(texts[0]).strip() else "a Reason without Text"
+    if not texts or not text_of(texts[0]).strip():
+        return "a Reason without Text"
+    return "" if all(one.get(_LANG) for one in texts) else "a Text of Reason without xml:lang"
 
 
 @rule("soap/fault-status", on=_ON)
@@ -325,25 +338,12 @@ def no_internals(trace: Trace) -> Iterator[Outcome]:
     return _told(trace, "an error that shows nothing of the program", wrong)
 
 
-@rule("soap/written-is-read", on=(soap_changes,))
-def written_is_read(_trace: Trace) -> tuple[Outcome, ...]:
+def _played(_trace: Trace) -> tuple[Outcome, ...]:
     """Play the changes; `checkers.soap_memory` judges what is read after them."""
     return ()
 
 
-@rule("soap/refused-keeps", on=(soap_changes,))
-def refused_keeps(_trace: Trace) -> tuple[Outcome, ...]:
-    """Play the refused changes; `checkers.soap_memory` judges what is read after them."""
-    return ()
-
-
-@rule("soap/created-is-there", on=(soap_changes,))
-def created_is_there(_trace: Trace) -> tuple[Outcome, ...]:
-    """Play the creations; `checkers.soap_memory` judges the lists."""
-    return ()
-
-
-@rule("soap/deleted-is-gone", on=(soap_changes,))
-def deleted_is_gone(_trace: Trace) -> tuple[Outcome, ...]:
-    """Play the removals; `checkers.soap_memory` judges the lists."""
-    return ()
+written_is_read, refused_keeps, created_is_there, deleted_is_gone = (
+    rule(f"soap/{name}", on=(soap_changes,))(_played)
+    for name in ("written-is-read", "refused-keeps", "created-is-there", "deleted-is-gone")
+)
