@@ -138,8 +138,8 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
 @options_of(Group.DEVICE, rare=True)
 @click.option("--publishers-wsdl", metavar="URL|FILE", help="WSDL of the publishers service, which takes deliveries.")
 @click.option("--subscribers-wsdl", metavar="URL|FILE", help="WSDL of the subscribers service, which returns the pose.")
-@click.option("--publishers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
-@click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, when its WSDL does not say.")
+@click.option("--publishers-endpoint", metavar="URL", help="Address of the publishers service, if not its WSDL's.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Address of the subscribers service, if not its WSDL's.")
 @click.option("--rosbridge", metavar="URL", help="Measure this rosbridge to the robot as well.")
 @options_of(Group.MEASURED)
 @click.option(
@@ -200,10 +200,10 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
 @click.option(
     "--expect-workers", "expect", type=click.IntRange(0, 1000), default=0, help="Workers in total, on all machines."
 )
-@click.option("--master-host", default="127.0.0.1", help="Where the master listens for workers.")
-@click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Its port; 0 picks a free one.")
+@click.option("--master-host", default="127.0.0.1", help="Address on which the master listens for workers.")
+@click.option("--master-port", type=click.IntRange(0, 65535), default=0, help="Port of the master; 0 picks a free one.")
 @click.option("--web-port", type=click.IntRange(1, 65535), help="Show Locust's web UI on this port.")
-@click.option("--web-host", default="127.0.0.1", help="Where the web UI listens.")
+@click.option("--web-host", default="127.0.0.1", help="Address on which the web UI listens.")
 @options_of(Group.EFFORT)
 @click.option("--knee", is_flag=True, help="Find the highest rate of REST, SOAP and both together, by bisection.")
 @options_of(Group.EFFORT, rare=True)
@@ -219,8 +219,8 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
     "(ws://…#/odom); repeatable.",
 )
 @options_of(Group.MEASURED, rare=True)
-@click.option("--stamp-field", metavar="POINTER", help="Where a message has its time, such as /header/stamp.")
-@click.option("--clock-field", metavar="POINTER", help="Where the polled response has the robot's time, such as /now.")
+@click.option("--stamp-field", metavar="POINTER", help="Place of the time in a message, such as /header/stamp.")
+@click.option("--clock-field", metavar="POINTER", help="Place of the robot's time in the polled response: /now.")
 @options_of(Group.OUTPUT)
 @click.option("--thresholds", hidden=True, expose_value=False, callback=_levels_instead)
 @options_of(Group.CREDENTIALS)
@@ -232,8 +232,12 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
 @options_of(Group.COMPARED, rare=True)
 @click.option("--against-publishers-wsdl", metavar="URL|FILE", help="WSDL of the other robot's publishers service.")
 @click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
-@click.option("--against-publishers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
-@click.option("--against-subscribers-endpoint", metavar="URL", help="Address of that service, when no WSDL says.")
+@click.option(
+    "--against-publishers-endpoint", metavar="URL", help="Address of its publishers service, if not its WSDL's."
+)
+@click.option(
+    "--against-subscribers-endpoint", metavar="URL", help="Address of its subscribers service, if not its WSDL's."
+)
 @options_of(Group.COMPARED)
 @click.option(
     "--tolerance", callback=SHARE, default="5%", help="How much slower than the other, or the baseline, it may be."
@@ -247,7 +251,7 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
     "map.",
 )
 @options_of(Group.CALLS)
-@click.option("--allow-motion", is_flag=True, help="The robot may drive: measure deliveries too.")
+@click.option("--allow-motion", is_flag=True, help="Allow the load test to move the robot: measure deliveries too.")
 @options_of(Group.COMPARED)
 @click.option("--save", metavar="NAME", help="Store the result as a baseline of this name.")
 @click.option("--baseline", metavar="NAME", help="Compare with the latest result stored under this name.")

@@ -62,14 +62,14 @@ See whether it moves and stops as told; this moves it:
     is_flag=True,
     help="Judge a ROS 2 web gateway by its ROS map, from both ends; with --init: propose the map.",
 )
-@click.option("--ros-play", is_flag=True, help="The same, with the suite in the robot's place: no robot is needed.")
+@click.option("--ros-play", is_flag=True, help="Like --ros, but the suite plays the robot: none is needed.")
 @options_of(Group.DEVICE, rare=True)
 @click.option("--force", is_flag=True, help="With --init: overwrite STATEMENT.")
 @click.option("--rest", metavar="URL", help="Base URL of the REST interface.")
 @click.option("--publishers-wsdl", metavar="URL", help="WSDL of the publishers service, URL or file.")
 @click.option("--subscribers-wsdl", metavar="URL", help="WSDL of the subscribers service, URL or file.")
-@click.option("--publishers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
-@click.option("--subscribers-endpoint", metavar="URL", help="Address of that service, if its WSDL has another.")
+@click.option("--publishers-endpoint", metavar="URL", help="Address of the publishers service, if not its WSDL's.")
+@click.option("--subscribers-endpoint", metavar="URL", help="Address of the subscribers service, if not its WSDL's.")
 @click.option(
     "--ros-domain-id",
     type=click.IntRange(0, 232),
@@ -137,7 +137,7 @@ See whether it moves and stops as told; this moves it:
     help="Command that restarts a device that stopped responding, so that the run can go on.",
 )
 @click.option(
-    "--wait", "wait_s", type=_POSITIVE, metavar="S", help="Wait so long for a device that is lost.  [default: 20 or 60]"
+    "--wait", "wait_s", type=_POSITIVE, metavar="S", help="Wait S seconds for a lost device.  [default: 20 or 60]"
 )
 @options_of(Group.OUTPUT)
 @click.option(

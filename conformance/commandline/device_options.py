@@ -15,16 +15,16 @@ _OPTION = re.compile(r"--[a-z][a-z-]+")
 
 _DESCRIPTION = (
     options_of(Group.DEVICE, rare=True),
-    click.option("--openapi", metavar="URL|FILE", help="The device's own OpenAPI or Swagger description: go by that."),
-    click.option("--wsdl", metavar="URL|FILE", help="The device's own WSDL: go by that."),
+    click.option("--openapi", metavar="URL|FILE", help="OpenAPI or Swagger description to judge the device by."),
+    click.option("--wsdl", metavar="URL|FILE", help="WSDL to judge the device by."),
     click.option(
         "--schemas",
         type=click.Path(exists=True, file_okay=False, path_type=Path),
         metavar="FOLDER",
-        help="Folder with the schemas that the WSDL imports, where their addresses do not have them.",
+        help="Folder with the schemas that the WSDL imports, if their addresses do not work.",
     ),
     click.option("--overlay", "overlays", multiple=True, metavar="FILE", help="OpenAPI Overlay to apply; repeatable."),
-    click.option("--base-url", metavar="URL", help="Where the operations of the description are."),
+    click.option("--base-url", metavar="URL", help="Address of the description's operations."),
     click.option("--allow-files", is_flag=True, help="A description in a file may refer to files outside its folder."),
     options_of(Group.CALLS),
     click.option(
@@ -40,9 +40,7 @@ _CREDENTIALS = (
     options_of(Group.CREDENTIALS),
     click.option("--basic-file", type=_FILE, help="File with user:password for basic authentication."),
     click.option("--api-key-file", type=_FILE, help="File with the API key."),
-    click.option(
-        "--api-key", metavar="'PLACE NAME'", help="Where the API key goes: header, query or cookie, and its name."
-    ),
+    click.option("--api-key", metavar="'PLACE NAME'", help="Place and name of the API key: header, query or cookie."),
     options_of(Group.CREDENTIALS, rare=True),
     click.option("--digest-file", type=_FILE, help="File with user:password for digest authentication (RFC 7616)."),
     click.option(
@@ -53,7 +51,7 @@ _CREDENTIALS = (
         "trust_hosts",
         multiple=True,
         metavar="HOST[:PORT]",
-        help="A description may lead to this server too, with the credentials; repeatable.",
+        help="Also follow addresses on this server, and send it the credentials; repeatable.",
     ),
     click.option("--headers-file", type=_FILE, help="File with headers to send, 'Name: value' in each line."),
 )
