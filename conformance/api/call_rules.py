@@ -27,7 +27,7 @@ HARMFUL: Final = frozenset(
     }
 )  # fmt: skip
 _SEVERAL: Final = frozenset(f"{word}s" for word in HARMFUL - {"format"})
-# The id of an operation often says what its method does.
+# An operationId often names what the operation does, as in `deleteMap`: such words count as the method's own.
 _OF_METHODS: Final = {method: frozenset(words) for method, words in {
     "DELETE": ("delete", "deletes"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
 }.items()}  # fmt: skip
@@ -118,7 +118,7 @@ def is_literal(pattern: str, operation: Operation) -> bool:
 def harmful_words(operation: Operation) -> tuple[str, ...]:
     """Return the words in an operation's path, id and tags that say that it may do harm."""
     text = f"{_PARAMETER.sub(' ', operation.template)} {operation.id}"
-    # Tags name a group: of what only reads in it, nothing is to be feared.
+    # A tag names a group of operations: its words are no warning for an operation that only reads.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
     return tuple(sorted(words & (HARMFUL | _SEVERAL)))

@@ -11,7 +11,7 @@ from conformance.transport.exchange import Listener
 from conformance.verdict.evidence import Checker
 from conformance.verdict.run import Run
 
-# A RestInterface, a SoapService and a Question: their modules import this one.
+# Stands for RestInterface, SoapService and Question, whose modules import this module.
 Rest = Any
 Soap = Any
 Question = Any
@@ -26,16 +26,16 @@ class Device:
         run: the data of the run.
     """
 
-    #: Whether the device's own values are known, so that no other valid request that moves it is sent.
+    #: Whether the suite sends this device only the valid moves of the pack, and generates none.
     is_known = False
     #: pytest plugins (names of modules) with the fixtures of the pack's checks.
     fixtures: tuple[str, ...] = ()
-    #: SOAP operations whose messages may be refused at any time, because what they read may have ended.
+    #: SOAP operations that may refuse a valid message at any time, because the thing that they read may have ended.
     comes_and_goes: frozenset[str] = frozenset()
 
     #: What `--init` writes below the generic tables of a first statement.
     statement_template: str = ""
-    #: Why `--init` comments out a class although its interfaces answer, by class.
+    #: By class: why `--init` writes it as a comment although its interfaces answer.
     doubts: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, run: Run) -> None:

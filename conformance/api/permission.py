@@ -64,7 +64,7 @@ class Permission:
         """
         self._run.limit.check()
         if not self._run.contract.is_claimed:
-            # Which operation a message is for, its scenario has decided by the same rules.
+            # A SOAP message is always a POST: its scenario has decided by the same rules which operation it is for.
             posts = method == "POST" and _place(url) in self._reading
             return "" if posts else self._refused_call(method, url)
         if self._run.allow_motion:
@@ -84,10 +84,11 @@ class Permission:
         rules = CallRules.of(self._run)
         declared = matching(self._run.contract, method, path)
         if declared is None and is_normal(path) and is_normal(sent):
-            # A value with a slash in it, written as %2F: another path only for a server that decodes it and has that.
+            # A value with a slash, written as %2F, is another path only for a server that decodes it and serves that
+            # path.
             declared = matching(self._run.contract, method, sent)
         if declared is None and method in SAFE_METHODS:
-            return ""  # whatever is there, it changes nothing
+            return ""  # the request changes nothing, whatever the server serves at its path
         reason = rules.decide(declared or Operation(path, method, path))
         mapped = declared is not None and any(
             covers(call, f"{method} {path}") or covers(call, f"{method} {sent}") for call in self._run.mapped
@@ -123,7 +124,7 @@ def permitted(run: Run, client: HttpClient, methods: Iterable[str], path: str, *
         ids: the requirements that the check judges.
     """
     refusals = {method: client.refusal(method, path) for method in methods}
-    # A device that claims no contract is judged by what may be called.
+    # A device that claims no contract is judged by the operations that may be called.
     reason = next(filter(None, refusals.values()), "") if run.contract.is_claimed else ""
     for id_ in ids if reason else ():
         requirement = run.contract.ledger.get(id_)

@@ -28,29 +28,29 @@ from conformance.verdict.evidence import Case
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _MOST_OCTETS: Final = 65_536
 _MOST_THINGS: Final = 1_000
-# A device may act this much later, s.
+# A device may carry out an operation this long after its response, s.
 _SETTLES_S: Final = 3.0
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
 _DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
-#: States in which nothing goes on.
+#: States in which an activity has ended.
 FINAL: Final = _CANCELLED | _DONE
-# States in which a thing was put away. From a final state that is allowed.
+# States of a thing that was put away. A final state may change to one of them.
 _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
-#: Operations that end what goes on, or interrupt it.
+#: Operations that end or interrupt an activity.
 ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
-#: Texts of a description that name a state of another thing in which an operation is refused.
+#: Phrases in a description which say that an operation is refused while another thing is in a certain state.
 ANOTHER: Final = re.compile(r"\b(?:while|if|when) another\b[^.;]*", re.IGNORECASE)
-# Texts of a description that say that a number never decreases.
+# Phrases in a description which say that a number never decreases.
 _GROWS: Final = re.compile(
     r"\b(?:never|not) (?:falls?|decreases?|drops?|goes? (?:back|down))\b(?! (?:below|under|to))"
     r"|\bonly (?:grows?|rises?|increases?)\b",
     re.IGNORECASE,
 )
-# Texts of a description that say that a state is final, and what limits them.
+# Phrases in a description which say that a state is final, and phrases that limit this.
 _IS_FINAL: Final = re.compile(r"([^.;:]*?)\b(?:is|are) (?:final|terminal)\b", re.IGNORECASE)
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
-# Operations after which a number may start again at its beginning.
+# Operations after which a counter may start again.
 _ANEW: Final = frozenset({"reset", "clear", "restart", "reboot", "restore", "zero"})
 
 
@@ -88,19 +88,19 @@ class Changes:
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
         }
-        # States of which the description says that they are final, by the template of the thing.
+        # By the thing's path template: states that the description calls final.
         self._said_final = {
             template: said
             for template, name in self._states.items()
             if (said := _final(reads[template], name, operations))
         }
-        # States that one thing alone may be in, by the operation that leads to them; and accepted ones until a read.
+        # By operation: states that only one thing at a time may be in. Below: accepted operations since the last read.
         self._alone = {one.label: found for one in operations if "409" in one.responses and (found := _alone(one))}
         self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
-        # Members that never fall, by template; and as they were read last, by path.
+        # By path template: members that never decrease. Below, by path: their last values.
         self._growing = {one.template.rstrip("/"): names for one in reads.values() if (names := _growing(one))}
         self._grown: dict[str, tuple[dict[str, Any], float]] = {}
-        # What was there when it was read last, and the DELETE of it that was refused since then.
+        # By path: the thing as it was last read, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
 
@@ -206,7 +206,7 @@ class Changes:
                 self._known[path] = _State(now, occasion.response.received_s)
             return
         is_late = sent_s - before.at_s > _SETTLES_S
-        # What was told, and is not yet so.
+        # The state that the response announced has not come yet.
         if before.told and now != before.value and now not in FINAL and not is_late:
             return
         wrong, expected = "", f"{before.value} as {name}, as it was read before"
@@ -217,7 +217,7 @@ class Changes:
         elif before.value in FINAL and now != before.value and now not in _AWAY:
             reason = before.refused or before.by
             expected += f" and as {reason} must leave it" if reason else ""
-            # What is done may begin anew by itself, as what a timetable says.
+            # A thing that is done may start again by itself, for example by a timetable.
             wrong = now if reason or before.value in _CANCELLED or now in FINAL else ""
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
         self._known[path] = _State(now, occasion.response.received_s)

@@ -15,11 +15,12 @@ from conformance.verdict.evidence import Case
 
 _CODING, _ALLOWED = "http/content-coding", "http/accept-encoding"
 _GZIP: Final = frozenset({"gzip", "x-gzip"})
-# Resources that are remembered; equal readings without a coding that show that a resource stands still.
+# _MOST: resources that are remembered. _STEADY: equal uncompressed responses which show that a resource does not
+# change.
 _MOST, _STEADY = 200, 3
 # An element of Accept-Encoding (RFC 9110 12.4.2, 12.5.3).
 _ELEMENT: Final = re.compile(r"\s*([!#$%&'*+.^_`|~\w-]+)\s*(?:;\s*[qQ]=([01](?:\.\d{0,3})?)\s*)?", re.ASCII)
-# Contents that a cache keeps for nobody, for one client alone, or asks for anew each time.
+# Responses that a cache may not store or share, or must revalidate each time.
 _NOT_SHARED: Final = re.compile(r"no-store|no-cache|private", re.IGNORECASE)
 
 

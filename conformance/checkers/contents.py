@@ -21,13 +21,13 @@ from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
 _PART: Final = re.compile(r"bytes (\d+)-(\d+)/(\d+|\*)", re.IGNORECASE)
-# Digests in structured fields (RFC 9530 2, 3), and in the field before them (RFC 3230 4.3.2).
+# Digests as structured fields (RFC 9530 2, 3), and in the older `Digest` header (RFC 3230 4.3.2).
 _DIGEST: Final = re.compile(r"(sha-256|sha-512)\s*=\s*:?([A-Za-z0-9+/]+=*):?(?=\s*(?:,|;|$))", re.IGNORECASE)
 _HASHES: Final = {"sha-256": hashlib.sha256, "sha-512": hashlib.sha512}
-# Plain names of members that contain the digest of a file.
+# Normalised names of members that contain the digest of a file.
 _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# Contents that are remembered, and octets of each at most.
+# _MOST: contents that are remembered. _LARGEST: bytes of each.
 _MOST, _LARGEST = 200, 1 << 20
 _FILES: Final = frozenset({_OCTETS, "application/pdf", "application/zip"})
 _RANGE, _DIGESTS, _READ, _TAGS = (
@@ -37,7 +37,7 @@ _RANGE, _DIGESTS, _READ, _TAGS = (
     "description/entity-tag",
 )
 _ASKED: Final = re.compile(r"bytes=(\d*)-(\d*)")
-# Texts of a description that say that a text is kept as it was sent; without them, line ends may change.
+# Phrases in a description which say that a text is stored byte for byte; otherwise line ends may change.
 _KEEPS: Final = re.compile(
     r"\b(?:octets?|bytes?)\b[^.]*\b(?:stored|sent|uploaded|received|written)\b|\bverbatim\b|\bbyte[ -](?:for|by)[ -]",
     re.IGNORECASE,
@@ -61,11 +61,12 @@ class Contents:
 
     def __init__(self) -> None:
         self._whole: dict[_Key, bytes] = {}
-        # Parts that wait for the next reading of the whole.
+        # Partial responses that wait for the next read of the whole resource.
         self._parts: dict[_Key, list[Occasion]] = {}
-        # Files as they were sent, until something else is changed.
+        # Files as clients uploaded them, until another request changes something.
         self._sent: dict[str, Occasion] = {}
-        # Hashes of what was sent to a file or read from it, and the files that read otherwise.
+        # By file: hashes of the contents that were uploaded or read. Below: files that were once read with other
+        # contents.
         self._known: dict[str, set[int]] = {}
         self._differs: dict[str, set[bytes]] = {}
 
@@ -125,7 +126,7 @@ class Contents:
             is_kept = octets == body or (_is_free(occasion, sent) and octets.split() == body.split())
             differs = self._differs.setdefault(occasion.request.url.partition("?")[0], set())
             differs |= set() if is_kept else {octets}
-            # Once, another client may have sent another file.
+            # A single difference may come from another client's upload.
             if is_kept or len(differs) > 1:
                 expected = f"the {len(octets)} octets that {label_of(sent.operation)} has sent"
                 found, cause = f"{len(body)} octets, which differ", f"{label} octets"
@@ -138,7 +139,7 @@ class Contents:
     def _ignored(occasion: Occasion, value: str) -> Iterator[Case]:
         """Judge a part for a client whose If-Range names another content (RFC 9110 13.1.5)."""
         tag = occasion.response.header("etag") or ""
-        # A weak tag is none that a part may be asked for by.
+        # A weak entity tag is not valid in If-Range.
         if value.startswith('"') and tag.startswith(('"', "W/")) and value != tag:
             expected = f"status 200 with the whole, because If-Range does not have {tag}"
             yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
@@ -164,7 +165,7 @@ def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:
         wrong = f"{len(answer.body)} octets that are not those of Content-Range: {found[0]}"
     asked = [value.strip() for name, value in occasion.request.headers if name.lower() == "range"]
     if len(asked) == 1 and (bounds := _ASKED.fullmatch(asked[0])) and any(bounds.groups()):
-        # A part of what is asked for may be sent, and more than that, but nothing that is all outside it.
+        # The server may send a part of the requested range, or more, but nothing entirely outside of it.
         length = int(bounds[2] or 0)
         start, end = (int(bounds[1]), length if bounds[2] else last) if bounds[1] else (len(whole) - length, len(whole))
         if not wrong and (last < start or first > end):

@@ -19,13 +19,14 @@ from conformance.documents.representation import UnreadableError, flat, read
 from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing, likeness
 
-# Statuses that RFC 9110 and RFC 6585 allow for any request: authentication and rate. Another requirement judges 5xx.
+# Statuses that any request may get by RFC 9110 and RFC 6585: authentication and rate limit. 5xx is judged elsewhere.
 _ANY_REQUEST = frozenset({401, 429})
-# Statuses allowed for a request that has more in it than method, path and Accept.
+# Statuses that a request with more than method, path and Accept may get.
 _ODD_REQUEST = frozenset({400, 408, 411, 413, 414, 415, 417, 431})
 # Bodies larger than this are not kept for comparison, octets.
 _LARGE = 1 << 14
-# Responses of an operation that are searched for writeOnly members; items of a list in them; depth of the search.
+# _JUDGED: responses of an operation that are searched for writeOnly members. _ITEMS: items of each list. _DEEPEST:
+# depth.
 _JUDGED, _ITEMS, _DEEPEST = 40, 20, 5
 _OK, _NO_CONTENT, _ERROR, _NOT_FOUND, _NO_METHOD, _NOT_ACCEPTABLE, _SERVER_ERROR = 200, 204, 400, 404, 405, 406, 500
 
@@ -91,7 +92,7 @@ def _status_fits(occasion: Occasion, operation: Operation) -> bool:
         return False
     if status in _ODD_REQUEST:
         return True
-    # Invalid input may be refused with any 4xx (contract, fine print); 404 only where a value is in the path.
+    # A device may refuse invalid input with any 4xx (contract, fine print), with 404 only if a value is in the path.
     has_input = bool(occasion.request.body or operation.parameters or operation.bodies)
     elsewhere = status == _NO_METHOD or (status == _NOT_FOUND and not operation.parameter("path"))
     refused = has_input and _ERROR <= status < _SERVER_ERROR and not elsewhere
@@ -106,11 +107,11 @@ def body(occasion: Occasion) -> Iterator[Case]:
         return
     media_type = answer.media_type
     if not answer.body:
-        # Only GET must return a body: the response to a PUT need not repeat what it accepted.
+        # Only a GET must return content: the response to a PUT need not repeat the request body.
         if operation.method == "GET" and answer.status != _NO_CONTENT:
             yield occasion.case("http/declared-body", False, f"a body as {' or '.join(content)}", "no body")  # noqa: FBT003
         elif media_type in content and answer.status != _NO_CONTENT:
-            # It says that there is a document, and a client that asked for one reads it.
+            # The response says that it contains a document, and clients will read it.
             yield from _shape(occasion, operation, content[media_type])
         return
     yield occasion.case(
@@ -139,7 +140,7 @@ def _shape(occasion: Occasion, operation: Operation, schema: Schema) -> Iterator
     try:
         fault = judge(shape_of(schema), media_type, body)
     except PatternError:
-        return  # other checks tell that the schema cannot be judged
+        return  # another requirement says that the schema cannot be used
     cause = f"{operation.id} {kind} {fault.split(':', 1)[0]}"
     yield occasion.case(id_, not fault, f"{kind} that is valid by the schema of {operation.id}", fault, cause=cause)
 
@@ -205,7 +206,7 @@ def negotiation(occasion: Occasion) -> Iterator[Case]:
     if operation is None or operation.method != "GET" or not answer.ok or not operation.formats:
         return
     if answer.media_type and context.usual:
-        # A format that q=0 rules out breaks another rule than a format that Accept does not name.
+        # A format excluded by q=0 breaks another rule than a format that Accept does not mention.
         ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
         yield occasion.case(
             "http/q-zero" if ruled_out else "http/not-acceptable",
@@ -214,7 +215,7 @@ def negotiation(occasion: Occasion) -> Iterator[Case]:
             f"status {answer.status} with {answer.media_type}",
             cause="not acceptable",
         )
-    # Of formats that may be there for other values, the response to Accept shows that the device chooses.
+    # If an operation may have other formats for other values, only a response to Accept shows that the device chooses.
     is_chosen = answer.media_type == (context.accept or "") != operation.formats[0]
     if len(operation.formats) > 1 and (is_chosen or are_data(operation.formats)) and not context.is_head:
         vary = (answer.header("vary") or "").lower()

@@ -22,7 +22,7 @@ _CONDITIONS: Final = frozenset(
 _TAGS, _MATCH, _REQUIRED = "description/entity-tag", "description/if-match", "description/required"
 # Conditions beside If-Match for which a request may also be refused with 412 (RFC 9110 13.2.2).
 _OTHERS: Final = frozenset({"if-none-match", "if-modified-since", "if-unmodified-since"})
-# Tags that are remembered, and bytes of the content of each at most.
+# _MOST: entity tags that are remembered. _LARGEST: bytes of the content of each.
 _MOST, _LARGEST = 4000, 65_536
 
 
@@ -60,15 +60,15 @@ class EntityTags:
         self._asked: dict[str, Fields] = {}
         self._wrote: dict[str, Occasion] = {}
         self._waiting: dict[str, _Condition] = {}
-        # Whether the device has answered 304 and 412, and what is judged once it has.
+        # Whether the device has ever answered 304 and 412. Below: cases that count only once it has.
         self._has_304 = self._has_412 = False
-        # How often a current tag was refused while the content stayed what it was.
+        # How often the device refused a current tag while the content stayed the same.
         self._refused = 0
         self._ignored: list[Case] = []
         self._performed: list[Case] = []
-        # By URL: what was read before the last write that was accepted by its tag, and what that wrote.
+        # By URL: the response before the last conditional write that was accepted, and the body of that write.
         self._spent: dict[str, tuple[Response, bytes]] = {}
-        # A 304 for a copy that is not the current one, with the tag that was current: the next read decides.
+        # 304 responses for an outdated copy, with the then current tag: the next read decides.
         self._stale: dict[str, tuple[Occasion, str]] = {}
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -92,7 +92,7 @@ class EntityTags:
     def _read(self, occasion: Occasion) -> Iterator[Case]:
         """Compare a content with the earlier content of the same tag, and with the one before the last write."""
         url, answer = occasion.request.url, occasion.response
-        # A content with a coding has a tag of its own.
+        # Compressed content has an entity tag of its own.
         wrote = self._wrote.pop(url, None) if not answer.header("content-encoding") else None
         waiting = self._waiting.pop(url, None)
         if answer.status == HTTPStatus.OK and url in self._stale:
@@ -103,7 +103,7 @@ class EntityTags:
                 yield stale.case(_TAGS, False, expected, cause=f"{label_of(stale.operation)} stale")  # noqa: FBT003
         if waiting is not None:
             yield from _effect(waiting, answer)
-            # Once, another client may have written the same.
+            # A single difference may come from another client's write.
             is_lost = waiting.matches and waiting.refused and waiting.before.body == answer.body
             self._refused += is_lost
             if is_lost and self._refused > 1 and waiting.tag != answer.header("etag"):
@@ -132,7 +132,7 @@ class EntityTags:
         """Judge a read by a client that has a copy: if it is current, it gets 304."""
         answer, label = occasion.response, label_of(occasion.operation)
         tags = {one.removeprefix("W/") for one in _TAG.findall(asked["if-none-match"])}
-        # Where * asks, any content is one that is there; no client has a copy of that name, so 200 is no finding.
+        # `If-None-Match: *` matches any content; no client has a copy with that tag, so 200 is no finding.
         is_any = asked["if-none-match"].strip() == "*"
         expected = "status 304, because If-None-Match has the current entity tag"
         if answer.status == HTTPStatus.NOT_MODIFIED:
@@ -173,7 +173,7 @@ class EntityTags:
         self._wrote.pop(url, None)
         self._waiting.pop(url, None)
         if not is_refused:
-            # An action may change anything.
+            # A POST may change any resource.
             self._now.clear()
             self._wrote.clear()
             self._waiting.clear()
@@ -190,7 +190,7 @@ class EntityTags:
             return
         tag = now.header("etag") or ""
         named = _TAG.findall(wanted)
-        # Strong tags are compared strongly; a device that has weak ones alone may take them back.
+        # If-Match compares strongly, but a device with only weak tags may accept its own.
         weakly = tag.startswith("W/") and tag[2:] in {one.removeprefix("W/") for one in named}
         matches = tag in named or weakly
         if is_refused:
@@ -203,7 +203,7 @@ class EntityTags:
         elif answer.ok and answer.status != HTTPStatus.ACCEPTED and not matches:
             label = label_of(occasion.operation)
             case = occasion.case(_MATCH, False, _refusal(tag), cause=f"{label} performed")  # noqa: FBT003
-            # Without the field, 412 may mean the state of the device.
+            # Without a conditional header, 412 may be about the device's state.
             if self._has_412 or _declares(occasion.operation, with_status=not tag.startswith("W/")):
                 yield case
             else:
@@ -270,7 +270,7 @@ def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
     occasion, label = waiting.occasion, label_of(waiting.occasion.operation)
     status = occasion.response.status
     if waiting.matches:
-        # A weak tag never matches here (RFC 9110 13.1.1).
+        # A weak tag never matches in If-Match (RFC 9110 13.1.1).
         is_sure = after.header("etag") == waiting.tag and not waiting.tag.startswith("W/")
         if is_sure and status == HTTPStatus.PRECONDITION_FAILED:
             expected = f"another status than 412, because {waiting.tag} was current before and after"
@@ -329,14 +329,14 @@ class Conditional:
     """Judges responses to conditions, by the entity tags and dates that the run has seen."""
 
     def __init__(self) -> None:
-        # By URL: the entity tags that were sent, and whether a time of change was.
+        # By URL: entity tags that the device sent. Below: whether it sent Last-Modified.
         self._tags: dict[str, set[str]] = {}
         self._dated: set[str] = set()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
         url, answer = occasion.request.url, occasion.response
-        # What comes with 304 may be what the client itself has sent.
+        # The headers of a 304 may repeat what the client sent.
         if answer.status != HTTPStatus.NOT_MODIFIED:
             self._tags.setdefault(url, set()).update(_OPAQUE.findall(answer.header("etag") or ""))
             if answer.header("last-modified") is not None:
@@ -354,7 +354,7 @@ class Conditional:
             has_sent = not self._tags.get(occasion.request.url, set()).isdisjoint(tags)
             yield occasion.case(id_, has_sent or not is_unchanged, expected)
         elif "if-modified-since" in asked and "if-none-match" not in asked:
-            # Where a robot says when something was changed, by whatever clock, that may have been longer ago.
+            # If the device sends Last-Modified, the resource may not have changed since, by whichever clock.
             expected = "another status than 304 when the resource has no Last-Modified"
             yield occasion.case(id_, not is_unchanged or occasion.request.url in self._dated, expected)
         elif is_unchanged and "if-none-match" not in asked:
@@ -364,7 +364,7 @@ class Conditional:
 def _range(occasion: Occasion, asked: dict[str, str]) -> Case:
     """Judge a request for a part: the response is the whole, or 206 with its Content-Range."""
     answer = occasion.response
-    # A server may send less than was asked for, or more, and then says so (RFC 9110 15.3.7).
+    # A server may send a smaller or larger range than requested, and then says so (RFC 9110 15.3.7).
     part = _PART.match(answer.header("content-range") or "")
     fits = part is not None and len(answer.body) == int(part["last"]) - int(part["first"]) + 1
     fits |= occasion.context.is_head or answer.media_type == "multipart/byteranges"

@@ -14,16 +14,16 @@ from conformance.transport.exchange import Response
 from conformance.verdict.evidence import Case
 
 WELL_FRAMED: Final = "well-framed HTTP"
-# Fields that clients act on, and that several values make meaningless (RFC 9110 5.3).
+# Headers that clients act on, and that several values make meaningless (RFC 9110 5.3).
 _SINGLE = ("Content-Type", "Location", "Retry-After")
-# Fields that contain one time and nothing else, in lower case, and the grammar of that time (RFC 9110 5.6.7).
+# _TIMES: headers that contain one time and nothing else. _IMF_FIXDATE: grammar of that time (RFC 9110 5.6.7).
 _TIMES = frozenset({"date", "last-modified"})
 _IMF_FIXDATE = re.compile(
     r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun), \d{2} (?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec) \d{4} "
     r"\d{2}:\d{2}:\d{2} GMT",
     re.ASCII,
 )
-# Statuses by which a web server itself refuses a request, unless the API's author declares them.
+# Statuses by which a web server refuses a request before the application sees it, unless the description declares them.
 _OF_PARSERS = frozenset({400, 413, 414, 431})
 # Last-Modified may be later than Date by this, s: a proxy may set Date, and servers write the same Date for a second.
 _SKEW_S: Final = 60.0
@@ -96,7 +96,7 @@ def _is_date(value: str | None) -> bool:
         return False
 
 
-# Methods that a server in front may refuse itself, without asking the resource.
+# Methods that a proxy or web server may refuse without asking the resource.
 _OF_SERVERS = frozenset({"TRACE", "CONNECT"})
 _ALWAYS_ALLOWED = frozenset({"HEAD", "OPTIONS", "TRACE"})
 

@@ -16,11 +16,12 @@ from conformance.documents.openapi import SAFE, Operation, is_json, operations_o
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
-# Plain names of identifiers that belong to one thing alone.
+# Normalised names of members that identify one thing.
 _IDS: Final = frozenset({"id", "uuid", "guid"})
 # Identifiers of a run that are remembered.
 _REMEMBERED: Final = 50_000
-# Statuses that refuse a creation with a taken value; refused bodies that are remembered, and octets of each.
+# _TAKEN: statuses that refuse a creation with a value in use. _FEW: refused bodies that are remembered. Below: bytes of
+# each.
 _TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
 _FEW: Final = 8
 _OCTETS: Final = 16_384
@@ -34,7 +35,7 @@ class Identities:
     """
 
     def __init__(self) -> None:
-        # By the path of a collection: the identifiers in its list, and those whose path has led to their own item.
+        # By collection: identifiers in its list. Below: identifiers under which their own item was read.
         self._listed: dict[str, set[str]] = defaultdict(set)
         self._own: dict[str, set[str]] = defaultdict(set)
         self._items: dict[str, Operation] | None = None
@@ -53,7 +54,7 @@ class Identities:
         above, _, last = path.rpartition("/")
         id_ = unquote(last).casefold()
         if method != "GET":
-            # It may be renamed, or become another one.
+            # The thing may have been renamed.
             self._own[above].discard(id_)
         if method != "GET" or answer.cut or not is_json(answer.media_type):
             return
@@ -93,15 +94,15 @@ class Uniques:
     """
 
     def __init__(self) -> None:
-        # By the path of a collection: values that creations had, bodies that were refused, and members that are unique.
+        # By collection: values of created things; below, refused bodies, and members whose values are unique.
         self._made: dict[str, set[tuple[str, str]]] = defaultdict(set)
         self._refused: dict[str, list[dict[str, Any]]] = defaultdict(list)
         self._unique: dict[str, set[str]] = defaultdict(set)
-        # Members of which two creations had the same value before that was seen.
+        # By collection: members that had the same value in two created things.
         self._shared: dict[str, set[str]] = defaultdict(set)
-        # The last bodies by which things were created.
+        # By collection: the last bodies of created things.
         self._bodies: dict[str, list[dict[str, Any]]] = defaultdict(list)
-        # Members of things by collection and identifier, as they were read since one of them was changed.
+        # By collection and identifier: members as they were read since the last change.
         self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -110,7 +111,7 @@ class Uniques:
         if operation is None or occasion.request.raw is not None:
             return
         if method in {"PUT", "PATCH", "DELETE"} and answer.ok:
-            # What was refused may have been so for want of room.
+            # The refused creations may have been refused because the device was full.
             self._refused.clear()
         path = occasion.context.target.partition("?")[0].rstrip("/")
         above, _, last = path.rpartition("/")

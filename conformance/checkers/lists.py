@@ -19,14 +19,14 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.verdict.evidence import Case
 
-# Values of items that are remembered; values of filters that are remembered; items that are compared.
+# _REMEMBERED: values of items that are remembered. _ASKED: values of filters. Below: items of a list that are compared.
 _REMEMBERED: Final = 50_000
 _ASKED: Final = 1000
 _COMPARED: Final = 60
-# Kinds of items that one order may have: items of one kind may come before those of another.
+# Kinds of items that a sorted list may have: all items of one kind may come before those of another.
 _KINDS: Final = 2
-#: Parameters that ask for their value or more, as logs are filtered; below them, parameters that ask for further items,
-#: and not for these alone, where their value is true.
+#: LEVELS: parameters that ask for a level or higher, as log filters do. _INCLUDING: boolean parameters that ask for
+#: further items when true.
 LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
@@ -40,15 +40,16 @@ class Lists:
 
     def __init__(self) -> None:
         self._seen: set[int] = set()
-        # By operation, parameter and value: the other values that items had when this one was asked for.
+        # By operation, parameter and requested value: other values that the items in the response had.
         self._others: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self._totals = Totals()
-        # By operation and other parameters: the most items so far; and by their number, lists that a limit did not cut.
+        # By operation and other parameters: the greatest number of items so far. Below: numbers of items of lists that
+        # no limit cut.
         self._longest: dict[object, int] = defaultdict(int)
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
-        # Lists that had fewer items than the default, although there are more: number of items, total, case.
+        # Lists that had fewer items than the default page size although more exist: number of items, total, case.
         self._short: dict[object, tuple[int, int, Case]] = {}
-        # How many items there were by each value of a parameter that bounds a member.
+        # How many items a list had, by each value of a parameter that bounds a member.
         self._counts: dict[tuple[str, str], dict[float, int]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -175,7 +176,8 @@ class Lists:
                 ranks = [choices.index(one) - choices.index(asked[0]) for one in others if one in choices]
                 return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
             return others[:1] if values else None
-        # What a text or number chooses shows only in pairs: one with the other's items, and the other with this one's.
+        # A filter for a part of a text can only be judged in pairs: it is broken if the list for A has an item of B,
+        # and the list for B one of A.
         found = self._others[listing.operation.label, name]
         if len(asked) != 1 or not values or len(found) > _ASKED:
             return None
@@ -198,7 +200,7 @@ class Lists:
                 return
             descending = str(given).lower().startswith("desc") if given else descending
         if "enum" in schema or schema.get("format") == "duration":
-            return  # these may be sorted by what they mean
+            return  # such values may be sorted by meaning
         values = list(self._known(listing, page, sorting.member))[:_COMPARED]
         pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
         up, down = ([(one, other) for one, other, said in pairs if said is way] for way in (True, False))
@@ -249,7 +251,7 @@ def _holds(value: Any, asked: list[str]) -> bool:
     return any(isinstance(one, dict | list) or text_of(one).casefold() in wanted for one in own)
 
 
-# Texts whose order may follow their meaning: numbers with units, durations, addresses, levels, days and months.
+# Texts that may be sorted by meaning: numbers with units, durations, addresses, levels, days and months.
 _MEANING: Final = re.compile(
     r"[\d+\-.].*|P[\dT].*|(?:off|none|low|minor|medium|moderate|high|major|severe|critical|urgent|fatal|emergency|trace"
     r"|debug|info|notice|warn|warning|error|alert|ok|good|bad|small|large|[sml]|x+[sl]"

@@ -38,21 +38,24 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
 from conformance.verdict.evidence import Case
 
-# A device may write this much later, s.
+# A device may store a change this long after its response, s.
 _SETTLES_S: Final = 3.0
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _REFUSED: Final = range(400, 500)
-# Times that a difference must be seen before it counts: other clients, or several processes, may cause one.
+# _SEEN: how often a difference must appear before it counts, because other clients or several server processes may
+# cause one.
 _SEEN: Final = 2
 _MOST_PENDING: Final = 20
 _MOST_THINGS: Final = 1_000
-# Bodies larger than this are not remembered, octets; characters of a value that are shown.
+# _MOST_OCTETS: larger bodies are not remembered. _SHOWN: characters of a value in a message.
 _MOST_OCTETS: Final = 65_536
 _SHOWN: Final = 200
-# Members that no change of a thing changes; the fewest characters of an identifier that no two devices share by chance.
+# _FOR_EVER: members that no change of a thing changes. _TELLING: least length of an identifier that two devices do not
+# share by chance.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
-# Texts of a description that say that an identifier is used once, and that something outlives a thing.
+# Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
+# another.
 _NEVER_AGAIN: Final = re.compile(
     r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)"
     r"|\bid(?:entifier)?\b[^.]*\b(?:higher|greater|larger) than\b[^.]*\b(?:had|ever|deleted)\b",
@@ -121,7 +124,7 @@ class Memory:
         reads = [one for one in operations if one.method == "GET" and not one.parameter("query")]
         self._items = {one.template.rstrip("/"): one for one in reads if collection_of(one.template)}
         self._of_collections = {collection_of(template): one for template, one in self._items.items()}
-        # What is below one thing, and can be there or not.
+        # Templates of things below another thing that may exist or not.
         self._items |= {
             one.template: one
             for one in reads
@@ -135,7 +138,7 @@ class Memory:
         self._collections = collections_of(operations)
         self._things: dict[str, _Thing] = {}
         self._own = {template: _read_only(one) for template, one in self._items.items()}
-        # The members of things as they were read last, by path, with what clients sent since for those of the device.
+        # By path: members of things at the last read, with what clients sent since.
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         # Other values than the declared default in the responses to creations, by operation and member.
         self._undefaulted: dict[tuple[str, str], Any] = {}

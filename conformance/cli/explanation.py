@@ -17,7 +17,7 @@ EFFORTS = (
     "At each effort, unless a check says otherwise. Quick tries about a tenth of the cases that standard generates, "
     "and every other value of those that a check lists. Deep generates as many cases as --minutes allows."
 )
-#: What a run must have for a requirement, in words.
+#: By prerequisite: what a run needs to judge the requirement, in words.
 NEEDS = {
     Prerequisite.MOTION: "permission to move the device (--allow-motion)",
     Prerequisite.OBSERVER: "a view of what requests cause: a ROS probe (--ros-domain-id), or the device's own list",

@@ -116,7 +116,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
             place, requirements = (folder, pack), {id_ for id_, _ in chosen}
             allowed = {"allow_motion": allow_motion, "minutes": minutes}
             return _judge_again(document, place, statement_file, given, requirements, allowed)
-        # The contract at hand judges what was judged by it.
+        # Judge by the contract at hand if the result was judged by it.
         contract = contract_of(document, pack, folder)
         rest = document["target"].get("rest") if contract else None
         sure = [allow_motion or not moves(failure, contract, rest or "") for _, failure in chosen]
@@ -194,7 +194,7 @@ def _judge_again(
     except (StatementError, ContractError, DescriptionError, OSError) as error:
         raise click.UsageError(str(error)) from error
     click.secho(warning(judged), fg="red", nl=False)
-    # Where the time was over, what was seen until then may be too little.
+    # If the time of --minutes ended, too few requests may have been sent.
     cut = {item["id"] for item in judged["requirements"] if "the time of --minutes" in item["reason"]}
     for item in judged["requirements"]:
         is_cut = item["verdict"] == "pass" and item["id"] in cut

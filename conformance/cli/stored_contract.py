@@ -24,7 +24,7 @@ def contract_of(document: dict[str, Any], pack: str | None, folder: Path) -> Con
 
     described, named = folder / FOLDER, pack or str(document.get("pack", {}).get("name", DEFAULT_PACK))
     try:
-        # The result of a run that was killed does not say what its API is.
+        # The result of a run that was killed does not name its description.
         if pack is None and ("api" in document or (described / "pack.toml").exists()):
             copy = click.get_current_context().with_resource(tempfile.TemporaryDirectory())
             named = str(copy_as_data(described, Path(copy), lambda found: without_unreadable(found)[0]))

@@ -25,10 +25,10 @@ _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-c
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 2000
 _SHOWN_BLOCKED = 5
-# Findings of one requirement that are printed in full; each further one takes a line. Characters of that line.
+# _IN_FULL: findings of one requirement that are printed in full; each further one gets a line of _LINE characters.
 _IN_FULL = 5
 _LINE = 160
-# Column of a class's reason; that column on narrow terminals; columns from which a terminal is wide.
+# _REASON: column of a class's reason. _NARROW: that column on a narrow terminal. _WIDE: columns of a wide terminal.
 _REASON, _NARROW, _WIDE = 46, 4, 100
 
 
@@ -46,7 +46,7 @@ def print_summary(outcome: Certification) -> None:
         reason = document["class_reasons"].get(name, "")
         view = " (black box)" if document["class_views"].get(name) == "black box" else ""
         mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
-        # A narrow terminal has the reason on lines of its own.
+        # On a narrow terminal the reason gets lines of its own.
         below = (columns() or _WIDE) < _WIDE and reason
         told = wrapped(inert(reason[:300]), " " * (_NARROW if below else _REASON))
         click.echo(
@@ -75,7 +75,7 @@ def print_summary(outcome: Certification) -> None:
     not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     counts[not_claimed] = counts.pop("not-claimed", 0)
-    # In the order, and by the words, of the bar and the pages.
+    # In the order of the pages, and with their words.
     order = ("fail", "error", "warn", "skip", "pass", not_claimed)
     told = ", ".join(f"{counts[value]} {value}" for value in order if counts[value])
     if "api" in document:

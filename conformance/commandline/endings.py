@@ -14,7 +14,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final
 
-#: Environment variable with the process that a command belongs to: the command ends with it.
+#: PARENT_VARIABLE: environment variable with the id of the process with which the command has to end. _OFTEN_S: how
+#: often that is checked, s.
 PARENT_VARIABLE: Final = "ROAAS_PARENT"
 _OFTEN_S: Final = 0.2
 _ALWAYS: Final = ("SIGINT", "SIGTERM")
@@ -64,7 +65,7 @@ def end_with_parent() -> None:
         while os.getppid() == parent:
             _parent_ended.wait(_OFTEN_S)
         _parent_ended.set()
-        # To the main thread: its system call returns at once.
+        # Send it to the main thread, so that its system call returns at once.
         signal.pthread_kill(main or 0, signal.SIGTERM)
 
     threading.Thread(target=follow, name="follows the parent", daemon=True).start()

@@ -15,7 +15,7 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
-#: By a result's overall verdict.
+#: By the verdict of a result.
 OF_VERDICT: Final = {
     "conformant": ExitCode.PASSED,
     "not-conformant": ExitCode.FAILED,

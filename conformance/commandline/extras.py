@@ -6,7 +6,7 @@ from typing import Final
 
 _ROS: Final = "rclpy"
 _SOAP: Final = ("zeep", "xmlschema")
-#: The modules that an extra of pyproject.toml brings, by their import names. `roaas robot` names its own.
+#: By extra of pyproject.toml: the modules that it installs. `roaas robot` names its own.
 EXTRAS: Final = {
     "soap": _SOAP,
     "load": (*("locust", "hdrh", "matplotlib", "numpy", "httptools", "scipy", "websockets"), *_SOAP),

@@ -7,11 +7,11 @@ import zlib
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-#: Octets of a result file; nodes of its JSON, estimated by its commas and brackets.
+#: MOST: bytes of a result file. _MOST_NODES: values of its JSON, estimated by commas and brackets.
 MOST: Final = 64 * 1024 * 1024
 _MOST_NODES: Final = 5_000_000
 _PIECE: Final = 1024 * 1024
-# A pipe without a writer must not block.
+# Flags for opening: reading a pipe without a writer must not block.
 _FLAGS: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -23,11 +23,11 @@ def read_octets(path: Path, most: int = MOST) -> bytes:
     """
     try:
         outside = not path.resolve().is_relative_to(path.parent.resolve())
-    except RuntimeError as error:  # links in a circle
+    except RuntimeError as error:  # symbolic links in a circle
         raise OSError(str(error)) from error
     if outside:
         raise OSError(f"it is a link to a file outside {path.parent}")
-    # An opener, as a descriptor of its own stays open where it is no file that can be read.
+    # An opener, because a descriptor opened before would leak if the path is no readable file.
     with open(path, "rb", opener=lambda name, _: os.open(name, _FLAGS)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError("it is no regular file")

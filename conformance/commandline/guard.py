@@ -12,7 +12,7 @@ import click
 
 try:
     import resource
-except ImportError:  # no POSIX system
+except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
 from conformance.commandline.exit_codes import ExitCode
@@ -20,12 +20,12 @@ from conformance.commandline.help_pages import inert
 from conformance.commandline.secrecy import SECRETS
 
 _SHOWN = 300
-# Messages of Python and its module loader where a process's memory is limited, beside MemoryError.
+# Messages of Python and its module loader when memory is exhausted, in other exceptions than MemoryError.
 _NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread", "out of memory")
-# Address space that each command needs, MB. With less, libraries end the process in the middle of a run, with exit code
-# 1 or an abort, and not with MemoryError.
+# Address space that each command needs, MB. With less, libraries may end the process with exit code 1 or an abort
+# instead of MemoryError.
 _LEAST_MB = {"certify": 400, "replay": 400, "judge": 400, "explain": 120, "load": 1_200}
-# Memory that is freed when there is no more, so that the error can be reported.
+# Memory to free when none is left, so that the error can be reported.
 _RESERVE = bytearray(1 << 20)
 
 
@@ -71,7 +71,7 @@ def make_streams_lenient() -> None:
 def _lenient(stream: TextIO | None, own: TextIO | None) -> TextIO:
     """Return a stream that never fails; one that a test or a program put in place of the process's stays."""
     if stream is None:
-        # It was closed before the process began; a socket would take its number otherwise.
+        # The stream was closed before the process began; without this, a socket would get its number.
         return Path(os.devnull).open("w", encoding="utf-8")
     if stream is not own:
         return stream

@@ -13,7 +13,7 @@ import click
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 _PLACE, _EVERYTHING = "roaas_place", "roaas.help_all"
-#: The statement that is used where a command names no device.
+#: Statement that is used if the command line names no device.
 USUAL_STATEMENT: Final = Path("roaas.toml")
 
 
@@ -45,7 +45,7 @@ def options_of(group: Group, *, rare: bool = False) -> Callable[[_Command], _Com
     """
 
     def mark(command: _Command) -> _Command:
-        # Decorators run from the last to the first: what has no group yet stands between this one and the next.
+        # Decorators run from last to first: an option without a group gets the group of the decorator above it.
         for parameter in getattr(command, "__click_params__", ()):
             vars(parameter).setdefault(_PLACE, _Place(group, rare))
         return command
@@ -111,8 +111,8 @@ def _show_everything(ctx: click.Context, _: click.Parameter, given: bool) -> Non
 
 
 _NARROWEST, _WIDEST = 60, 200
-# What CI systems run as commands when a job prints it: GitHub's at the beginning of a line, and Azure's, TeamCity's and
-# GitHub's older ones anywhere.
+# Texts that CI systems execute when a job prints them: GitHub's `::` at the start of a line, and `##[` and `##vso[` of
+# Azure, TeamCity and older GitHub anywhere.
 _COMMAND = re.compile(r"^(?=\s*::)|(?<=#)#(?=\w*\[)")
 
 

@@ -17,7 +17,8 @@ from typing import Any, Final
 from conformance.commandline.secrecy import SECRETS
 
 LOCK_NAME: Final = ".roaas.lock"
-# A result has some hundred kilobytes: if this many octets cannot be written, it cannot either.
+# _ROOM: a result has some hundred kilobytes; if these bytes cannot be written, it cannot either. _MOST: files that are
+# removed.
 _ROOM: Final = bytes(1 << 18)
 _MOST: Final = 1000
 
@@ -93,7 +94,7 @@ def _locked(path: Path) -> int:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), path.stat()):
                 break
-        os.close(descriptor)  # the run before ended, and removed its file, in between
+        os.close(descriptor)  # in between, the earlier run ended and removed its file
     os.ftruncate(descriptor, 0)
     owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": f"{dt.datetime.now(dt.UTC):%Y-%m-%dT%H:%M:%SZ}"}
     os.write(descriptor, json.dumps(owner).encode())
@@ -109,7 +110,7 @@ def _owner(descriptor: int) -> str:
         return f"its file {LOCK_NAME} does not say which"
 
 
-#: The folders of an absolute path, wherever in a word it begins; addresses such as http://host/path are none.
+#: Folders of an absolute path, anywhere in a word; addresses such as http://host/path do not match.
 _FOLDERS = re.compile(r"(?<![\w:/.~-])(?:file://)?~?/(?:[^\s/]+/)*")
 
 

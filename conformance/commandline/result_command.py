@@ -57,11 +57,11 @@ class ResultCommand(GroupedCommand):
                     if result.tell:
                         click.echo(f"report: {path}")
             except ModuleNotFoundError:
-                raise  # the front door names the extra that brings it
+                raise  # roaas.py says which extra installs the module
             except Exception as error:  # noqa: BLE001 - the verdict stands without its pages, also where memory ends
                 own = error.format_message() if isinstance(error, click.ClickException) else ""
                 said = own or inert(str(error)) or type(error).__name__
                 click.echo(f"the pages could not be written or signed: {said}. {result.file} is kept", err=True)
                 if result.notary is not None and result.exit_code == ExitCode.PASSED:
-                    ctx.exit(ExitCode.INCONCLUSIVE)  # a signature was asked for, and there is none
+                    ctx.exit(ExitCode.INCONCLUSIVE)  # --sign was given, but nothing could be signed
         ctx.exit(result.exit_code)

@@ -24,21 +24,22 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
 
-# Fewest characters of a secret that is masked, and of one that is a word or number: shorter ones occur by chance.
+# Shortest secret that is masked, and shortest one that is a word or number: shorter ones occur by chance.
 _SHORTEST: Final = 5
 _SHORTEST_WORD: Final = 8
 _MOST_KNOWN: Final = 100
 _REMEMBERED: Final = 1000
 _MOST_REMEMBERED: Final = 4096
-# Fewest characters of a secret's beginning that is masked where the text is cut; fewest characters of such a secret.
+# _BEGINNING: where a text is cut, so many first characters of a secret are masked. _LONG: only of secrets of this
+# length.
 _BEGINNING: Final = 8
 _LONG: Final = 12
 _CUT: Final = re.compile(r"\Z|[\s\"'`<\\]")
-# Fewest and most characters that are recognized before an ellipsis.
+# _SHORTEST_CUT: fewest characters of a secret before an ellipsis that are recognised.
 _ELLIPSIS: Final = re.compile(r"…+|\.{3,}")
 _SHORTEST_CUT: Final = 4
 _LONGEST_CUT: Final = 256
-# An escape may itself be escaped: text is searched this deep.
+# Escapes may be nested: they are undone so many times.
 _DEPTH: Final = 4
 _ESCAPE: Final = re.compile(
     r"%(?:25){0,8}(?:(?P<wide>(?:[C-Dc-d][0-9A-Fa-f]|[Ee][0-9A-Fa-f]%(?:25){0,8}[89ABab][0-9A-Fa-f])"
@@ -56,8 +57,8 @@ _QUOTED_PRINTABLE: Final = re.compile(rf"=(?:(?P<hex>[0-9A-F]{{2}})|{_LINE_END}{
 _FOLDED: Final = re.compile(rf"{_LINE_END}[ \t]*")
 _UNITS: Final = (_ESCAPE, _QUOTED_PRINTABLE, _FOLDED)
 _URLSAFE: Final = str.maketrans("+/", "-_")
-# Secrets that are known by their places: the value of a cookie that a device gives to the owner of a credential, and
-# digests of a password, from which it can be guessed (RFC 7616 3.4.1; UsernameToken Profile 1.0, 3.1).
+# Secrets recognised by their place: cookies that a device sets, and password digests, from which a password can be
+# guessed (RFC 7616 3.4.1; UsernameToken Profile 1.0, 3.1).
 _SET_COOKIE: Final = re.compile(r"([Ss][Ee][Tt]-[Cc][Oo][Oo][Kk][Ii][Ee]2?: ?[^=;,\s\"]{1,99}=)[^;,\s\"]+")
 _ANSWER: Final = re.compile(r"(\bresponse=[\\\"']{0,9})[0-9A-Fa-f]{32,64}")
 _PASSWORD_DIGEST: Final = re.compile(r"(#PasswordDigest[^<>]{0,99}>)[^<]{1,99}")
@@ -70,10 +71,10 @@ _PLACES: Final = (
 _COOKIE: Final = re.compile(r"^([^=;]{1,99}=)[^;]+")
 # A password in a URL (RFC 3986 3.2.1).
 _USERINFO: Final = re.compile(r"://[^/?#\s:@\"']{0,99}:([^/?#\s@\"']{1,999})@")
-# Compressed bodies are unpacked, up to this size, and searched as well.
+# Gzipped bodies up to this many bytes are unpacked and searched too.
 _GZIP: Final = b"\x1f\x8b"
 _MOST: Final = 1 << 24
-# The words of the result formats and requirements are not masked: no program could read the result without them.
+# Words of the result formats and requirements are never masked: no program could read the result without them.
 _ROOMS: Final = Path(__file__).parents[2]
 _OUR_WORDS: Final = ("reports/schemas/*.json", "conformance/rules/requirements.toml", "conformance/packs/*/*.toml")
 
@@ -96,14 +97,14 @@ class Secrets:
     def forget(self) -> None:
         """Forget all secrets, as the tests of one process do between two runs."""
         self._known: set[str] = set()
-        # Many texts are written again and again.
+        # Cache: many texts are written repeatedly.
         self._seen: dict[str, str] = {}
         self._weak: dict[str, str] = {}
-        # Those in which the case does not matter, and the others.
+        # Forms of secrets that are compared without regard to case. Below: the others.
         self._folded: tuple[_Form, ...] = ()
         self._exact: tuple[_Form, ...] = ()
         self._dumps: tuple[_Form, ...] = ()
-        # By the last characters before an ellipsis: what may be cut there, and after how many characters.
+        # By the last characters before an ellipsis: secrets that may be cut there, and after how many characters.
         self._cuts: dict[str, list[tuple[_Form, int]]] = {}
 
     def __bool__(self) -> bool:
@@ -123,7 +124,7 @@ class Secrets:
         if not secret or secret in self._known:
             return
         if len(self._known) >= _MOST_KNOWN:
-            # A device may give out ever new ones, and each is searched for in everything.
+            # A device may issue tokens without end, and each is searched for in every text.
             self._weak[variable] = f"is one of more than {_MOST_KNOWN}"
             return
         self._known.add(secret)
@@ -134,7 +135,7 @@ class Secrets:
         folded, exact = _forms(secret)
         self._folded = _with(self._folded, folded, variable)
         self._exact = _with(self._exact, exact, variable)
-        # A dump that is cut short is a few numbers, as any list has them.
+        # A truncated dump would be a few numbers, as any list has them.
         self._dumps = (*self._dumps, *(_Form(dump, dump, variable) for dump in _dumps(secret)))
         cuts: dict[str, list[tuple[_Form, int]]] = {}
         for form in (*self._folded, *self._exact):
@@ -303,7 +304,7 @@ def _decoded(unit: re.Match[str]) -> str:
 
 def _outer(inner: list[tuple[int, int, str]], unit: re.Pattern[str], text: str) -> Iterator[tuple[int, int, str]]:
     """Yield where in the escaped text the spans of the plain one are."""
-    # For each character of the plain text, where its escape begins and ends.
+    # For each character of the unescaped text: where its escape begins and ends.
     begins, ends, last = array("Q"), array("Q"), 0
     for found in unit.finditer(text):
         length = len(_decoded(found))

@@ -15,7 +15,7 @@ from typing import Any, Final
 import click
 
 _TOLD: Final = set[str]()
-# A URL with a user, as a word or as the value of an option. A password may have a slash in it, which no port has.
+# A URL with a user, alone or as the value of an option. A port has no slash, but a password may.
 _USERINFO: Final = re.compile(
     r"(?:-[\w-]+=)?\s*[A-Za-z][A-Za-z0-9+.-]*:[/\\]{2}(?:[^/?#\s]*|[^/?#\s:\[]*:(?!\d+(?:[/?#]|\Z))[^\s]*)@", re.ASCII
 )
@@ -55,7 +55,7 @@ def warn_if_shared(path: str | Path, *, at_once: bool = False) -> None:
     try:
         mode = Path(path).stat().st_mode
     except OSError:
-        return  # who reads it tells that
+        return  # the code that reads the file reports that
     name = str(path)
     if os.name == "posix" and stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH) and name not in _TOLD:
         _TOLD.add(name)

@@ -45,7 +45,7 @@ class Topic(StrEnum):
     SERVICE = "service"  # whether the device does what the contract says of its resources and operations
     CLIENTS = "clients"  # whether stock clients, libraries and tools work with it
     HOSTILE = "hostile"  # what attacks and invalid input do to it
-    HYGIENE = "hygiene"  # what is good form, and seldom met; pages fold it
+    HYGIENE = "hygiene"  # good practice that devices seldom follow; pages fold it
 
 
 #: The topics as questions that a reader has.
@@ -72,11 +72,13 @@ class Prerequisite(StrEnum):
     """What a run must have, besides the interface, to judge a requirement."""
 
     MOTION = "motion"  # permission to move the device
-    OBSERVER = "observer"  # a ROS probe, or another way to see the effects of a request
+    OBSERVER = "observer"  # a ROS probe, or another way to observe the effects of a request
     LIMITS = "limits"  # the statement declares them
     HOLD = "hold"  # the statement declares the hold time
     RESOLVED = "resolved"  # the declared tolerances are small beside the limits, so that rest and motion differ
-    SEEN = "seen"  # the device must show it by itself; a device that did not is not judged, and its class not held back
+    # the device must show the behaviour by itself; otherwise the requirement is not judged and does not hold its class
+    # back
+    SEEN = "seen"
     PROBE = "probe"  # a ROS probe; without one the requirement is skipped and does not hold its class back
 
 
@@ -108,7 +110,7 @@ class ConformanceClass:
         return tuple(name for name in self.interfaces if name in described and name not in there)
 
 
-#: Octets of request content that every service must accept, over REST and over SOAP.
+#: Bytes of a request body that every service must accept, over REST and over SOAP.
 TAKEN_OCTETS: Final = 64 * 1024
-#: Octets of request content from which on a service may stop reading and close the connection.
+#: Bytes of a request body from which on a service may stop reading and close the connection.
 LIMIT_OCTETS: Final = 10 * 1024 * 1024

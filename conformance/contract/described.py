@@ -17,7 +17,7 @@ from conformance.contract.toml_file import basic_string
 DOCUMENT_NAME: Final = "openapi.json"
 ORIGINAL_NAME: Final = "original.json"
 UNRESOLVED_NAME: Final = "unresolved.json"
-# Files that a run writes of a description into its result. They are data; no other file is read from there.
+# Files of a description that a run writes into its result. They are data; no other file is read from there.
 _DATA_NAMES: Final = (DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME, "wsdl.json")
 _MOST_MANIFEST: Final = 64 * 1024
 #: The contract's name in verdicts: "keeps its own description".
@@ -30,10 +30,10 @@ ROS: Final = "ros-gateway"
 STATES: Final = "states"
 #: The class of a device that is known by its WSDL.
 SOAP: Final = "soap"
-#: The class of what a web server does by itself.
+#: Class for the behaviour of the web server, as opposed to the application's.
 WEB_SERVER: Final = "web-server"
 _CLASSES: Final = ("description", "robustness", "http", WEB_SERVER)
-# Media types in which one value can be written.
+# _DATA: media types of structured data, in which one value can be written in several formats.
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 _NO_NAME: Final = re.compile(r"[^a-z0-9]+")
 
@@ -81,7 +81,7 @@ def write_described_pack(
     for file, content in (
         (DOCUMENT_NAME, document), (ORIGINAL_NAME, original), (UNRESOLVED_NAME, list(unresolved)),
     ):  # fmt: skip
-        # Reports point to lines of the description.
+        # Indented, because reports point to lines of the description.
         write_json(folder / file, content, indent=1 if file == DOCUMENT_NAME else None, ensure_ascii=False)
     return folder
 
@@ -126,7 +126,8 @@ def _formats(document: Mapping[str, Any]) -> tuple[set[str], int]:
             responses = operation.get("responses")
             for status, response in responses.items() if isinstance(responses, dict) else ():
                 formats = _content(response) if str(status)[0] == "2" else set()
-                # What a path names may be gone when others than the formats of data are asked for.
+                # With a parameter in the path, only formats of data are requested: the thing may be gone before a
+                # second request.
                 formats = {one for one in formats if _DATA.search(one)} if "{" in str(path) else formats
                 sent = max(sent, len(formats))
     return taken, sent

@@ -17,11 +17,12 @@ _MOST_OCTETS: Final = 32 * 1024 * 1024
 _MOST_NODES: Final = 1_000_000
 _DEEPEST: Final = 100
 _LONGEST_NAME: Final = 8_192
-# Marks before the values of a JSON text: each value but the first follows one of them. Texts may contain them too.
+# Characters before the values of a JSON text: each value but the first follows one of them. Strings may contain them
+# too.
 _MARKS_OF_VALUES: Final = ",[{"
-# Digits of a whole number: with more it is beyond every double.
+# Most digits of a whole number: a longer one exceeds every double.
 _MOST_DIGITS: Final = 400
-# Characters of a name, and names, that a message about a place shows.
+# A message shows so many characters of a name, and so many names of a path.
 _SHOWN: Final = 60
 _PLAIN: Final = "roaas:plain"
 _TAG: Final = "tag:yaml.org,2002:"
@@ -69,7 +70,7 @@ def _json(text: str) -> Any:
         value = json.loads(text, parse_constant=_refused, parse_float=_real, parse_int=_whole)
     except RecursionError as error:
         raise ValueError(f"it is nested too deeply; the limit is {_DEEPEST} levels") from error
-    # Each entry: a value, and the names of those that hold it, the innermost first.
+    # Each entry: a value, and the values that contain it, innermost first.
     waiting: list[tuple[Any, Any, int]] = [(value, None, 0)]
     nodes = 1
     while waiting:
@@ -125,7 +126,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._loader = _Loader(text)
         self._event: Any = None
-        # The value of each anchor, with the nodes and the octets that an alias repeats.
+        # By anchor: its value, and the nodes and bytes that an alias adds.
         self._anchors: dict[str, tuple[Any, int, int]] = {}
         self._nodes = self._octets = 0
 

@@ -9,12 +9,12 @@ from types import ModuleType
 
 from conformance.contract.toml_file import TomlFileError
 
-#: The group of entry points by which an installed package offers a pack.
+#: ENTRY_POINTS: entry-point group of installed packs. MANIFEST: file in each pack's folder.
 ENTRY_POINTS = "roaas.packs"
 MANIFEST = "pack.toml"
 _SUITE = Path(__file__).parents[1]
 _BUILT_IN = _SUITE / "packs"
-#: What judges any web API: its classes, its ledger, its checks.
+#: Folder of the generic suite: classes, ledger and checks for any web API.
 GENERIC_RULES = _SUITE / "rules"
 
 

@@ -28,7 +28,7 @@ from conformance.contract.ledger import LedgerError, Requirement, load_ledger, r
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.toml_file import Text, read_toml
 
-#: The pack that is used where none is named.
+#: Pack that is used if the command names none.
 DEFAULT_PACK = "table1"
 _OPENAPI_NAMES = ("openapi.yaml", "openapi.yml", "openapi.json")
 
@@ -275,7 +275,7 @@ class Contract:
             for id_, item in generic_ledger().items()
             if self._classes_of(item) and dropped.isdisjoint({id_, *item.aliases})
         }
-        # Of two that ask the same, the one that judges both is enough.
+        # Of two equal requirements, keep the one that covers more.
         generic = {id_: item for id_, item in generic.items() if generic.keys().isdisjoint(item.same_as)}
         own: dict[str, Requirement] = {}
         path = self.directory / LEDGER

@@ -21,13 +21,13 @@ from conformance.commandline.secret_file import IN_URL, names_user
 
 _Shape = TypeVar("_Shape")
 
-#: The kinds of values that several files have. NaN and infinity, which TOML can write, are none of them.
+#: Value types that several files share. They exclude NaN and infinity, which TOML allows.
 Positive = Annotated[float, Meta(gt=0, le=sys.float_info.max)]
 NotNegative = Annotated[float, Meta(ge=0, le=sys.float_info.max)]
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Text = Annotated[str, Meta(min_length=1, pattern=r"\S")]
 
-_DATES = (dt.date, dt.datetime, dt.time)  # TOML has them, so a date in quotes is no date
+_DATES = (dt.date, dt.datetime, dt.time)  # TOML has dates of its own, so a quoted text is never converted to one
 _PLACE = re.compile(r" - at `\$(?P<path>[^`]*)`$")
 _STEP = re.compile(r"\.(?P<key>\w+)|\[(?P<index>\d+)\]")
 
@@ -84,7 +84,7 @@ def basic_string(text: str) -> str:
 def _explained(table: dict[str, Any], shape: type, said: str) -> str:
     """Return what is invalid, in words for the author of the file."""
     place = _PLACE.search(said)
-    if place and "[...]" in place["path"]:  # in a table whose keys are the user's: msgspec does not say under which
+    if place and "[...]" in place["path"]:  # msgspec does not name the key in a table whose keys the user chooses
         return f"[{place['path'].strip('.').partition('[')[0]}] {_PLACE.sub('', said)}"
     value: Any = table
     kind = inspect.type_info(shape)
@@ -156,7 +156,7 @@ def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
     return f"a {noun}, and not negative" if low == 0 else f"a finite {noun}"
 
 
-# Words for the patterns of texts in statements.
+# By regular expression: what a text in a statement has to be, in words.
 _TEXTS: Final = {
     r"^[A-Z]+ /\S*$": "a method and a path on the device, such as 'POST /login', and no URL",
     r"^/\S+$": "a full ROS name, which begins with '/'",

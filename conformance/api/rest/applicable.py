@@ -11,7 +11,7 @@ from conformance.documents.json_schema import kind_of
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.wsdl_pack import own_wsdl
 
-# Operations that are read to see how a server speaks HTTP.
+# Number of operations that the checks of HTTP read.
 _READS = 8
 NO_MOTION = "it moves the robot, and --allow-motion was not given"
 

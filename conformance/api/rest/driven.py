@@ -17,10 +17,10 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener
 
-# Values of one name that are remembered; requests that are made of them for one stop.
+# _MOST: values of one parameter that are remembered, and requests that one stop is made into. _REFUSED: statuses.
 _MOST: Final = 64
 _REFUSED: Final = range(400, 500)
-# Refused values that are remembered, for each name.
+# Values that the device refused and that are remembered, for each parameter.
 _MOST_REFUSED: Final = 8
 
 
@@ -39,13 +39,13 @@ class Driven(Listener):
         self._contract, self._base_url = contract, base_url
         #: How many requests may have moved the device since it was last stopped.
         self.moves = 0
-        #: How many requests to move it the device has refused since then: a broken one may have moved all the same.
+        #: Requests to move that the device has refused since then: a faulty device may have moved all the same.
         self.refused = 0
         stops = [operation for operation in operations_of(contract) if operation.stop]
-        # One that names nothing stops all that moves, if there is no other.
+        # A stop without a parameter stops everything that moves, if there is no other stop.
         self._stops_all = len(stops) == 1 and not [*_places(stops[0])]
         self._names = {name for stop in stops for names, _, _ in _places(stop) for name in names}
-        # By name and value, whether a response has shown that the device takes the value.
+        # By parameter and value: whether a response has shown that the device accepts the value.
         self._values: dict[str, dict[Any, bool]] = defaultdict(dict)
         self._refused: dict[str, dict[Any, None]] = defaultdict(dict)
 

@@ -50,7 +50,7 @@ def differs_from(api: RestInterface, call: Call) -> str | None:
     if read is None or not isinstance(call.value, dict):
         return None
     shown = flatten(read.send(api, ("Accept", JSON)))
-    if shown["status"] == HTTPStatus.NOT_FOUND:  # what was put has ended since: a goal that was reached
+    if shown["status"] == HTTPStatus.NOT_FOUND:  # the goal that was PUT has ended since, because the robot reached it
         return None
     other = (
         f"{shown.get(place, 'nothing')!r} as {place} instead of {value!r}"

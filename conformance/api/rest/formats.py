@@ -19,7 +19,7 @@ from conformance.transport.parallel import MOST_CLIENTS, send_together
 
 # A robot at rest jitters: only a difference in this many rounds in a row counts.
 _TURNS = 10
-# Of these rounds, those in which a response to simultaneous requests must differ: in the others it may have come first.
+# In this many of the rounds, a response to simultaneous requests must differ: in the others it may have come first.
 _AT_ONCE = 8
 
 
@@ -38,9 +38,9 @@ class Disagreement:
     exchange: Exchange
 
 
-# A disagreement by format and place.
+# Differences between two formats, by format and place.
 Found = dict[tuple[str, str], Disagreement]
-#: Reads a resource in these formats; returns each with its exchange.
+#: Function that reads a resource in the given formats, and returns each format with its exchange.
 Reader = Callable[[RestInterface, Call, list[str]], list[tuple[str, Exchange]]]
 
 

@@ -27,10 +27,11 @@ from conformance.documents.patterns import with_python_patterns
 from conformance.documents.schema_budget import unrolls
 from conformance.transport.exchange import Outgoing
 
-#: Exceptions where no case can be made: schemas allow everything or nothing, or the media type is unknown.
+#: Exceptions of Schemathesis when it can make no request: a schema allows everything or nothing, or a media type is
+#: unknown.
 NOT_GENERATED = (Unsatisfiable, SerializationNotPossible)
 _BASE = "http://robot.invalid"
-# A header's name and value (RFC 9110 5.1, 5.5), as far as every server takes them.
+# A header's name and value (RFC 9110 5.1, 5.5), in the forms that every server accepts.
 _FIELD = re.compile(r"[!#$%&'*+\-.^_`|~0-9A-Za-z]+")
 _VALUE = re.compile(r"[!-~](?:[ -~]*[!-~])?")
 
@@ -104,7 +105,7 @@ def _loaded(document: dict[str, Any], *, undeclared: bool = False) -> Any:
     """
     phases: dict[str, Any] = {} if undeclared else {"coverage": {"unexpected-methods": []}}
     config = SchemathesisConfig.from_dict({"generation": {"with-security-parameters": False}, "phases": phases})
-    # What generates values would fetch the metaschema that the document names.
+    # Schemathesis would fetch the metaschema that `$schema` names.
     document = {key: value for key, value in document.items() if key != "$schema"}
     return schemathesis.openapi.from_dict(_without_pointers(with_python_patterns(document)), config=config)
 
@@ -137,7 +138,7 @@ def as_request(case: Any) -> Outgoing | None:
     body = request.body or b""
     if not isinstance(body, str | bytes):
         return None
-    # For an operation without a body, a case may name a media type of its own, even one that lacks its boundary.
+    # For an operation without a body, Schemathesis may invent a media type, even a multipart type without its boundary.
     content_type = str(request.headers.get("Content-Type") or "") if body or case.operation.body else ""
     target = (url.path or "/") + (f"?{url.query}" if url.query else "")
     method = str(request.method)

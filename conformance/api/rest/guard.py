@@ -19,10 +19,10 @@ from conformance.transport.credentials import Kind
 from conformance.transport.exchange import SAFE_METHODS
 
 _PROGRAM: Final = Path(__file__).with_name("guard_process.py")
-# Deadline of each of its requests, and how long its end is awaited, s.
+# _DEADLINE_S: deadline of each request of the guard, s. _ENDS_S: how long the run waits for the guard to end, s.
 _DEADLINE_S: Final = 3.0
 _ENDS_S: Final = 2.0
-# Renewing the list of stops may take this share of the run's time, and this long besides, s.
+# Renewing the list of stops may take _SHARE of the run's time plus _FREE_S seconds.
 _SHARE: Final = 0.05
 _FREE_S: Final = 0.1
 
@@ -57,7 +57,7 @@ class Guard:
         if not (acts or self._is_stale) or (self._process is None and not acts):
             return
         with self._lock:
-            # A device that is known is always stopped in the same way.
+            # A device with a pack is always stopped by the same requests.
             if self._api.device.is_known and self._is_alive:
                 self._is_stale = False
                 return
@@ -77,7 +77,7 @@ class Guard:
     def start(self) -> int | None:
         """Start the process; return the descriptor for other processes that move the device to inherit, or None."""
         if self._api.driven is not None:
-            self._api.driven.moves += 1  # by the processes
+            self._api.driven.moves += 1  # counts moves that a process of Schemathesis made
         self._before_sending(acts=True)
         process = self._process
         return process.stdin.fileno() if process is not None and process.stdin is not None else None
@@ -112,7 +112,7 @@ class Guard:
         }
         try:
             if not self._is_alive:
-                # Isolated, in a session of its own. The credentials in the stops go through the pipe alone.
+                # Isolated, in a session of its own. The credentials of the stops go only through the pipe.
                 self._process = subprocess.Popen(  # noqa: S603 - our own program
                     [sys.executable, "-I", "-S", str(_PROGRAM)],
                     stdin=subprocess.PIPE,

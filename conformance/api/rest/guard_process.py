@@ -27,16 +27,17 @@ if TYPE_CHECKING:
 
     Contexts = dict[str | None, SSLContext | None]
 
-# Rounds of stops, and the time between two, s: a request of the killed process may arrive after the first stop, and a
-# device with a queue of missions begins the next one.
+# Stops are sent _ROUNDS times, _BETWEEN_S apart: a request of the killed process may arrive after the first stop, and a
+# device with a queue of missions may begin the next one.
 _ROUNDS = 3
 _BETWEEN_S = 0.4
-# Statuses after which the stop is sent again: not for this request, or not now (RFC 9110 15.5.9, 15.6, RFC 8470, 6585).
+# Statuses after which the stop is sent again, because they speak of another request or of another time (RFC 9110
+# 15.5.9, 15.6, RFC 8470, 6585).
 _AGAIN = frozenset({408, 425, 429})
 _SERVER_ERROR = 500
 _NO_RESPONSE = 599
 _LONGEST_HEAD = 65_536
-# Statuses that refuse the sender of the stop (RFC 9110 15.5, RFC 4918 11.3): it is sent again after a login.
+# Statuses that refuse the credentials of the stop (RFC 9110 15.5, RFC 4918 11.3): it is sent again after a login.
 _REFUSALS = frozenset({401, 403, 407, 423, 428})
 _LONGEST_LOGIN = 1 << 20
 _UNAUTHORIZED = 401
@@ -73,7 +74,7 @@ def _response(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> tu
                     break
                 came += part
     except OSError:
-        pass  # what came until then may say enough
+        pass  # the bytes that came until then may contain the status
     try:
         return int(came.split(None, 2)[1]), came.decode("latin-1")
     except (ValueError, IndexError):
@@ -160,20 +161,20 @@ def _context(files: str | None) -> SSLContext | None:
 
 def main() -> None:
     """Read how the device is stopped until the other process has ended or is done."""
-    # What ends all processes of a terminal or a job does not end this one.
+    # Ignore signals that end all processes of a terminal or a job: the guard must outlive the run.
     for number in signal.valid_signals() - {signal.SIGCHLD} if os.name == "posix" else {signal.SIGINT}:
         try:
             signal.signal(number, signal.SIG_IGN)
-        except OSError:  # SIGKILL, SIGSTOP
+        except OSError:  # SIGKILL and SIGSTOP cannot be ignored
             continue
     told: dict[str, Any] | None = None
     contexts: Contexts = {}
     for line in sys.stdin.buffer:
         if line == b"done\n":
             return
-        if line.endswith(b"\n"):  # a line that is cut short was never told
+        if line.endswith(b"\n"):  # a line that is cut short is incomplete JSON
             told = json.loads(line)
-            # Now, as the files may be gone when it counts.
+            # Read the TLS files now, because they may be gone when the stop is sent.
             files = {one["tls"] for one in (*told["stops"], told.get("login")) if one}
             contexts = {one: contexts.get(one) or _context(one) for one in files}
     if told is not None:

@@ -7,7 +7,7 @@ from conformance.api.rest.request_context import RequestContext
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case
 
-# An operation that once took longer than this is called less often, ms.
+# An operation whose response once took longer than this is called less often, ms.
 _SLOW_MS = 1000.0
 
 

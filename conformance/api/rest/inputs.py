@@ -75,7 +75,7 @@ def written(operation: Operation, inputs: Inputs) -> Outgoing:
         values = inputs.at(item.where)
         if item.name not in values:
             continue
-        # What has content is written by its media type, whatever the style.
+        # A parameter with `content` is written in its media type, whatever its style.
         value = json_text(values[item.name]) if is_json(item.media_type) else values[item.name]
         match item.where:
             case "path":

@@ -15,11 +15,11 @@ from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 
-# Longest array that is sent: a longer one is a load test.
+# Longest array that is sent: a longer one would test load.
 _MOST_ITEMS: Final = 100
-# Formats of a response that are each requested together with a wrong value.
+# Response formats that are requested together with a wrong value, at most.
 _FORMATS: Final = 3
-# Faults that frameworks refuse wherever they are.
+# Why a value is wrong, for the two faults that frameworks refuse for every parameter.
 _OTHER_TYPE: Final = "which has another type"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
@@ -43,7 +43,7 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     yield Variation(Kind.MALFORMED, "a body that is not UTF-8", "body", not_utf8)
     if "object" in kinds_of(body.schema) and len(kinds_of(body.schema)) == 1:
         yield Variation(Kind.INVALID, "a list instead of an object", "body", replace(usual, body=[]))
-    # What one alternative of a union forbids, another one may allow.
+    # A value that one alternative of a union forbids may be allowed by another alternative.
     found = _invalid_parts(usual, usual.body, body.schema, ())
     # A merge patch leaves out what it does not change (RFC 7396).
     is_whole = "merge-patch" not in usual.media_type
@@ -68,7 +68,7 @@ def _invalid_parameters(operation: Operation, usual: Inputs) -> Iterator[Variati
                 if item.where == "query" and why in _BEYOND:
                     beside = _beside(operation, changed)
                     yield from (Variation(Kind.INVALID, f"{says}, with {name}", place, one) for name, one in beside)
-                # What writes another format may be another path through the code.
+                # Request other response formats too: a device may handle them by another path through its code.
                 for name in formats:
                     other = replace(changed, accept=name)
                     yield Variation(Kind.INVALID, f"{says}, with Accept: {name}", place, other)
@@ -138,7 +138,7 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
     for value, why in _beyond(merged):
         if not fits(schema, value):
             yield value, why
-    # An object stands for no scalar, and a word for no number, in any framework; 1 for "1" is taken by many.
+    # Every framework refuses an object in place of a scalar, and a word in place of a number; many take 1 for "1".
     for value in ({"roaas": 1}, UNKNOWN, 17):
         is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})
         if not fits(schema, value) and (is_plain or isinstance(value, dict)):
@@ -218,7 +218,7 @@ def _wrong_scalars(schema: Schema) -> Iterator[tuple[Any, str]]:
     if not kinds or kinds & {"object", "array"}:
         return
     for value, why in _beyond(merged):
-        # A number within a text is a text.
+        # A number as text is allowed where texts are.
         is_text = isinstance(value, str) or "string" not in kinds
         if is_text and not isinstance(value, list) and not fits(schema, value):
             yield value, why

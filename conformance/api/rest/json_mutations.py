@@ -29,7 +29,7 @@ KINDS = (
     "empty",
     "bounds",
 )
-# Texts that are no JSON number or no double: the kind of fault, and whether it makes the body malformed.
+# Texts that are no JSON number or no double: name of the fault, whether it makes the body malformed, and the texts.
 _NO_NUMBERS = (
     ("non-finite", True, ("NaN", "Infinity", "-Infinity")),
     ("non-finite", False, ("1e400", "-1e400")),

@@ -73,5 +73,5 @@ def contradiction(api: RestInterface, theirs: Described, context: RequestContext
     try:
         problem = shape_of(schema).problem(text.value) if schema and text and not text.problem else ""
     except PatternError:
-        problem = ""  # other checks tell that the schema cannot be judged
+        problem = ""  # another requirement says that the schema cannot be used
     return f"a response that the description does not have: {problem}" if problem else ""

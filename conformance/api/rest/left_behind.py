@@ -16,7 +16,7 @@ from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined, path_of
 from conformance.verdict.finding import listed
 
-# Ids, paths and operations that a line of the summary names (the result has all); characters of an id.
+# _NAMED: ids, paths and operations that a line of the summary names; the result has all. _ID: characters of an id.
 _NAMED: Final = 3
 _ID: Final = 60
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
@@ -47,7 +47,7 @@ class LeftBehind:
             self._look(path, exchange)
         if operation.safe or not answer.ok:
             return
-        # Written again, it is the last one.
+        # A thing that is written again becomes the last one written.
         self._last.pop(operation.label, None)
         self._last[operation.label] = answer.status
         made = self.made(operation, path, exchange)

@@ -19,8 +19,8 @@ from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import UnreadableError, flat, read
 from conformance.transport.exchange import Response
 
-# Plain names of parameters, and of members that stand beside a list. Of names for the number of items, the second group
-# means it only where no parameter of the first is there, and no item has a member of that name.
+# Normalised names of limit parameters, and of members beside a list that repeat the limit. The second group also names
+# item counts: it counts as a limit only without a parameter of the first group, and if no item has such a member.
 _LIMITS: Final = ("limit", "pagesize", "perpage", "maxresults", "maxitems", "pagelimit", "itemsperpage")
 _ALSO_LIMITS: Final = ("top", "take", "max", "size", "count", "first")
 _OFFSETS: Final = ("offset", "skip", "pageoffset")
@@ -31,7 +31,8 @@ _DIRECTIONS: Final = ("order", "direction", "dir", "sortorder", "sortdirection",
 _REVERSING: Final = frozenset({"reverse", "reversed", "desc", "descending"})
 _WRAPPERS: Final = ("items", "data", "results", "value", "records", "entries", "content", "rows", "list", "embedded")
 _NO_ITEMS: Final = frozenset({"errors", "warnings", "links", "included", "facets", "messages"})
-#: Members and header fields that tell how many items there are; the third group may tell those on the page as well.
+#: Members and header fields with the number of items; those of the third group may give the number on this page
+#: instead.
 TOTALS: Final = frozenset(
     {"total", "totalcount", "totalitems", "totalelements", "totalresults", "totalrecords", "totalsize", "totalrows",
      "totalhits", "odatacount", "hydratotalitems", "numfound", "nbhits", "recordsfiltered"}
@@ -40,7 +41,8 @@ _HEADERS: Final = ("x-total-count", "x-total", "total-count", "x-pagination-tota
 COUNTS: Final = frozenset({"count", "itemcount", "itemscount", "recordcount", "numitems", "length"})
 _COUNT: Final = re.compile(r"\s*(\d{1,18})\s*", re.ASCII)
 _RANGE: Final = re.compile(r"\s*[A-Za-z]+\s+(?:\d+-\d+|\*)/(\d{1,18})\s*")
-# Names that are a member's as well, and do not choose items by it: how a response is written, and texts to search for.
+# Parameters whose name is also a member's, but which choose no items by it: those for the form of the response, and
+# search texts.
 _NO_FILTERS: Final = frozenset(
     {"format", "lang", "language", "locale", "unit", "units", "currency", "timezone", "tz", "fields", "view", "include",
      "expand", "embed", "version", "precision", "resolution", "interval", "search", "q", "query", "text", "name",
@@ -130,7 +132,7 @@ class Listing:
         found = {text: self._sorting(text) for text in given}
         turned = {one.member for one in found.values() if one is not None and one.descending}
         for text, one in found.items():
-            # Beside "-name", the value "name" means ascending order.
+            # If a parameter takes "-name" for descending order, then "name" means ascending order.
             plain = one is not None and one.descending is None and one.member in turned
             yield text, Sorting(one.member, descending=False) if one is not None and plain else one
 
@@ -278,7 +280,7 @@ def _value_of(response: Response, operation: Operation | None) -> Any:
     try:
         return read(response.media_type, response.body, schema)
     except UnreadableError:
-        return None  # other checks tell what is wrong with the document
+        return None  # another requirement says what is wrong with the document
 
 
 @lru_cache(maxsize=1024)
@@ -288,7 +290,7 @@ def listing_of(operation: Operation) -> Listing | None:
     in_xml = (schema for content in success for name, schema in content.items() if is_xml(name))
     item = _item_of(operation.shape or next(in_xml, None), 0)
     query = {_plain(one.name): one for one in operation.parameter("query")}
-    # One thing that has a list among its members is no list, unless it can be read in parts.
+    # A response with one thing is no list, even if the thing has a list among its members, unless it is read in pages.
     is_thing = operation.template.rstrip("/").endswith("}") and query.keys().isdisjoint((*_LIMITS, *_OFFSETS, *_PAGES))
     if operation.method != "GET" or item is None or is_thing:
         return None
@@ -360,7 +362,7 @@ _LEAST: Final = frozenset(
 _MOST: Final = frozenset(
     {"max", "maximum", "to", "until", "till", "before", "lte", "le", "lt", "end", "older", "upper", "below", "under"}
 )
-# Descriptions of a parameter that is a lower bound.
+# Phrases in a parameter's description which say that it is a lower bound.
 _SAYS_LEAST: Final = re.compile(
     r"at least|or more|or (?:later|after|newer|above|greater|higher)|not (?:before|below|less)|minimum|lower bound"
     r"|greater than|more than|later than|newer than|higher than|since|\bfrom\b|>=?",

@@ -13,9 +13,9 @@ from conformance.documents.openapi import Operation
 from conformance.documents.writing import json_text
 from conformance.transport.exchange import Outgoing
 
-# How many valid requests of one moving operation are sent: each may start a mission.
+# How many valid requests are sent to one operation that moves the robot: each may start a mission.
 _ACCEPTED = 3
-# The greatest number in an invalid body: a robot that takes it all the same must not run away.
+# Greatest number in an invalid body: a robot that accepts it wrongly must not drive fast.
 _SLOW = 0.1
 
 
@@ -44,7 +44,7 @@ class MotionGuard:
             return self._fitted(item, operation)
         if not self._api.device.is_known:
             return item
-        # What may be taken with whatever values are in it is not sent to a robot; what must be refused is sent slow.
+        # A body without any rule is not sent to a robot; a body that the robot must refuse is sent with low numbers.
         return self._slow(item) if said.verdict == INVALID else None
 
     def count(self, item: Outgoing, *, accepted: bool) -> None:

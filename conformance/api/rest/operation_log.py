@@ -22,10 +22,10 @@ from conformance.transport.exchange import Exchange, Listener, Request, Unanswer
 from conformance.verdict.finding import Finding
 
 _OK, _REDIRECT = 200, 300
-# Octets of a body that are searched for members of its schema.
+# _READ: bytes of a body that are searched for members of its schema. _ERRORS: first status of an error.
 _READ = 100_000
 _ERRORS: Final = 400
-# Statuses by which a device says that its state forbids the operation; they show the operation as well as a success.
+# Statuses which say that the device's state forbids the operation; they prove as well as a success that it exists.
 _OF_STATE: Final = frozenset({409, 423})
 # A fault as the first element of a SOAP Body.
 _FAULT: Final = re.compile(rb"Body[^<>]*>\s*<(?:[\w.-]+:)?Fault[\s/>]")
@@ -179,7 +179,7 @@ class OperationLog(Listener):
             return ""
         if any(record.sent for record in self._records.values()):
             return "no operation succeeded; [values] in a statement names values that the device knows"
-        # HEAD and OPTIONS are not counted: other checks send them as well.
+        # HEAD and OPTIONS do not make an operation count as called, because other checks send them too.
         if any(reason.may and item.method in {"HEAD", "OPTIONS"} for item, reason in reasons.items()):
             return ""
         why = next((f": {item.label}: {reason}" for item, reason in reasons.items() if not reason.may), "")
@@ -212,7 +212,7 @@ class OperationLog(Listener):
         keys = {operation.response_key(status) for status in record.statuses} - {None}
         return {
             "operation": operation.label,
-            # A stop and what a motion map names are sent although no pattern allows them.
+            # A stop, and operations of a motion map, are sent even if no pattern of --call allows them.
             "called": reason.may or record.sent > 0,
             "reason": str(reason) if reason.may or not record.sent else "the motion map or the end of the run sends it",
             "requests": record.sent,

@@ -6,10 +6,10 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.parameters import Parameter
 
-# Letters, the empty text, and texts that programming languages read as numbers and the contract does not.
+# Texts that are no number by the contract: letters, nothing, and texts that programming languages read as numbers.
 _NO_NUMBERS = ("abc", "roaas-no-number", "", "NaN", "Infinity", "-Infinity", "inf", "1e400", "-1e400", "1.5m", "0x1F")
 _NO_INTEGERS = ("3.5", "99999999999999999999")
-# Those of these texts that a problem's detail may repeat.
+# Of these texts, those that a problem's `detail` can quote recognisably.
 _TELLING = {"abc", "roaas-no-number", "1.5m"}
 
 
@@ -43,7 +43,7 @@ def wrong_texts(parameter: Parameter) -> list[Wrong]:
         outside = [schema[key] + step for key, step in (("minimum", -1), ("maximum", 1)) if key in schema]
         if "enum" in schema:
             whole = [value for value in schema["enum"] if isinstance(value, int)]
-            # The last becomes one that is allowed where only the lower 32 bits of a number are kept.
+            # The last number becomes an allowed one in a program that keeps only its lower 32 bits.
             outside += [max(whole) + 1, min(whole) - 1, 0, -1, min(whole) + 2**32] if whole else []
         found += [
             Wrong(parameter.name, str(value), f"{value}, which is not allowed, at {parameter.name}", str(value))

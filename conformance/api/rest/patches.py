@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterator
 from typing import Any, Final
 
-#: Media types of patches; those of an API's own may end in the same way.
+#: Media types of patches; a vendor's own media type may end in the same way.
 MERGE: Final = "merge-patch+json"
 JSON_PATCH: Final = "json-patch+json"
 _MISSING: Final = object()

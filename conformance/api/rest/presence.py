@@ -81,7 +81,7 @@ def _by_options(call: Call, exchange: Exchange) -> bool | None:
         return False
     if allow is not None:
         return call.operation.method in {name.strip() for name in allow.split(",")}
-    # A resource that refuses OPTIONS, and does not say what it allows, says nothing of its other methods.
+    # If a resource refuses OPTIONS without `Allow`, its other methods remain unknown.
     return None if status in _NOT_IMPLEMENTED else True
 
 

@@ -17,11 +17,11 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Outgoing
 
-# Ends of names that refer to something: an identifier, or the place where a list goes on.
+# Ends of member names that refer to something else: an identifier, or the place where a list continues.
 _ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
-# Whole names of references that are also the ends of other words.
+# Names that refer to something only as whole words, because other words end in them too.
 _WHOLE: Final = frozenset({"ref", "slug", "key", "after", "before", "since", "next", "previous", "startafter"})
-# Words that end like references and identify nothing.
+# Words that end like a reference and are none.
 _NO_REFERENCES: Final = frozenset(
     [
         "acid",
@@ -48,7 +48,7 @@ _NO_REFERENCES: Final = frozenset(
         "void",
     ]
 )
-# Formats of texts that JSON Schema and OpenAPI define, so that a client can write them.
+# Text formats that JSON Schema and OpenAPI define: the suite can make a valid value.
 _DEFINED: Final = frozenset(
     {
         "date-time", "date", "time", "duration", "email", "idn-email", "hostname", "idn-hostname", "ipv4", "ipv6",

@@ -23,7 +23,8 @@ _USUAL_FIELDS = {
     "user-agent",
 }
 _USUAL_OCTETS = 2000
-# Fields that ask for a part or set a condition, and the statuses that only such requests get (RFC 9110 13, 14).
+# _CONDITIONS: headers that ask for a part or set a condition. _CONDITIONAL: statuses that only such requests get (RFC
+# 9110 13, 14).
 _CONDITIONS = frozenset({"range", "if-none-match", "if-modified-since", "if-match", "if-unmodified-since"})
 _CONDITIONAL = frozenset({206, 304, 412, 416})
 

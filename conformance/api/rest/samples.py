@@ -14,11 +14,11 @@ from conformance.documents.patterns import for_python
 from conformance.documents.representation import discriminator_of, flat
 
 _DEPTH = 6
-# Optional members of a value in all; required members and items in all. Each member gets an equal share of both for its
-# own members, as schemas may refer to each other without end.
+# _OPTIONAL: optional members of a value, in all; _REQUIRED: required members and items, in all. Each member gets an
+# equal share for its own members, because schemas may refer to each other without end.
 _OPTIONAL = 1_000
 _REQUIRED = 20_000
-#: A text of each format that JSON Schema, OpenAPI and its registry name.
+#: A valid text for each format that JSON Schema, OpenAPI or its registry names.
 FORMATS: Mapping[str, str] = {
     "uuid": "3fa85f64-5717-4562-b3fc-2c963f66afa6",
     "date-time": "2026-01-31T12:00:00Z",
@@ -32,7 +32,7 @@ FORMATS: Mapping[str, str] = {
     "ipv4": "127.0.0.1",
     "ipv6": "::1",
     "byte": "AA==",
-    # Numbers as texts: JSON's own have no more digits than a double.
+    # Formats of numbers that are sent as texts.
     **dict.fromkeys(("int32", "int64", "uint32", "uint64", "float", "double", "decimal"), "1"),
 }
 
@@ -198,7 +198,7 @@ def _matching(encoded: str) -> str:
     if pattern is None:
         return ""
     try:
-        # Hypothesis would explain for seconds why a text is the shortest one.
+        # Leave out Hypothesis's explain phase, which takes seconds.
         phases = (Phase.generate, Phase.shrink)
         quiet = settings(database=None, derandomize=True, max_examples=200, phases=phases)
         return find(from_regex(pattern), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)

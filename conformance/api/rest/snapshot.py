@@ -14,7 +14,7 @@ from conformance.transport.exchange import Exchange
 Snapshot = dict[str, Any]
 _READINGS = 3
 _PAUSE_S = 0.04
-# Times that a suspect is given to come to rest.
+# How many times the suite waits for a value that still changes to come to rest.
 _WINDOWS = 12
 
 

@@ -28,16 +28,17 @@ from conformance.transport.exchange import Exchange, Listener, NoAnswerError, No
 from conformance.transport.pace import Hangs
 from conformance.transport.passage import Heard
 
-#: How the note on a device that may still move begins.
+#: First words of the note on a device that may still move.
 UNDELIVERED: Final = "the stop could not be delivered; the robot may still move"
 # Pause between two tries, s.
 _AGAIN_S: Final = 0.3
-# Deadline of one request, s; a slow device gets this many of its usual response times.
+# _DEADLINE_S: deadline of a stop request, s. _ANSWERS: a slow device gets this many of its usual response times
+# instead.
 _DEADLINE_S: Final = 2.0
 _ANSWERS: Final = 4
-# Longest duration of one try that sends what the description marks, s.
+# Longest time for one round of the stops that the description marks, s.
 _LONGEST_S: Final = 5.0
-# Operations that are read to see whether the device moves; names of members that say so, and names of positions.
+# _READS: operations that are read to see whether the device moves. _MOVING: members that say so.
 _READS: Final = 8
 _MOVING: Final = frozenset({"moving", "driving"})
 _PLACES: Final = frozenset(
@@ -58,7 +59,7 @@ _PLACES: Final = frozenset(
     }
 )
 _Way = Callable[[], str]
-# Statuses of a read of what the stop names, once it is gone.
+# Statuses of a GET of the stopped thing after it has ended.
 _OVER: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 
 
@@ -85,7 +86,7 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
         with _unheard(api.client) as refusals:
             open_ = _still_open(open_)
             if open_ and refusals.seen:
-                # The token of a login has expired, or the device has forgotten it.
+                # The token of the login may have expired, or the device has forgotten it.
                 with suppress(Exception):
                     api.client.connection.log_in_again()
     run.stop_undelivered = f"{UNDELIVERED}: {'; '.join(open_.values())}" if open_ else ""
@@ -163,7 +164,7 @@ def _stop_as_marked(api: RestInterface) -> str:
         return problem
     if not problem:
         api.driven.moves = api.driven.refused = 0
-    # What was not moved since it was stopped needs no stop, and many devices answer 404 or 409 to one then.
+    # Without a move since the last stop, none is needed: many devices answer a needless stop with 404 or 409.
     return problem if api.driven.moves or (problem and api.driven.refused and _is_moving(api)) else ""
 
 
@@ -224,14 +225,14 @@ def _send(api: RestInterface, operation: Operation) -> str:
                 request.method, request.target, headers=request.headers, body=request.body, timeout_s=_DEADLINE_S
             )
         except NotPermittedError:
-            return ""  # the user's --never
+            return ""  # the user's --never forbids it
         except NoAnswerError as none:
             problem = f"{operation.label}: {none}"
             open_ = open_ or (problem if moved else "")
             continue
-        until += exchange.response.elapsed_ms / 1000  # a device that responds is sent each of them
+        until += exchange.response.elapsed_ms / 1000  # a device that responds gets the time for every stop
         if inputs not in known:
-            continue  # to a good device it names nothing
+            continue  # 404 from a good device: it has no part of that name
         accepted |= exchange.response.ok or (names_one and exchange.response.status in _OVER)
         problem = f"{operation.label} got {exchange.came}"
         status = exchange.response.status

@@ -17,14 +17,14 @@ from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 
-# Members that are tried; characters of a text that are counted up.
+# _TRIED: members of which unique values are tried. _COUNTED: characters of a text that are changed for that.
 _TRIED: Final = 6
 _COUNTED: Final = 8
-# Distance between two values: other code, which counts by one, does not reach the next.
+# Distance between two unique values: other code, which counts up by one, does not reach the next of ours.
 _STEP: Final = 7919
-# Values that are looked at for one that was not sent before.
+# Values that are tried until one is found that was not sent before.
 _STEPS: Final = 40
-# The greatest integer where no bound is declared: every program can hold it.
+# Greatest integer to send where no bound is declared: every language can hold it.
 _GREATEST: Final = 2**31 - 1
 _ALPHABETS: Final = (string.digits, string.ascii_lowercase, string.ascii_uppercase)
 

@@ -29,7 +29,8 @@ from conformance.verdict.evidence import HarnessError
 
 __all__ = ["INVALID", "UNCLEAR", "VALID"]
 
-# Characters that a cookie's value may not contain (RFC 6265 4.1.1), and percent signs, which not every reader decodes.
+# Characters that a cookie's value may not contain (RFC 6265 4.1.1), and the percent sign, which some servers do not
+# decode.
 _NO_COOKIE = re.compile(r"[^!#-$&-+\--:<-\[\]-~]")
 Headers = Sequence[tuple[str, str]]
 _RULES = {
@@ -94,7 +95,7 @@ def validity_by(
     except SlowPatternError as error:
         return Validity(UNCLEAR, operation, slow=str(error))
     except PatternError:
-        return Validity(UNCLEAR, operation)  # description/file-valid judges the pattern itself
+        return Validity(UNCLEAR, operation)  # the requirement description/file-valid judges the pattern itself
     if any(verdict == UNCLEAR for verdict, _, _ in found):
         return Validity(UNCLEAR, operation)
     wrong = next(((requirement, why) for verdict, requirement, why in found if verdict == INVALID), None)

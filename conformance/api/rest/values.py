@@ -19,10 +19,10 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Exchange, Outgoing
 
-# Values of one name that are remembered; those that are tried in one place.
+# _REMEMBERED: values of a name that are remembered. _TRIED: those that are tried in one place.
 _REMEMBERED, _TRIED = 16, 4
 _DEPTH = 6
-#: Usual names of the members that identify an item of a collection.
+#: Usual members that identify an item of a collection.
 IDS = ("id", "uuid", "name", "key", "slug")
 
 
@@ -126,7 +126,7 @@ class Values:
 
     @staticmethod
     def _remember(known: list[Any], value: Any) -> None:
-        # The newest first: what was there before may be gone.
+        # Newest first: a thing that an older value names may be deleted.
         if value in known:
             known.remove(value)
         known.insert(0, value)
@@ -146,7 +146,7 @@ class Values:
             learned = self.references(operation, parameter.name, parameter.schema)
             if "array" in kinds_of(parameter.schema):
                 learned = [learned[:1]] if learned else []
-        # An empty list or object is written as nothing, or as an empty text.
+        # Prefer a sample that is not empty: an empty list or object is written as nothing.
         made = sample(parameter.schema) or sample(parameter.schema, whole=True)
         found = [*given, *parameter.examples, *learned, made]
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
@@ -173,7 +173,7 @@ class Values:
         given = [one for one in self._given.get(plain_name(name), []) if fits(schema, one)]
         if given:
             return given[0]
-        # References only: another member's value of the same name may be out of place.
+        # Only identifiers: values of another member with the same name may not fit here.
         if operation is None or not refers(name, schema, self.collections):
             return self.filled(item, schema, operation)
         known = self.references(operation, name, schema)

@@ -19,14 +19,14 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 
-# Enum values, examples and optional members that are tried in one place; how deep in a body.
+# _FEW: enum values, examples and optional members that are tried in one place. DEPTH: how deep in a body.
 _FEW: Final = 12
 DEPTH: Final = 3
 LONG: Final = 5000
 # Names of members that take any text.
 _TEXTUAL: Final = frozenset({"name", "title", "label", "text", "note", "description", "comment", "message", "remark"})
 _BEYOND: Final = 2**63
-#: Names of members and indexes of items on the way into a body.
+#: Path into a body: names of members and indexes of items.
 Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
 _UNKNOWN_NUMBER: Final = 987_654_321
@@ -50,7 +50,7 @@ class Kind(StrEnum):
     """What a request of the survey shows."""
 
     USUAL = "usual"  # with what is required
-    EXAMPLE = "example"  # with a value that the description gives as an example
+    EXAMPLE = "example"  # with an example of the description
     DEFAULT = "default"  # with the default written out
     ENUM = "enum"  # with one value of an enumeration
     OPTIONAL = "optional"  # with an optional parameter or member
@@ -60,9 +60,9 @@ class Kind(StrEnum):
     INVALID = "invalid"  # with a value that the description forbids
     MALFORMED = "malformed"  # with content that its media type forbids
     UNKNOWN = "unknown"  # with the identifier of something that does not exist
-    ODD = "odd"  # with a value that programs stumble over
+    ODD = "odd"  # with a valid value that programs often mishandle
     ANONYMOUS = "anonymous"  # without credentials, or with wrong ones
-    AGAIN = "again"  # the usual request once more, after others
+    AGAIN = "again"  # the usual request again, after others
     GENERATED = "generated"  # made by Schemathesis
     OTHER = "other"  # sent by another check
 
@@ -160,7 +160,7 @@ def together(operation: Operation, usual: Inputs, variations: list[Variation]) -
     for turn, (body, parts) in enumerate(groups, 1):
         fresh = _with_new_texts(body, schema, usual.body, turn) if operation.method == "POST" else body
         says, inputs = f"{len(parts)} members of the body", replace(usual, body=fresh)
-        # Members may exclude each other.
+        # Two members may exclude each other, so each is also sent alone.
         alone.append(Variation(Kind.ODD, says, "body", inputs, tuple(parts)) if len(parts) > 1 else parts[0])
     return alone
 
@@ -222,7 +222,7 @@ def _bounds(schema: Schema) -> Iterator[Any]:
         if isinstance(schema.get(key), int | float) and not isinstance(schema.get(key), bool):
             yield schema[key]
     if "array" in kinds_of(schema) and (apart := alike_and_apart(schema)[1]):
-        yield apart  # what stands between items shows from the second one on
+        yield apart  # the separator between items appears only with two items
         yield from _lists(schema)
     if "pattern" in schema or "format" in schema or "enum" in schema:
         return
@@ -257,7 +257,7 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
             yield Variation(Kind.OPTIONAL, f"the optional member {place}", place, filled)
         for kind, one in _valid_values(flatter, flatter.get("examples", ()) or (), [], required=True):
             if kind is Kind.BOUND and plain_name(name) in _TEXTUAL and isinstance(one, str) and len(one) > 1:
-                # Characters are counted, not octets or units of UTF-16 (JSON Schema Validation 6.3).
+                # JSON Schema counts characters, not bytes or UTF-16 units (JSON Schema Validation 6.3).
                 one = ("\u00e9\U0001f916" * len(one))[: len(one)]  # noqa: PLW2901 - of the same length
             if one != value.get(name, NOTHING):
                 body = with_member(usual.body, here, one)

@@ -17,9 +17,9 @@ from conformance.verdict.evidence import Judge
 
 _LEAK: Final = re.compile(LEAKS)
 _REFUSED: Final = 400
-#: At less than this share of the standard effort, each requirement gets one attack.
+#: Below this share of the standard effort, one attack for each requirement is sent.
 HALF: Final = 0.5
-#: More attacks than there are for any requirement.
+#: More than the number of attacks for any requirement: send all.
 ALL: Final = 99
 
 
@@ -42,7 +42,7 @@ class AttackVerdict:
 
 def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
     """Return the verdict on one attack by its response, or by the missing response."""
-    # What a coding hides is over the limit once it is unpacked.
+    # Compressed content may exceed the limit after decompression.
     over = len(attack.body) > LIMIT_OCTETS or any(name.lower() == "content-encoding" for name, _ in attack.headers)
     may_close = over or not attack.must_refuse
     expected = f"{'a refusal' if attack.must_refuse else 'a response'}{' or a closed connection' if may_close else ''}"
@@ -77,7 +77,7 @@ def is_closed(attempt: Unanswered) -> bool:
 _SLOWER: Final = 20
 _ALWAYS_MS: Final = 1000.0
 _TRIES: Final = 3
-# After this many attacks that used up a deadline, the rest is left out.
+# After this many attacks that used up a deadline, the remaining attacks are left out.
 _TROUBLES: Final = 3
 
 

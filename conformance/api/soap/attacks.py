@@ -12,7 +12,7 @@ from functools import partial
 from itertools import islice
 from typing import Final
 
-# Slots in a document: for text that the robot reads as a value, and for text that it may ignore.
+# Slots in a document: VALUE_SLOT for text that the robot reads as a value, IGNORED_SLOT for text that it may ignore.
 VALUE_SLOT: Final = "roaas-value-here"
 IGNORED_SLOT: Final = "roaas-aside-here"
 # A text that occurs in a response only if the robot expanded an entity.
@@ -23,7 +23,7 @@ _FILES: Final = ("file:///etc/passwd", "file:///etc/hosts", "file:///c:/windows/
 _DEPTH: Final = 100_000
 _ATTRIBUTES: Final = 20_000
 _LONG: Final = 1_000_000
-# Half a mebibyte over the limit that the contract sets (10 MiB).
+# Half a mebibyte over the contract's limit of 10 MiB.
 _OVER: Final = 10 * 1024 * 1024 + 512 * 1024
 
 
@@ -65,7 +65,7 @@ class Template:
     def filled(self, value: str | None = None, ignored: str = "", prolog: str = "") -> str:
         """Return the document with texts in its slots, after a prolog."""
         text = self.value if value is None else value
-        # Without a place to pass over, what was meant for it stands in the value.
+        # If the document has no ignorable place, put that text into the value too.
         if IGNORED_SLOT not in self.document:
             text += ignored
         return prolog + self.document.replace(VALUE_SLOT, text).replace(IGNORED_SLOT, ignored)
@@ -85,7 +85,7 @@ def attacks(template: Template, url: Callable[[str], str], each: int, place: str
         place: tells the canaries of this document from those of another.
     """
     for make in _KINDS:
-        # One that is not sent is not made: some take 10 MiB.
+        # Make an attack only when it is sent: some take 10 MiB.
         for attack in islice(make(template, lambda canary: url(f"{place}{canary}")), each):
             yield replace(attack, canary=f"{place}{attack.canary}") if attack.canary else attack
 
@@ -105,7 +105,7 @@ def _doctypes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack
         "a DOCTYPE after the XML declaration",
         template.octets(prolog=f'<?xml version="1.0" encoding="UTF-8"?>\n{bare}'),
     )
-    # In UTF-16, so that who looks for the octets "<!DOCTYPE" does not find them.
+    # In UTF-16, so that a filter for the bytes "<!DOCTYPE" does not find it.
     wide = template.filled(prolog=f'<?xml version="1.0" encoding="UTF-16"?>{bare}')
     yield Attack("doctype", "a DOCTYPE in UTF-16", codecs.BOM_UTF16_LE + wide.encode("utf-16-le"))
 
@@ -153,7 +153,7 @@ def _parameters(template: Template, url: Callable[[str], str]) -> Iterator[Attac
 def _expansions(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
     levels = "".join(f'<!ENTITY l{level} "{f"&l{level - 1};" * 10}">' for level in range(1, 10))
     subset = f'<!DOCTYPE {template.root} [<!ENTITY l0 "lol">{levels}]>'
-    # Aside, where a robot that expands them may pass over what comes out; as a value, where it would have to keep it.
+    # In the ignorable place, a robot may drop the expanded text; in the value, it has to keep it.
     yield Attack(
         "expansion", "the billion laughs attack in an ignored element", template.octets(ignored="&l9;", prolog=subset)
     )

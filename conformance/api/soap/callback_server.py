@@ -29,7 +29,7 @@ class CallbackServer:
 
     def __exit__(self, *_: object) -> None:
         self._closing = True
-        # Closing alone does not wake an accept; on some systems shutting down does not either, but the timeout does.
+        # Closing alone does not wake a thread in accept(). Shutting down does on most systems, and the timeout on all.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._thread.join(1.0)

@@ -71,7 +71,7 @@ def read(document: bytes) -> Envelope:
         NotSoapError: it is no XML, or no SOAP 1.1 envelope with a Body.
     """
     try:
-        # A DOCTYPE breaks R1008, which is judged of every answer; the rest of the message is judged all the same.
+        # A DOCTYPE breaks R1008, which another check reports; the rest of the message is judged all the same.
         root = parse(document, doctype=True)
     except NotXmlError as error:
         raise NotSoapError(str(error)) from error
@@ -99,7 +99,7 @@ def read_root(root: etree._Element) -> Envelope:
 
 def _fault(element: etree._Element) -> Fault:
     children = elements(element)
-    # R1001 wants the children unqualified; a fault that breaks it is read all the same, so that it can be judged.
+    # R1001 demands unqualified children; a fault with qualified ones is read too, so that it can be judged.
     by_name: dict[str, etree._Element] = {}
     for child in children:
         by_name.setdefault(local(str(child.tag)), child)

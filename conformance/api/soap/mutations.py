@@ -21,7 +21,7 @@ _NOBODY: Final = "no_such_element"
 Payload = tuple[Node, ...]
 # Kinds of faults that no schema can forbid.
 _BEYOND_SCHEMA: Final = frozenset({"body", "non-finite"})
-# An element that may occur this often is not sent once more than that.
+# An element with a `maxOccurs` from this on is not sent once too often.
 _MANY: Final = 100
 
 

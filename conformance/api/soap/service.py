@@ -130,7 +130,7 @@ class SoapService:
         return fetch(location, self.published.url or self.endpoint, self.client.connection, folder)
 
 
-# How long the address in a WSDL may take to answer before the address of the WSDL itself is used, s.
+# How long the address in a WSDL may take to answer, s. After that, the address of the WSDL itself is used.
 _PROBE_S = 3.0
 
 

@@ -16,7 +16,7 @@ from conformance.documents.xml import XSD, XSI, Node, NotXmlError, clark, namesp
 from conformance.documents.xsd_shapes import FLOATS, INTEGERS, Element, bounds
 from conformance.verdict.evidence import HarnessError
 
-# Whole numbers that are tried where a contract accepts only some, such as codes.
+# Whole numbers to try where a device accepts only some, such as codes.
 _NUMBERS: Final = (0, 1, 2, 3, 4, 5)
 
 
@@ -42,7 +42,7 @@ def require_valid_document(service: SoapService, document: bytes | str) -> bytes
     """
     octets = document.encode() if isinstance(document, str) else document
     try:
-        # Without comments, by which a value would be in two pieces.
+        # Drop comments, because a comment splits a value into two text nodes.
         message = read_root(parse(octets, comments=False))
     except (NotXmlError, NotSoapError) as error:
         raise HarnessError(f"a document was made as a valid message, and is none: {error}") from error
@@ -125,7 +125,7 @@ def quiet_example(service: SoapService) -> tuple[SoapOperation, Node] | None:
         NoAnswerError: no HTTP response came.
         DescriptionError: the contract cannot be used.
     """
-    # The operation that asks for least is the one that is least likely to be refused.
+    # Try the smallest message first: it is the least likely to be refused.
     for operation in sorted(service.contract.operations, key=lambda item: _size(service, item)):
         message = example(service, operation)
         if message is not None:

@@ -16,7 +16,8 @@ DECLARATIONS: Final = (
     "<?xml version='1.0' encoding='utf-8' standalone='yes'?>",
 )
 TEXTS: Final = ("plain", "cdata", "reference", "hexadecimal", "comment", "split", "comment inside")
-# The attribute of signed messages (WS-Security 4.2): SOAP 1.1 4.1.1 lets the Envelope have any qualified attribute.
+# _SECURITY: namespace of the `Id` attribute of signed messages (WS-Security 4.2); SOAP 1.1 4.1.1 lets the Envelope have
+# any qualified attribute.
 _SECURITY: Final = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-utility-1.0.xsd"
 _PREFIXES: Final = ("soapenv", "S", "SOAP-ENV", "_", "x.1-y")
 
@@ -140,7 +141,7 @@ class _Writer:
         made: list[str] = []
         for space in sorted(wanted):
             if not space:
-                # An unqualified element under a default namespace has to take it back.
+                # An unqualified element under a default namespace needs `xmlns=""`.
                 if scope.get("") and not namespace(node.tag):
                     scope[""] = ""
                     made.append(f"xmlns={self._quoted('')}")
@@ -183,7 +184,7 @@ class _Writer:
             "hexadecimal": "".join(f"&#x{ord(char):X};" for char in text),
             "comment": f"{escape(text)}<!-- 1 -->",
             "split": f"{escape(text[:half])}<![CDATA[{text[half:]}]]>",
-            # A reader that takes the first of several text nodes for all of them sees a part of the value.
+            # A parser that uses only the first text node sees only part of the value.
             "comment inside": f"{escape(text[:half])}<!-- 2 -->{escape(text[half:])}",
         }
         return forms.get(self.style.text, escape(text))

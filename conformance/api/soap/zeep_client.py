@@ -53,7 +53,7 @@ class _Transport(Transport):
         )
         self.last = exchange
         answer = exchange.response
-        # zeep takes 200 only; the profile allows any 2xx (R1124).
+        # zeep accepts status 200 only, but the profile allows any 2xx (R1124).
         status = _OK if answer.ok and answer.body else answer.status
         return _Reply(status, CaseInsensitiveDict(answer.headers), answer.body)
 
