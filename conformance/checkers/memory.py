@@ -140,16 +140,18 @@ class Memory:
         self._own = {template: _read_only(one) for template, one in self._items.items()}
         # By path: members of things at the last read, with what clients sent since.
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
-        # Other values than the declared default in the responses to creations, by operation and member.
+        # By operation and member: values in responses to creations that differ from the declared default.
         self._undefaulted: dict[tuple[str, str], Any] = {}
-        # What the run created; collections of which something else was deleted and is gone, and what waits for that.
+        # Paths that the run created. Below: collections in which another thing was deleted, and cases that wait for
+        # that.
         self._made: set[str] = set()
         self._gone: set[str] = set()
         self._back: dict[str, list[Case]] = defaultdict(list)
         self._acts = 0
-        # For how long something lasted by its value, s: things by their template, members by template and name.
+        # How long a value stayed the same, s: of things by template, of members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
-        # What is a failure if something else lasts as long, with its age, s, and what was read instead.
+        # Cases that fail only if the value stays the same elsewhere: with their age, s, and the value that was read
+        # instead.
         self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
 
     def forget(self, *, deletes: bool = True) -> None:
@@ -180,11 +182,11 @@ class Memory:
         elif made is not None and method == "POST":
             yield from self._created(occasion, operation, made, path)
         elif operation.template in self._actions:
-            # Its action may change it, and what is below it.
+            # An action on a thing may change it and the things below it.
             self._drop(lambda other: _is_below(path, other) or _is_below(other, path))
             self._last.clear()
         elif operation.template in self._single and method in {"PUT", "PATCH"}:
-            # Settings may change what things read, and neither create nor delete one.
+            # Settings may change members of all things, but neither create nor delete one.
             for thing in self._things.values():
                 thing.written.clear()
         else:
@@ -203,7 +205,7 @@ class Memory:
     def _changed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Take a PUT, PATCH or DELETE of an item."""
         if not collection_of(operation.template):
-            # The thing that it is below may tell of it.
+            # The parent may list the changed thing.
             self._drop(lambda other: _is_below(path, other))
             self._last.clear()
         last = self._last.pop(path, None)
@@ -251,7 +253,7 @@ class Memory:
         elif id_ is not None and location is None:
             target = _path_in(f"{path}/{quote(str(id_), safe='')}")
         if not target or target.rpartition("/")[0] != path:
-            # It may be any of them.
+            # The request may have changed any of them.
             self._drop(lambda other: _is_below(other, path))
             return
         before = self._things.pop(target.casefold(), None)
@@ -324,7 +326,7 @@ class Memory:
             self._last[path] = now, {}
         for name in own & now.keys() & {*before, *sent}:
             is_taken = name in sent and sent[name] == now[name] != before.get(name)
-            # A word or a truth value may be the device's own as well.
+            # A word or a boolean may also be the device's own value.
             is_taken = is_taken and not isinstance(now[name], bool) and len(str(now[name])) >= _TELLING
             is_other = (
                 name in before and before[name] != now[name] and _FOR_EVER.fullmatch(plain_name(name)) is not None
@@ -343,7 +345,7 @@ class Memory:
             return
         age_s = occasion.sent_s - thing.changed_s
         if age_s < 0:
-            return  # it was sent before that
+            return  # the response began before the write
         if thing.gone:
             yield from self._deleted(occasion, item, thing, age_s)
             return
@@ -365,7 +367,7 @@ class Memory:
         if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
             case = self._case("deleted-is-gone", occasion, expected, cause=item.label)
-            # What is always there is emptied, or as it was at first.
+            # A thing that always exists is emptied by DELETE, or reset.
             if thing.own or item.template in self._gone:
                 yield case
             elif len(self._back[item.template]) < _MOST_PENDING:
@@ -427,8 +429,7 @@ class Memory:
                 thing.shown.setdefault(name, self._acts)
                 yield from self._lasts(kept, age_s, str(wanted)[:_SHOWN])
                 continue
-            # It had been written, and something was sent since then; or it was never written.
-            # Another thing may be the default one now.
+            # Another thing may have become the default since this one was read.
             is_given_away = wanted is True and is_shared(name)
             was_lost = not is_given_away and name in thing.shown and thing.shown[name] < self._acts
             if was_lost or (name not in thing.shown and age_s > _SETTLES_S):

@@ -13,7 +13,8 @@ from conformance.transport.exchange import Response
 from conformance.verdict.evidence import Case
 
 _NAMESPACE = "urn:ietf:rfc:7807"
-# Statuses that servers, proxies and gateways send before a resource sees the request; and 401, which has its own field.
+# Statuses that servers, proxies and gateways send before a resource sees the request; 401 is explained by
+# WWW-Authenticate.
 _TRANSPORT = frozenset({401, 407, 408, 411, 413, 414, 417, 421, 426, 429, 431})
 # Path characters that servers refuse, because the application may read them differently: an encoded slash (Apache),
 # backslash, percent, control character, a parameter (Tomcat, Jetty, Spring's firewall).
@@ -31,7 +32,7 @@ def inside(occasion: Occasion) -> Iterator[Case]:
         if WRONG.encode() in occasion.response.body and WRONG.encode() not in sent and request.raw is None:
             expected, found = "an error that shows nothing of other requests", f"the credentials {WRONG} of another one"
             yield occasion.case("robustness/no-internals", False, expected, found, cause="credentials")  # noqa: FBT003
-        # What is shown differs from file to file, and from one request to the next.
+        # Files and request ids in a response differ from one request to the next.
         inside, path = inside_shown(occasion.exchange), path_shown(occasion.exchange)
         found, cause = f"status {occasion.response.status} with {inside or path!r}", "inside" if inside else "path"
         expected = "an error that shows nothing of the program"

@@ -13,9 +13,9 @@ from conformance.documents.openapi import Resource, is_json, resource_at, resour
 from conformance.transport.exchange import SAFE_METHODS
 from conformance.verdict.evidence import Case
 
-# Statuses that say nothing of the resource; CRASHES are findings of their own.
+# Statuses that do not show whether a resource exists; CRASHES are findings of their own.
 _NOT_NOW: Final = frozenset({401, 403, 429, 503}) | CRASHES
-# Statuses of a device without HEAD; those of a device without the resource.
+# _NO_HEAD: statuses of a device that does not support HEAD. _NO_RESOURCE: statuses for a resource that does not exist.
 _NO_HEAD: Final = frozenset({404, 405, 501})
 _NO_RESOURCE: Final = frozenset({400, 404, 410, 422})
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
@@ -40,13 +40,14 @@ class Resources:
         self._got: dict[object, _Shown] = {}
         self._heads: dict[object, Occasion] = {}
         self._varies: set[str] = set()
-        # What is judged once the device has shown that it knows HEAD; whether it does, and with entity tags.
+        # Cases on HEAD that count once the device has shown that it supports HEAD. Below: whether it does, also with
+        # entity tags.
         self._without_head: list[Case] = []
         self._has_head = self._tags_heads = False
-        # Paths of things that are there, and requests to them that were answered as if they were not.
+        # Paths of things that exist. Below: requests to them that were answered as if they did not.
         self._there: set[str] = set()
         self._suspects: list[tuple[str, Occasion]] = []
-        # For OPTIONS and for all other methods: whether the device refuses methods, and what is judged if it does.
+        # Whether the device refuses methods: OPTIONS, all others. Below: cases that count if it does.
         self._refuses: set[bool] = set()
         self._waiting: dict[bool, list[Case]] = {True: [], False: []}
 
@@ -102,7 +103,7 @@ class Resources:
                 self._without_head.append(case)
         if not same or shown.status in _GONE:
             return
-        # What changes by itself may have been something else between two equal contents.
+        # A resource that changes by itself may have changed between two equal responses.
         is_steady = head.request.url not in self._varies
         tag = _opaque(answer.header("etag"))
         if is_steady and (tag or self._tags_heads):
@@ -194,7 +195,7 @@ def _declared_refusal(occasion: Occasion, resource: Resource) -> Iterator[Case]:
     try:
         problems = [shape_of(one).problem(read_json(answer.body).value) for one in schemas]
     except ValueError:
-        return  # other checks tell that a schema cannot be judged
+        return  # another requirement says that the schema cannot be used
     fault = "" if "" in problems else f"a body in which {problems[0]}"
     expected = "JSON that is valid by the schema that the path declares for 405"
     yield occasion.case("description/method-refused", not fault, expected, fault, cause=f"{resource.template} body")

@@ -22,7 +22,7 @@ from conformance.contract.pack import Contract
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.evidence import Case
 
-# Checkers of any response; checkers that need the description's operation.
+# _ANY: checkers of every response. _DOCUMENTS: checkers that need the description's operation.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.stated, problem.form, fields.allow, fields.challenge,
@@ -42,7 +42,7 @@ class RestCheckers:
     def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
-        # These know what the run has shown so far.
+        # Checkers that remember earlier exchanges of the run.
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._untouched, self._codings = Untouched(contract), Codings()
         self._over_time = (
@@ -76,7 +76,7 @@ class RestCheckers:
             yield from check(occasion)
         yield from self._codings(occasion)
         if not attempt.response.content.is_plain:
-            return  # all others judge what the content says
+            return  # the remaining checkers read the content
         for checker in self._over_time:
             yield from checker(occasion)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:

@@ -24,7 +24,7 @@ from conformance.documents.xml import (
 from conformance.transport.exchange import Attempt, Exchange, Response
 from conformance.verdict.evidence import Case
 
-# BP 1.1 R1012; ASCII is a part of UTF-8.
+# Encodings that BP 1.1 R1012 allows; ASCII is a part of UTF-8.
 _ENCODINGS: Final = frozenset({"", "utf-8", "utf8", "utf-16", "utf-16le", "utf-16be", "us-ascii", "ascii"})
 _ENCODING_STYLE: Final = clark(ENVELOPE, "encodingStyle")
 _MUST_UNDERSTAND: Final = clark(ENVELOPE, "mustUnderstand")
@@ -80,7 +80,7 @@ class SoapCheckers:
         if not isinstance(attempt, Exchange) or request.method != "POST" or request.url not in self._endpoints:
             return
         if SOAP_12 in request.body:
-            return  # a node that has SOAP 1.2 as well answers a request of that version in it
+            return  # a service that also supports SOAP 1.2 answers a request of that version in it
         rules, response = _Rules(attempt), attempt.response
         yield rules.case("R1141", response.http_version in {"HTTP/1.1", "HTTP/1.0"}, "HTTP/1.1 or HTTP/1.0")
         inside = inside_shown(attempt)
@@ -203,7 +203,7 @@ def _fault(rules: _Rules, response: Response, fault: Fault) -> Iterator[Case]:
         is_standard = fault.code_namespace != ENVELOPE or fault.code in _FAULT_CODES
         expected = "one of SOAP's fault codes, or a fault code in a namespace of its own"
         yield case("R1004", is_standard, expected, lambda: f"{fault.code!r} in SOAP's namespace")
-        # A service that implements WS-Addressing has codes of its own for headers of it that are wrong.
+        # A service with WS-Addressing has fault codes of its own for wrong addressing headers.
         addressed = b"addressing" in rules.exchange.request.body and "addressing" in fault.code_namespace
         yield case(
             "fault-code",
@@ -227,7 +227,7 @@ def _fits(response: Response) -> bool:
     charset = _CHARSET.search(response.header("content-type") or "")
     if charset is None or charset[1].lower() not in _ENCODINGS:
         return True
-    # XML begins with "<" or a byte order mark, so that UTF-16 has a zero or a mark of its own in its first two octets.
+    # XML begins with "<" or a byte order mark, so UTF-16 shows in the first two bytes: a mark or a zero.
     wide = response.body[:2] in {b"\xff\xfe", b"\xfe\xff"} or 0 in response.body[:2]
     return wide == charset[1].lower().startswith("utf-16")
 

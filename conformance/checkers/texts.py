@@ -76,7 +76,7 @@ class Texts:
             expected = f"{name} {shown(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
             label = occasion.operation.label if occasion.operation else ""
             same = _plain(seen) in {_plain(text), _ascii(text)}
-            # A list may show the beginning.
+            # A list may show only the beginning of a text.
             same |= write.id is not None and _plain(text).startswith(_plain(seen.rstrip(". \u2026")))
             cause = f"{label} {name} text"
             yield occasion.case("description/written-is-read", same, expected, f"{name} {shown(seen)}", cause=cause)

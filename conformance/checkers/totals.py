@@ -13,18 +13,18 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
-#: A total may be stored apart from the list, and be late after a change, s. Reads in which a total must be wrong while
-#: nothing changes.
+#: SETTLES_S: a total may be stored apart from its list, and be late after a change, s. _OFTEN: reads in which it must
+#: be wrong.
 SETTLES_S: Final = 3.0
 _OFTEN: Final = 2
-# Servers cut a list at multiples of these numbers without saying so; the fewest items of such a list.
+# _CUTS: multiples at which servers cut a list silently. _FEWEST_CUT: fewest items of such a list.
 _CUTS: Final = (5, 16)
 _FEWEST_CUT: Final = 10
-# Choices of filters that are remembered.
+# Combinations of filters that are remembered.
 _MOST: Final = 1000
-# Texts of a description that say that a total counts the filtered items.
+# Phrases in a description which say that a total counts the filtered items.
 _FILTERED: Final = re.compile(r"\b(?:filter\w*|match\w*)\b(?![^.]*\b(?:ignor|regardless|whatever))", re.IGNORECASE)
-_CAP: Final = 50  # also the fewest items that a list without parameters for its parts is cut at
+_CAP: Final = 50  # Also the fewest items at which a list without paging parameters counts as cut.
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Totals:
             count.is_of_all |= every.is_of_all
             if chosen and whole and count.agrees is None and name in says_filtered(listing):
                 count.agrees = True
-            # A filter that leaves all items does not show whether the total is that of what it leaves.
+            # A filter that keeps all items does not show whether the total counts the filtered ones.
             if whole and shown and (not chosen or part.least < every.all):
                 count.learn(total, part)
             if count.agrees and (count is not every or not chosen):
@@ -171,7 +171,8 @@ class Totals:
         elif not part.whole and shown and total != count.all:
             if count.is_of_all:
                 count.other.append((part.occasion, total))
-            # Nothing was changed since the whole list was read; a list that shrinks by itself may have one such size.
+            # Nothing changed since the whole list was read, but a list that shrinks by itself may once have had that
+            # size.
             elif plain_name(name) in TOTALS and total == shown < count.all and count.all_s > self._changed_s:
                 count.sizes.add(total)
                 if len(count.sizes) >= _OFTEN:

@@ -18,10 +18,11 @@ from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 _STATES: Final = frozenset({"state", "status", "phase", "mode"})
-# Texts of a description on what an operation does in all states that another sentence does not name.
+# Phrases in a description on what an operation does in every other state.
 _ELSE: Final = re.compile(r"\b(?:an)?other state|\botherwise\b", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
-# Times that a change must follow: once may be a change by itself at that moment.
+# _TWICE: how often a state change must follow an operation, because once may be by chance. _OCTETS, _MOST: size and
+# number of responses kept.
 _TWICE: Final = 2
 _OCTETS, _MOST = 65_536, 1_000
 
@@ -36,10 +37,10 @@ class Transitions:
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
         reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
-        # The member with the state of a thing, and the states from which each operation of it starts.
+        # By template: the member with the thing's state. Below: the states from which each operation starts.
         self._states = {template: name for template, one in reads.items() if (name := state_member(one))}
         self._starts = {one.label: named for one in operations if (named := self._named(reads, one))}
-        # The members of each thing, as they were last read.
+        # By path: members of the thing at the last read.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
 

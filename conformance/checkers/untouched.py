@@ -21,16 +21,17 @@ from conformance.documents.openapi import SAFE, is_json
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
 
-#: What changed so often, and did not change between so many reads alone, is no chance.
+#: A change after OFTEN refusals, and never between ALONE reads without one, is no chance. _OCTETS, _MOST: size and
+#: number of responses kept.
 OFTEN, ALONE = 3, 2
 _OCTETS, _MOST = 65_536, 1_000
-#: By these words an operation says that it keeps all when it is refused.
+#: Phrases with which an operation says that a refused request changes nothing.
 KEEPS: Final = re.compile(r"nothing (?:is )?chang|not chang|unchanged|no effect|without effect", re.IGNORECASE)
-# What tells of a change is sure after fewer times, where it did not change between so many reads alone.
+# A revision member needs only _TWICE refusals, if it did not change between _MANY reads without one.
 _TWICE, _MANY = 2, 12
 # Members that change when a thing does.
 _REVISION: Final = re.compile(r"(?:revision|version|etag|(?:updated|modified|changed)(?:at|on|time)?)$")
-# By these words a description says of all requests that a refused one changes nothing.
+# Phrases with which a description says that no refused request changes anything.
 _SAID: Final = re.compile(
     r"\b(?:refus|reject|4xx)\w*\b[^.:]*\b(?:changes? nothing|nothing (?:is )?changed?|no effect|unchanged)",
     re.IGNORECASE,
@@ -61,9 +62,9 @@ class Untouched:
     def __init__(self, contract: Contract) -> None:
         self._keeps_all = keeps_all(contract)
         self._seen: dict[str, _Seen] = {}
-        # Labels of operations that say so for themselves.
+        # Operations whose own description says that a refused request changes nothing.
         self._keeping: set[str] = set()
-        # By template and what came between: how often that was, and which members were others then.
+        # By template and refused operation: how many refusals were seen. Below: members that had changed after them.
         self._count: Counter[tuple[str, str]] = Counter()
         self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
 
@@ -109,7 +110,7 @@ class Untouched:
         is_often = times >= OFTEN and alone >= ALONE
         if not label or not (is_often or (times >= _TWICE and alone >= _MANY)):
             return
-        # What a refused request may not change: all, by the description, and what tells that the thing has changed.
+        # A refused request may not change any member, if the description says so; otherwise not the revision.
         always = [name for name, count in self._changed[key].items() if count == self._count[key]]
         is_all = self._keeps_all or label == _CONDITIONAL
         changed = [found for other, found in self._changed.items() if other[0] == template and other != key]

@@ -174,7 +174,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
 
     Exit code: 0 conformant, 1 not conformant, 2 usage, 3 robot not reached, 4 inconclusive, 130 interrupted.
     """
-    # However it ends, a run stops the robot and writes what it has.
+    # However it ends, a run has to stop the robot and write its result.
     end_like_ctrl_c()
     end_with_parent()
     options = CertifyOptions.of(given)
@@ -188,7 +188,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
-        # What each run would refuse is told once, before the first.
+        # Report wrong options once, before the first run starts.
         options.check_nonce()
         if options.key:
             door.notary(Path(options.key))
@@ -207,8 +207,8 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
         raise click.UsageError(str(error)) from error
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
-    # What is there now lives as long as the process, which would look through all of it for garbage before it ends:
-    # that took half a second.
+    # Exempt existing objects from the garbage collector, which would scan them all before the process ends (half a
+    # second).
     gc.freeze()
     return done
 
@@ -236,7 +236,7 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
         return init(statement, chosen, contract, force=options.force)
     options.check_nonce()
     options.check_new_baseline()
-    # Before the run: what cannot be signed by this key is told at once.
+    # Before the run, so that a key that cannot sign is reported at once.
     notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
     if options.plan:
         return _plan(chosen, options, contract)
@@ -320,7 +320,7 @@ def _certify(
     run.requirement_set, run.given = requirements, given
     run.selection = replace(run.selection, accepted=frozenset(entry.requirement for entry in baseline))
     run.restart_command, run.wait_s = options.restart_command, options.wait_s
-    run.prepare = door.prepare if door else None  # there is none where the command runs without roaas.py
+    run.prepare = door.prepare if door else None  # without roaas.py there is no front door
     notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     robot = RobotUnderTest(run, connection)

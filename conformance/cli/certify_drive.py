@@ -94,7 +94,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         NotShownError: no map could be found.
         KeyboardInterrupt: nobody wants it to move.
     """
-    # What talks to a device is imported late: --help need not pay for it.
+    # Modules that talk to a device are imported late, so that --help stays quick.
     from conformance.api.permission import Permission  # noqa: PLC0415
     from conformance.api.rest.interface import RestInterface  # noqa: PLC0415
     from conformance.engine.finding import plan_of  # noqa: PLC0415

@@ -69,7 +69,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
         return write_fleet(document, options.out)
 
     def keep(results: list[MemberResult]) -> None:
-        with contextlib.suppress(OSError):  # told in the end: no robot is to wait for a full disk
+        with contextlib.suppress(OSError):  # reported at the end: a full disk must not delay the other robots
             write(results, interrupted=True)
 
     async def judge() -> tuple[list[MemberResult], bool]:

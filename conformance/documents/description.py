@@ -27,11 +27,11 @@ from conformance.documents.schema_places import DATA, FILES, in_one_version, mak
 from conformance.documents.swagger import as_openapi_3
 from conformance.transport.reach import ElsewhereError, Trust, is_same, joined, path_of
 
-# All files of a description together: their number, their octets, and the time to fetch them, s.
+# All files of a description together: _MOST_FILES, _MOST_OCTETS, and below the time to fetch them, s.
 _MOST_FILES: Final = 5_000
 _MOST_OCTETS: Final = 64 * 1024 * 1024
 _MOST_S: Final = 120.0
-# Objects whose members have names that an author chose.
+# Objects whose keys are names that an author chose.
 _BY_NAME: Final = frozenset(
     {
         "properties", "patternProperties", "dependentSchemas", "dependencies", "$defs", "definitions", "schemas",
@@ -221,7 +221,7 @@ class _Bundle:
         """Return the document with the files that it refers to below FILES, and references to there."""
         plain = json.loads(json.dumps(document))
         self.anchors[self.source] = make_plain(plain, self.source)
-        plain.pop("jsonSchemaDialect", None)  # any is judged as OpenAPI's own, which is JSON Schema 2020-12
+        plain.pop("jsonSchemaDialect", None)  # a schema of any dialect is judged as JSON Schema 2020-12, OpenAPI's own
         whole: Schema = self._walked(plain, self.source, "#")
         return {**whole, FILES: self.files} if self.files else whole
 
@@ -307,12 +307,12 @@ def _with_defaults(server: Schema) -> str:
     url = _VARIABLE.sub(default, str(server.get("url", "/")))
     server_part = _SERVER.match(url)
     begin = server_part.end() if server_part else 0
-    # No request target has a space, a line end or a lone surrogate, and no host has the last one.
+    # A request target may not contain a space, line end or lone surrogate, and a host no lone surrogate.
     host = url[:begin].encode("utf-8", "backslashreplace").decode()
     return host + quote(url[begin:], safe="%/:?#[]@!$&'()*+,;=~\\", errors="surrogatepass")
 
 
-# Budget of an overlay: places that its actions change in all, values that they add in all, and time, s.
+# Budget of an overlay: _MOST_PLACES that its actions change, _MOST_NODES values that they add, and below the time, s.
 _MOST_PLACES: Final = 50_000
 _MOST_NODES: Final = 1_000_000
 _MOST_OVERLAY_S: Final = 10.0
@@ -351,9 +351,10 @@ def overlaid(document: Schema, overlay: Schema) -> Schema:
                 matches.append(match)
         except OverlayError:
             raise
-        except (JSONPathError, ValueError, OverflowError, re.error) as error:  # Python reads its numbers and patterns
+        # jsonpath uses Python's numbers and patterns, which raise these
+        except (JSONPathError, ValueError, OverflowError, re.error) as error:
             raise OverlayError(f"actions[{number}] target {action['target']!r} is no JSONPath: {error}") from error
-        # The last first, so that removing an item of a list does not move the next one.
+        # From the last to the first, so that removing an item of a list does not move the next.
         for match in reversed(matches):
             _apply(changed, list(match.parts), action)
     return changed

@@ -24,7 +24,7 @@ from conformance.documents.openapi import PARAMETER, Operation, methods_of, read
 from conformance.documents.schema_budget import Growth
 from conformance.documents.schema_places import DATA, foreign_words, in_extension, schema_places, without_foreign_words
 
-# Violations that are searched for the reason why a part cannot be read.
+# Violations to search for the reason why a part of the description cannot be read.
 _MOST_FAULTS = 1_000
 _SCHEMAS = "openapi/definitions.py"
 
@@ -128,7 +128,7 @@ def _schemas(document: Schema) -> Iterator[str]:
         try:
             shape_of(modern(resolved(document, schema)))
         except UnresolvedError:
-            continue  # description/references tells that
+            continue  # the requirement description/references reports that
         except (ValueError, TypeError, RecursionError) as error:
             reason = str(error).splitlines()[0][:160]
             if reason not in told:
@@ -231,7 +231,7 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
         content = one.get("content", {})
         for name, media in content.items() if isinstance(content, dict) else ():
             if isinstance(media, dict) and isinstance(media.get("schema"), dict) and "json" in name:
-                # A request lacks what is the device's, and a response what is only for requests.
+                # A request lacks readOnly members, and a response writeOnly members.
                 marks = ("readOnly" if one is body else "writeOnly",)
                 yield from ((f"the example of {place}", media["schema"], marks, value) for value in _named(media))
                 yield from _of_schema(place, media["schema"])
@@ -250,7 +250,7 @@ def _named(given: Schema) -> list[Any]:
 def _of_schema(place: str, schema: Schema, depth: int = 0) -> Iterator[tuple[str, Schema, tuple[str, ...], Any]]:
     """Yield the defaults and examples inside a schema."""
     plain = {key: value for key, value in schema.items() if key not in {"default", "example", "examples"}}
-    # One schema may be that of a request and of a response.
+    # The same schema may serve requests and responses.
     marks = ("readOnly", "writeOnly")
     if schema.get("default") is not None:
         yield f"the default of {place}", plain, marks, schema["default"]
@@ -296,7 +296,7 @@ def _path_fault(operations: Sequence[Operation]) -> str:
 
 
 _UNREADABLE: Final = (UnresolvedError, AttributeError, TypeError, KeyError, ValueError)
-# Characters of a place, and lines, that are shown.
+# _SHOWN: characters of a place in a message. _LINES: lines of a message.
 _SHOWN: Final = 300
 _LINES: Final = 200
 _META: Final = jsonschema_rs.validator_for({"$ref": "https://json-schema.org/draft/2020-12/schema"})
@@ -345,7 +345,7 @@ def _without_schemas(document: Schema) -> tuple[Schema, list[str]]:
     found: Schema = deepcopy(document)
     growth = Growth(found)
     lines = []
-    # Inner ones first, so that as little as possible is left out.
+    # Innermost first, so that as little of the description as possible is left out.
     for holder, key, pointer in reversed(list(schema_places(found))):
         if in_extension(pointer):
             continue

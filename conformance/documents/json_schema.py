@@ -9,7 +9,7 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 Schema = dict[str, Any]
-# Nodes of a schema, and references behind each other, that are copied; the others stay lazy references.
+# MOST_NODES: nodes of a schema that are copied. _DEEPEST: references in a chain; deeper ones stay lazy references.
 MOST_NODES: Final = 2_000
 _DEEPEST: Final = 8
 #: Scheme of lazy references.
@@ -87,7 +87,7 @@ class _Resolver:
             return value
         if isinstance(value.get("$ref"), str):
             return self._referred(value, value["$ref"], trail)
-        # The values of an enum or a const are data, whatever they look like.
+        # Values of enum and const are data, even if they look like schemas.
         return {
             key: item if key in _DATA and not names else self.copy(item, trail, names=key in _NAMING and not names)
             for key, item in value.items()
@@ -95,9 +95,9 @@ class _Resolver:
 
     def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
         if reference.startswith(f"{LAZY_SCHEME}/"):
-            return value  # the ring in which it is was resolved before
+            return value  # a circular reference that was resolved before
         found = pointed(self._document, reference)
-        # OpenAPI 3.0 ignores what stands beside a $ref; `nullable` is taken as its author means it.
+        # OpenAPI 3.0 ignores keywords beside a $ref, but authors mean `nullable` there.
         beside = {
             key: self.copy(item, trail)
             for key, item in value.items()
@@ -194,12 +194,12 @@ def modern(schema: Any) -> Any:
         and isinstance(result.get("oneOf"), list)
         and "anyOf" not in result
     ):
-        # The discriminator says which alternative is meant, even if others allow the value as well (3.1, 4.8.25).
+        # The discriminator names the alternative, even if others allow the value too (OpenAPI 3.1, 4.8.25).
         result["anyOf"] = result.pop("oneOf")
     for bound, exclusive in (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")):
         if isinstance(result.get(exclusive), bool) and result.pop(exclusive) and bound in result:
             result[exclusive] = result.pop(bound)
-    if isinstance(result.get("items"), list):  # a tuple, before 2020-12
+    if isinstance(result.get("items"), list):  # before 2020-12, a list in `items` described a tuple
         result["prefixItems"] = result.pop("items")
         if "additionalItems" in result:
             result["items"] = result.pop("additionalItems")
@@ -229,7 +229,7 @@ def opened(schema: Any) -> Any:
     return changed_alike(found, "opened")
 
 
-#: The changes to a schema behind a lazy reference, by name.
+#: By name: functions that change the schema behind a lazy reference.
 CHANGES: Final[dict[str, Callable[[Any], Any]]] = {"modern": modern, "opened": opened}
 
 

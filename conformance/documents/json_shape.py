@@ -43,18 +43,18 @@ if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
 
 T = TypeVar("T")
-# The keyword that stands for a lazy reference in a schema that is compiled on its own.
+# _KEYWORD: stands for a lazy reference in a schema that is compiled alone. _UNEVALUATED: keywords that need all others.
 _KEYWORD: Final = "roaas-referred"
 _UNEVALUATED: Final = frozenset({"unevaluatedProperties", "unevaluatedItems"})
-# A schema that refers to at most this many others is compiled together with them.
+# A schema with at most this many references is compiled together with the schemas it refers to.
 _MOST_TOGETHER: Final = 30
-# Nodes of all schemas that are kept compiled, in nearly 1 kB each.
+# Nodes of all compiled schemas that are kept; each takes nearly 1 kB.
 _MOST_KEPT: Final = 100_000
-# Verdicts on parts of values that are remembered, in about 250 octets each.
+# Verdicts on parts of values that are remembered; each takes about 250 bytes.
 _MOST_JUDGED: Final = 100_000
 # A part with at least this many octets of JSON is remembered by its digest.
 _DIGESTED: Final = 100
-# References that are followed to name a violation: alternatives that refer to each other multiply.
+# References to follow in order to describe a violation: alternatives that refer to each other multiply.
 _MOST_FOLLOWED: Final = 1_000
 # The form of a lazy reference after `bundled` has put its schema into `$defs`.
 _BUNDLED: Final = re.compile(r"#/\$defs/(\d+(?:,\w+)*)")
@@ -103,7 +103,7 @@ def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> 
         if is_finite and _holds_by(f"{LAZY_SCHEME}/{found[1]}", instance):
             return
         _FOLLOWING.left -= 1
-        # Whether a value with an infinity is valid is known by following alone.
+        # Only following the references can tell whether a value with an infinity is valid.
         if _FOLLOWING.left < (0 if is_finite else -_MOST_FOLLOWED):
             yield ValidationError("it fits none of the alternatives", validator="anyOf")
             return
@@ -262,7 +262,7 @@ def _has_words(schema: Any, words: frozenset[str]) -> bool:
 
 def _is_together(schema: Schema) -> bool:
     """Return whether a schema is compiled with all that it refers to: that is quicker to judge by, if it is little."""
-    # What is evaluated behind a keyword of ours is unknown to these words.
+    # These keywords cannot know what a lazy reference has evaluated.
     if _has_words(schema, _UNEVALUATED):
         return True
     waiting: list[str] = []
@@ -311,7 +311,7 @@ class Shape:
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._quick = validator_of(schema, _holds_by)
-        # By such names, jsonschema-rs allows too much.
+        # With such patterns for names, jsonschema-rs allows too much.
         self._is_exact = _are_plain(_patterns_in(_compiled_of(schema), names=True))
 
     def problem(self, value: Any, where: str = "") -> str:
@@ -347,11 +347,11 @@ class Shape:
     def _validator(self) -> Any:
         from jsonschema_specifications import REGISTRY  # noqa: PLC0415 - as above
 
-        # With a registry of one's own, jsonschema fetches nothing.
+        # With a registry of its own, jsonschema fetches nothing from the network.
         return _naming()(bundled(self.schema), registry=REGISTRY)
 
     def _is_valid(self, value: Any) -> bool:
-        # One judgement may ask for another, in the midst of a search for a name.
+        # A validation may start another one while it searches for a violation to describe.
         before, _FOLLOWING.left = _FOLLOWING.left, 0
         try:
             return bool(self._validator.is_valid(value))
@@ -378,7 +378,7 @@ class Shape:
         try:
             return self._is_exact and bool(self._quick.is_valid(value)) and _all_finite(value)
         except (ValueError, TypeError, OverflowError):
-            return False  # a number that it does not take (an Infinity): the other one judges that
+            return False  # jsonschema-rs refuses the number (an Infinity): the other validator judges it
 
 
 def _misfit(errors: list[ValidationError]) -> tuple[bool, bool, int]:
@@ -455,7 +455,7 @@ def _each_finite(value: Any) -> bool:
 
 
 _SINGLE: Final = 3.4028234663852886e38
-# The lowest and the highest value by the OpenAPI Initiative's Format Registry. Any number of JSON may be a double.
+# By format of the OpenAPI Initiative's Format Registry: lowest and highest value. Any JSON number may be a double.
 _RANGES: Final[dict[str, tuple[float, float]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
@@ -518,7 +518,7 @@ def in_range(schema: Any) -> Any:
     result = {key: item if key in _DATA else in_range(item) for key, item in schema.items()}
     name = schema.get("format")
     if isinstance(name, str) and name in _RANGES:
-        # All of them hold: the schema's own bounds may be narrower, and stay.
+        # The schema's own bounds stay, because they may be narrower.
         bounds: Schema = dict(zip(("minimum", "maximum"), _RANGES[name], strict=True))
         bounds |= {"format": name} | ({"multipleOf": 1} if "int" in name else {})
         result["allOf"] = [*result["allOf"], bounds] if isinstance(result.get("allOf"), list) else [bounds]

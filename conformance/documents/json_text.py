@@ -10,7 +10,7 @@ from typing import Any, Final
 
 _SHOWN: Final = 60
 _BYTE_ORDER_MARK: Final = "a byte order mark before the JSON"
-# An integer with more digits is beyond every double; Python refuses to read 5,000 of them.
+# Most digits of an integer: a longer one exceeds every double, and Python refuses to read 5,000 digits.
 _DIGITS_READ = 400
 
 

@@ -13,7 +13,7 @@ from conformance.documents.xml import NotXmlError, parse
 if TYPE_CHECKING:
     from lxml import etree
 
-# Budget of a multipart body: parts; octets of included parts, counted as often as they are included.
+# Budget of a multipart body: _MOST_PARTS, and _MOST_OCTETS of included parts, counted each time they are included.
 _MOST_PARTS: Final = 10_000
 _MOST_OCTETS: Final = 64 * 1024 * 1024
 _INCLUDE: Final = "{http://www.w3.org/2004/08/xop/include}Include"
@@ -111,7 +111,7 @@ def root_of(content_type: str, body: bytes) -> etree._Element:
 def in_utf_8(content_type: str, body: bytes) -> bytes:
     """Return XML in UTF-8 if its Content-Type names another charset, which outranks the document (RFC 7303, 3.2)."""
     charset = parameter(content_type, "charset").strip("'\"").lower()
-    # A byte order mark outranks both, and an encoding that the document names itself is read by the parser.
+    # A byte order mark outranks the charset, and an encoding in the document itself is left to the parser.
     if charset in {"", "utf-8", "idna", "punycode"} or body.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
         return body
     try:

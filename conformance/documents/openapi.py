@@ -33,8 +33,7 @@ from conformance.transport.exchange import sendable
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options", "trace", "query")
 SAFE = frozenset({"GET", "HEAD", "OPTIONS", "TRACE", "QUERY"})
-# Nodes of a document that are copied for all its paths, and for each at least; schemas that many refer to are then read
-# once for all of them.
+# _NODES_IN_ALL: values of a document that are copied for all paths together. _FEWEST_NODES: for each path at least.
 _NODES_IN_ALL: Final = 500_000
 _FEWEST_NODES: Final = 100
 
@@ -230,7 +229,8 @@ def _operation(
             }
             for status, response in given.get("responses", {}).items()
         },
-        # Of a device with a contract, whatever is not safe may move it; of any other, what is said to.
+        # With a contract, every unsafe operation may move the device; with a description alone, only operations marked
+        # so.
         motion=bool(given.get("x-roaas-motion", method not in SAFE and not closed)),
         optional=bool(given.get("x-roaas-optional", False)),
         headers={str(status): _headers(response) for status, response in given.get("responses", {}).items()},
@@ -261,7 +261,7 @@ def without_marked(schema: Any, mark: str) -> Any:
         marked = _marked(properties, mark)
         result["required"] = [name for name in required if name not in marked]
     if isinstance(properties, dict) and mark == "readOnly":
-        # A device ignores such a member of a request, whatever its value.
+        # A device ignores such a member in a request.
         result["properties"] = {**properties, **{name: {"readOnly": True} for name in _marked(properties, mark)}}
     return result
 
@@ -376,8 +376,8 @@ def inside_prefix(contract: Contract, path: str) -> bool:
 
 #: Other keywords of OpenAPI 3 describe these, so header parameters of these names are ignored (OpenAPI 3.1, 4.8.12.2).
 IGNORED: Final = frozenset({"accept", "content-type", "authorization"})
-# Fields by which a server may take another method, target or end of the request than the request line says: they would
-# make a permitted GET a DELETE, and lead a credential to another host behind the same gateway.
+# Headers by which a server may see another method, target or end of the request than the request line has. They could
+# turn a permitted GET into a DELETE, or send a credential to another host behind the same gateway.
 _STEERING: Final = re.compile(
     r"x-(?:http-?)?(?:method|verb)(?:-?override)?|(?:http-?)?method-?override"
     r"|(?:x-)?(?:original|rewrite|forwarded)-?(?:url|uri|path|prefix|host|server)"
@@ -442,7 +442,7 @@ def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
         return _in_query(parameter, document)
     name, where = str(parameter.get("name")).lower(), parameter.get("in")
     steers = {"header": _STEERING, "query": _METHOD_IN_QUERY}.get(str(where))
-    # Many servers take _ and - for the same in the name of a field.
+    # Many servers treat _ and - in header names as equal.
     same = name.replace("_", "-") if where == "header" else name
     is_left_out = (where == "header" and name in ignored) or (steers and steers.fullmatch(same))
     return [] if is_left_out else [given]

@@ -14,10 +14,10 @@ from conformance.documents.parameters import Parameter, by_media_type, read_enco
 from conformance.documents.schema_compatibility import schema_changes
 from conformance.documents.schema_sides import Side
 
-#: A change: whether it breaks a client (None if that is not known), and its text.
+#: Whether a change breaks a client (None: not known), and the text of the change.
 Found = tuple[bool | None, str]
 _KINDS: Final = {"query": "query parameter", "header": "header", "cookie": "cookie", "path": "path parameter"}
-# Styles that write something before a single value.
+# Parameter styles with a prefix before a single value.
 _MARKED: Final = frozenset({"matrix", "label"})
 
 
@@ -108,7 +108,7 @@ class _Comparison:
         before, after = self.old.parameters(), self.new.parameters()
         for key, (one, _) in after.items():
             if key not in before and one.where == "path":
-                # It was always there: only its description is new.
+                # The parameter always existed: only its description is new.
                 yield False, f"{_called(one)} is described now"
             elif key not in before:
                 needed = one.required and self.by_client
@@ -171,7 +171,7 @@ class _Comparison:
         for status in before:
             keys = [status] if status in after else _narrower(status, before, after) or _wider(status, after)
             if not keys:
-                # A client that knows of an error need not get it.
+                # A client needs no error status that is no longer described.
                 succeeds = status.startswith("2") or not any(key.startswith("2") for key in before)
                 yield succeeds, f"status {status} is gone"
             pairs |= dict.fromkeys((status, key) for key in keys)
@@ -215,7 +215,8 @@ class _Comparison:
         """Yield what changed in the media types of a body, and in the schema of each."""
         found: dict[Found, None] = {}
         for name, content in old.items():
-            # A client that sends what is described must be understood; one that reads takes less than a whole range.
+            # A client that sends a described media type must be understood; a client that reads accepts less than a
+            # whole range.
             others = [one for one in new if _is_in(name, one)][:1] or [one for one in new if _is_in(one, name)]
             if not others or (request and not _is_in(name, others[0])):
                 yield True, f"{what} is no longer {name}"
@@ -225,7 +226,7 @@ class _Comparison:
         yield from found
         for name in new:
             if name not in old and (old or not request):
-                # A response that had no content may have one: a client that expects none need not look at it.
+                # A response may gain content: a client that expects none ignores it.
                 yield False, f"{what} may be {name}"
 
     def _content(self, old: Schema, new: Schema, media_type: str, *, request: bool) -> Iterator[Found]:
@@ -284,9 +285,9 @@ def _called(parameter: Parameter) -> str:
     return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
 
 
-# What a client has to know of a security scheme, by its type.
+# By type of security scheme: what a client has to know of it.
 _KNOWN: Final = {"apiKey": ("in", "name"), "http": ("scheme",), "openIdConnect": ("openIdConnectUrl",)}
-# A credential as a client knows it, with its scopes; several are needed together.
+# A credential as a client knows it, with its scopes. Several may be needed together.
 _Alternative = dict[tuple[str, ...], frozenset[str]]
 
 
@@ -301,7 +302,7 @@ def security_changes(old: tuple[Schema, Schema], new: tuple[Schema, Schema]) -> 
     if all(one in after for one in before) and all(one in before for one in after):
         yield from _flows(old[0], new[0], before)
         return
-    # A client with credentials that sufficed before must be let in.
+    # Credentials that sufficed before must still suffice.
     breaking = any(not any(_suffices(had, needed) for needed in after) for had in before)
     yield breaking, f"needs {_text(*new)}, before {_text(*old)}"
 
@@ -369,7 +370,7 @@ def _text(document: Schema, operation: Schema) -> str:
 
 
 _VARIABLE: Final = re.compile(r"\{([^{}]+)\}")
-# An operation as a client addresses it: method and path below the server.
+# Method and path below the server.
 _Key = tuple[str, str]
 
 
@@ -430,7 +431,7 @@ def _of_operation(both: Documents, old: Described, new: Described, *, by_client:
     if by_client:
         yield from security_changes((both.old, old.operation), (both.new, new.operation))
     yield from operation_changes(both, old, new, by_client=by_client)
-    # What the API calls in the other direction.
+    # Callbacks are requests from the API to the client.
     callbacks = _callbacks(old), _callbacks(new)
     for change in _of_operations(both, *callbacks, by_client=not by_client):
         yield change.breaking, f"callback {change.operation}: {change.text}"

@@ -26,13 +26,13 @@ VALID, INVALID, UNCLEAR = "valid", "invalid", "unclear"
 # The grammar of numbers in paths and queries; integers have no fraction.
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _INTEGER: Final = re.compile(r"[+-]?\d+", re.ASCII)
-# Texts that no reader takes for a number: the empty text, or a letter where a number has none.
+# Texts that no server reads as a number: the empty text, or a letter where a number has none.
 _NO_NUMBER: Final = re.compile(r"|.*[A-DF-Za-df-z].*|[eE].*", re.DOTALL)
-# Texts of booleans; texts that some frameworks take for a boolean, and for null.
+# _BOOLEANS: texts of booleans. _NEAR_BOOLEANS: texts that some frameworks read as a boolean or null.
 _BOOLEANS: Final = {"true": True, "false": False}
 _NEAR_BOOLEANS: Final = frozenset({"", "1", "0", "yes", "no", "on", "off", "t", "f", "y", "n"})
 _NULLS: Final = frozenset({"", "null"})
-# Digits of an integer that is beyond every declared bound.
+# _BEYOND_EVERY_BOUND: digits of an integer that exceeds every declared bound.
 _BEYOND_EVERY_BOUND: Final = 40
 _SCALARS: Final = frozenset({"string", "number", "integer", "boolean"})
 _ENCODED: Final = re.compile(r"%(?![0-9A-Fa-f]{2})")
@@ -89,7 +89,7 @@ def judged(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
         kinds = kinds_of(parameter.schema) or {"string"}
         said = [_of_scalar(parameter, texts, decode)] if kinds & _SCALARS else []
         if kinds & {"array", "object"} and list(texts) == [""]:
-            return UNCLEAR  # nothing at all, an empty array, or one with an empty text
+            return UNCLEAR  # nothing, an empty array, or an array with an empty text
         if "array" in kinds:
             said.append(_agreed(parameter.schema, _arrays(parameter, texts, decode)))
         if "object" in kinds:
@@ -127,7 +127,7 @@ def _of_content(parameter: Parameter, texts: Sequence[str], decode: Callable[[st
 def _of_scalar(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
     text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
     if text is None or (text == "" and (parameter.empty or not parameter.required)):
-        return UNCLEAR  # to some readers, an optional parameter without a value is not there
+        return UNCLEAR  # some servers treat an optional parameter without a value as absent
     return judged_text(parameter.schema, decode(text))
 
 
@@ -271,7 +271,7 @@ def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
     pairs = parameter.explode and "object" in kinds_of(parameter.schema)
     plain: Callable[[str], str] = str if pairs else decode
     if parameter.style in SEPARATORS:
-        yield Reading(decode(text).split(separator))  # such a separator is always percent-encoded
+        yield Reading(decode(text).split(separator))  # this separator is always percent-encoded
         return
     yield Reading([plain(part) for part in text.split(separator)])
     delimiters = (separator, "=") if pairs else (separator,)
@@ -282,7 +282,7 @@ def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
         yield Reading([plain(part) for part in text.split(".")])
 
 
-# A verdict, and why it is so.
+# Verdict on a text, and its reason.
 Said = tuple[str, str]
 _Value = TypeVar("_Value", str, "Part")
 # Keywords that make the value of one field depend on others.
@@ -399,7 +399,7 @@ def urlencoded_verdict(body: bytes, form: Body) -> Said:
 def _text_field(name: str, schema: Schema, how: Encoding | None, texts: Sequence[str]) -> str:
     given = how or Encoding()
     if how is None and "object" in kinds_of(schema):
-        return UNCLEAR  # OpenAPI 3.0 and 3.1 differ in how it is written
+        return UNCLEAR  # OpenAPI 3.0 and 3.1 write this value differently
     media_type = given.media_type if is_json(given.media_type) else ""
     item = Parameter(
         name, "form", required=False, schema=schema, style=given.style, explode=given.explode, media_type=media_type
@@ -433,7 +433,7 @@ def _one_part(schema: Schema, given: str, part: Part) -> str:
         if text.problem and not text.malformed:
             return UNCLEAR
         return INVALID if text.malformed else judged_json(schema, text.value)
-    # A text with a file name is a file to some frameworks; OpenAPI leaves other ways to write an object open.
+    # Some frameworks take a text with a file name for a file; OpenAPI leaves open how else to write an object.
     is_text = not part.is_file and "object" not in kinds_of(schema)
     return text_verdict(part.content, schema) if is_text else UNCLEAR
 

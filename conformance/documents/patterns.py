@@ -21,16 +21,18 @@ from typing import Any, Final
 import jsonschema_rs
 import regress
 
-# Seconds that one match in the worker may take; steps that are tried without it: some hundredths of a second.
+# _SECONDS: longest time of one match in the worker process. _MOST_STEPS: steps of a match without it (hundredths of a
+# second).
 _SECONDS: Final = 2.0
 _MOST_STEPS: Final = 200_000
-# Pattern syntax that ECMA-262 and Rust read alike: literals, groups, quantifiers, classes without brackets or &&.
+# Pattern syntax that ECMA-262 and Rust read the same way: literals, groups, quantifiers, classes without brackets or
+# &&.
 _ESCAPE: Final = r"\\[dDwWntrfv\-.^$*+?()\[\]{}|/\\]"
 _CLASS: Final = rf"\[\^?(?:{_ESCAPE}|[^\\\[\]&~\-]|(?<!-)-(?!-))+\]"
 _PLAIN: Final = re.compile(
     rf"(?:{_ESCAPE}|{_CLASS}|[^\\\[\](){{}}*+?|.]|\((?:\?:)?(?![?*+])|\)|\|(?![?*+])|(?<![(|^*+?{{])[*+?]|\{{\d{{1,3}}(?:,\d{{0,3}})?\}}\??)*"
 )
-# Letters that mean nothing after a backslash in ECMA-262, although other dialects know some of them.
+# _NO_ESCAPE: letters without a meaning after a backslash in ECMA-262, although other dialects know some.
 _NO_ESCAPE: Final = frozenset("ACEFGHIJKLMNOQRTUVXYZaeghijlmoqyz")
 _SYNTAX: Final = frozenset("^$\\.*+?()[]{}|/")
 _UNICODE_ONLY: Final = re.compile(r"\\(?:[pP]|u)\{")
@@ -60,7 +62,7 @@ def matches(pattern: str, text: str) -> bool:
         PatternError: it is no regular expression of ECMA-262.
         SlowPatternError: it takes too long.
     """
-    if not text.isascii():  # JSON can have half a surrogate pair, and the engines cannot
+    if not text.isascii():  # JSON may contain half a surrogate pair, but the engines reject it
         text = text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
     plain = _native(pattern)
     if plain is not None:
@@ -162,7 +164,7 @@ class _Worker:
                 stderr=subprocess.DEVNULL,
                 text=True,
             )
-            self._ask(self._process, "", "", "")  # the start is not the pattern's time
+            self._ask(self._process, "", "", "")  # starting the process must not count as time of the pattern
         timer = threading.Timer(_SECONDS, self._process.kill)
         timer.start()
         try:
@@ -199,7 +201,7 @@ def _matches_in_time(pattern: str, source: str, flags: str, text: str) -> bool:
     return _THE_WORKER.matches(pattern, source, flags, text)
 
 
-# Code points below this stand for a class that Python does not have; ranges of such a class at most.
+# _LAST: code points from here on are not listed when Python lacks a class. _MOST_RANGES: ranges of such a class.
 _LAST: Final = 0x2000
 _MOST_RANGES: Final = 40
 _PYTHON_PART: Final = re.compile(
@@ -234,7 +236,7 @@ class _Writer:
     def text(self) -> str:
         written, in_class = "", False
         for part in self._parts:
-            if in_class and part in {"[]", "[^]"}:  # a bracket in the class, and the end of the class
+            if in_class and part in {"[]", "[^]"}:  # the closing bracket of a class, or a bracket inside it
                 written += rf"\{part}"
                 in_class = False
                 continue

@@ -12,7 +12,7 @@ from conformance.documents.json_schema import Schema, as_double, kind_of, types_
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 
-# The contract's numbers; a point without digits after it is XML Schema's and YAML's affair, and harmless.
+# Numbers that the contract allows. XML Schema and YAML also allow a point without digits after it, which is harmless.
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d{1,400}", re.ASCII)
 _NULLS = {"", "null", "~", "Null", "NULL"}
@@ -20,7 +20,7 @@ _NULLS = {"", "null", "~", "Null", "NULL"}
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _ByItself: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _COMBINING = frozenset({"allOf", "oneOf", "anyOf"})
-# PyYAML's constructors let Python's own errors through, such as IndexError for `!!int ""`.
+# Exceptions of PyYAML: its constructors let Python's own through, such as IndexError for `!!int ""`.
 _NO_YAML: Final = (yaml.YAMLError, ValueError, LookupError, TypeError, ArithmeticError, AttributeError)
 _NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
 
@@ -205,9 +205,9 @@ def projected(value: Any, schema: Schema) -> Any:
     schema = flat(schema)
     if isinstance(value, list):
         given = schema.get("items")
-        items = flat(given) if isinstance(given, dict) else {}  # false, beside prefixItems
+        items = flat(given) if isinstance(given, dict) else {}  # `items` may be `false` beside prefixItems
         if not items.get("properties") and "items" not in items:
-            return list(value)  # numbers, mostly: a covariance matrix has 36 of them
+            return list(value)  # mostly numbers: a covariance matrix has 36
         return [projected(item, items) for item in value]
     properties: dict[str, Schema] = schema.get("properties", {})
     if not properties:
@@ -241,7 +241,7 @@ def flat(schema: Schema, within: frozenset[str] = frozenset()) -> Schema:
         properties = {**inner.get("properties", {}), **result.get("properties", {})}
         for name in inner.get("properties", {}).keys() & result.get("properties", {}).keys():
             one, other = inner["properties"][name], result["properties"][name]
-            # Of a member that several parts name, all of them hold.
+            # A member that several parts describe must satisfy all of them.
             properties[name] = one if one == other else {"allOf": [other, one]}
         result = {
             **inner,

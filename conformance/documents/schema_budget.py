@@ -11,44 +11,44 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 
-# Schemas that may bind one value at once, by allOf, anyOf, oneOf, not, if, then, else and references.
+# Most schemas that may apply to one value, by allOf, anyOf, oneOf, not, if, then, else and references.
 _MOST_AT_ONCE: Final = 5_000
-# Parts of the smallest value of a schema: members, items and characters.
+# Largest value that a schema may demand: members, items and characters.
 _LARGEST: Final = 1_000_000
-# Values that may stand in these keywords: each is sent in a request of its own.
+# By keyword: most values. Each value is sent in a request of its own.
 _MOST_VALUES: Final = {"enum": 50_000, "examples": 10_000}
-# References that may follow each other; times that schemas are looked at again.
+# _DEEPEST: references in a chain. _MOST_STEPS: how often schemas are visited again.
 _DEEPEST: Final = 60
 _MOST_STEPS: Final = 50_000
-# Characters of a pattern; repeats of quantifiers within quantifiers.
+# _LONGEST_PATTERN: characters of a pattern. _MOST_REPEATS: product of nested quantifiers.
 _LONGEST_PATTERN: Final = 20_000
 _MOST_REPEATS: Final = 10_000
-# States of all patterns of a document, with some 50 bytes each in an automaton, and of one pattern.
+# _MOST_STATES: states of all patterns of a document (50 bytes each in an automaton). _STATES_OF_ONE: of one pattern.
 _MOST_STATES: Final = 3_000_000
 _STATES_OF_ONE: Final = 200_000
 _PART: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|\{(\d{1,9})(?:,(\d{0,9}))?\}|.", re.DOTALL)
 _SCHEMAS: Final = frozenset({"schema", "schemas", "definitions", "example", "value"})
 _SHOWN: Final = 60
-# Budget of the objects outside of schemas that make up a request or a response, by name.
+# By name: most objects of that kind in an operation, outside of schemas.
 _CROWDS: Final = {
     "paths": 10_000, "parameters": 1_000, "responses": 1_000, "content": 1_000, "headers": 1_000, "callbacks": 1_000,
     "links": 1_000, "security": 1_000, "servers": 1_000, "encoding": 1_000, "examples": 10_000,
     "securitySchemes": 1_000,
 }  # fmt: skip
-# Characters of a word, such as a name, address or pattern.
+# _LONGEST_WORD: characters of a name, address or pattern. _FOR_PEOPLE: keywords without this limit.
 _LONGEST_WORD: Final = 100_000
 _FOR_PEOPLE: Final = frozenset({"description", "summary", "title", "$comment"})
 _VALUES: Final = frozenset({"example", "examples", "default", "value", "enum", "const", "pattern"})
 _IN_ADDRESSES: Final = frozenset({"parameters", "servers", "headers"})
-# Budget of generators that follow every reference: parts, references deep. They make cases of each part with all others
-# in it, so time grows with the square. GitHub's largest operation has 900 parts.
+# Budget of generators that follow every reference: _MOST_UNROLLED parts, _MOST_BESIDE references deep. They make cases
+# of each part with all others, so time grows with the square. GitHub's largest operation has 900 parts.
 _MOST_UNROLLED: Final = 10_000
 _MOST_BESIDE: Final = 1_000
 _UNROLLED_DEEPEST: Final = 8
 _SEVERAL: Final = ("allOf", "anyOf", "oneOf")
 _ONE: Final = ("not", "if", "then", "else")
 
-# Yields the schemas that count for a schema.
+# Function that yields the schemas that apply together with a schema.
 Parts = Callable[[Schema], Iterator[Any]]
 
 
@@ -63,7 +63,7 @@ class Growth:
         self._states = 0
         self._seen: set[int] = set()
         self._steps = 0
-        self._kept: list[Any] = []  # an id stands for its schema as long as that is kept
+        self._kept: list[Any] = []  # keep each schema alive, because its id() stands for it
 
     def fault(self, schema: Any) -> str:
         """Return why nothing can be judged by a schema; empty if it can. Ask for inner schemas first."""
@@ -136,7 +136,7 @@ class Growth:
         total = count(schema, trail, lows)
         trail.pop()
         low = min(lows)
-        # A sum that left out what is on the trail holds for this trail alone.
+        # A sum without the schemas on the trail holds for this trail only.
         if low >= len(trail):
             known[id(schema)] = total
         return total, low
@@ -209,7 +209,7 @@ def _list(schema: Schema, word: str) -> list[Any]:
 
 def _unrolled(pattern: str) -> tuple[int, int]:
     """Return how many states a pattern has with its quantifiers unrolled, and how often nested ones repeat."""
-    # For each open group its parts: their states, repeats, and how deep quantifiers are nested in them.
+    # For each open group, its parts: their states, repeats, and depth of nested quantifiers.
     groups: list[list[tuple[int, int, int]]] = [[]]
     nested = 1
     for found in _PART.finditer(pattern):

@@ -24,7 +24,7 @@ from conformance.documents.schema_sides import (
     types_in,
 )
 
-# Words that are compared together, because one changes what the others mean.
+# Keywords that are compared together, because one changes the meaning of the other.
 _GROUPS: Final = (
     ("enum", "const"), ("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"), ("multipleOf",),
     ("minLength",), ("maxLength",), ("pattern",), ("format",), ("minItems",), ("maxItems",), ("uniqueItems",),
@@ -32,7 +32,7 @@ _GROUPS: Final = (
     ("dependentSchemas",), ("propertyNames",), ("not",), ("if", "then", "else"),
 )  # fmt: skip
 _MEMBERS: Final = ("properties", "patternProperties", "additionalProperties")
-# Keywords that mean nothing without those of other places.
+# Keywords that depend on keywords elsewhere in the schema.
 _WIDE: Final = ("unevaluatedProperties", "unevaluatedItems")
 
 
@@ -85,7 +85,7 @@ class _Comparison:
             known = set(self.found)
             result = self._compared(before, after)
             if self.open.pop(key) and any(one.breaks is not False for one in result):
-                # What was found on the assumption that this pair is right does not hold.
+                # Discard results that assumed that this pair is compatible.
                 for other in self.found.keys() - known:
                     del self.found[other]
             self.found[key] = result
@@ -118,7 +118,7 @@ class _Comparison:
             found = list(self._by_alternative(old, new, before, after))
         found = list(dict.fromkeys(found))
         if any(one.breaks is not False for one in found) and self._is_covered(old, new):
-            # What breaks in one word is made good by another.
+            # A change that breaks by one keyword may be compensated by another.
             kept = [
                 replace(one, breaks=one.breaks and one.always) for one in found if one.breaks is not None or one.always
             ]
@@ -147,7 +147,7 @@ class _Comparison:
         for one in sent:
             if len(sent) > 1:
                 yield from self._gone(one, taken)
-            # What is sent in this shape, against all that is taken.
+            # Compare each value that may be sent in this form with all values that are accepted.
             if self._is_covered(*self._ordered(one, whole)):
                 continue
             like = [other for other in taken if kind_in(one) == kind_in(other) or "" in (kind_in(one), kind_in(other))]
@@ -218,7 +218,7 @@ class _Comparison:
             for given, part in ((old, before), (new, after))
         )
         if one.get("type") != other.get("type"):
-            # The type is a change of its own.
+            # A changed type is reported as a change of its own.
             one, other = ({**shell, "type": common_types(old, new)} for shell in (one, other))
         within = old, new
         if self._is_covered(one, other, within):
@@ -267,7 +267,7 @@ class _Comparison:
         rest = True if name in other.get("properties", ()) else other.get("additionalProperties", True)
         sends = old_has == self.request
         if rest is True or (rest is False and not (sends and self.request)):
-            # A client sends no member that is not described, and takes those that it does not know.
+            # Clients send no undescribed members, and ignore those that they do not know.
             return
         pair = (schema, rest) if old_has else (rest, schema)
         yield from (replace(one, text=below(name, one.text)) for one in self.findings(*pair))
@@ -349,13 +349,13 @@ def change_text(word: str, old: Schema, new: Schema, *, request: bool) -> str:
 def _values(old: Schema, new: Schema, *, request: bool) -> str:
     before, after = (one.get("enum", [one["const"]] if "const" in one else None) for one in (old, new))
     if [] in (before, after):
-        # The schema `false`.
+        # the schema `false`
         return f": {'no value is' if after == [] else 'values are'} allowed now"
     if before is None or after is None:
         return f": values {_shown(before)} → {_shown(after)}"
     fewer = [one for one in before if one not in after]
     more = [one for one in after if one not in before]
-    # What breaks comes first.
+    # Breaking changes come first.
     texts = [f"may no longer be {_shown(fewer)}" if fewer else "", f"may now be {_shown(more)}" if more else ""]
     return " " + ", and ".join(text for text in (texts if request else texts[::-1]) if text)
 

@@ -18,7 +18,7 @@ from conformance.documents.json_schema import Schema, opened
 from conformance.documents.schema_sides import MANY, NAMED, ONE, Side
 
 _TRIED: Final = 4000
-# Exceptions of the libraries: ValueError for an invalid schema, the others for unsupported values.
+# Exceptions of the libraries: ValueError for an invalid schema, the others for values that they do not support.
 _UNUSABLE: Final = (ValueError, TypeError, OverflowError, RecursionError, jsonschema_rs.ReferencingError)
 
 

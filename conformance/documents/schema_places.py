@@ -15,7 +15,7 @@ from urllib.parse import unquote
 from conformance.documents.json_schema import Schema, modern
 from conformance.transport.reach import joined
 
-#: Where the contents of other files stand in a description that has been made one document.
+#: FILES: key below which a description that was merged into one document keeps the contents of other files.
 FILES: Final = "x-roaas-files"
 _ONE: Final = frozenset(
     {
@@ -26,10 +26,10 @@ _ONE: Final = frozenset(
 _NAMED: Final = frozenset({"properties", "patternProperties", "dependentSchemas", "$defs", "definitions"})
 _SEVERAL: Final = frozenset({"allOf", "anyOf", "oneOf", "prefixItems"})
 _WORDS: Final = frozenset({*_ONE, *_NAMED, *_SEVERAL, "type", "enum", "const", "$id", "$schema", "$anchor"})
-# What an author writes as a value: nothing in it is a schema or a reference.
+# Keywords whose value is data: nothing in it is a schema or a reference.
 DATA: Final = frozenset({"example", "examples", "default", "enum", "const", "value", "dataValue"})
 _UNBOUND: Final = frozenset({"additionalProperties", "unevaluatedProperties"})
-# Objects of OpenAPI that are no schema, although some of their words are a schema's too.
+# Keywords which show that an object is no schema, although it shares other keywords with schemas.
 _NO_SCHEMA: Final = frozenset({"openapi", "swagger", "in", "content", "responses", "paths", "schema", "url"})
 
 Holder = dict[str, Any] | list[Any]
@@ -152,7 +152,8 @@ def _by_pointer(reference: str, base: str, roots: dict[str, str], anchors: dict[
     return f"#{roots[uri]}{fragment}"
 
 
-# OpenAPI 3.1 took these from JSON Schema 2020-12; OpenAPI 3.0 and Swagger 2.0 do not have them (OpenAPI 3.0, 4.7.24).
+# Keywords that OpenAPI 3.1 took from JSON Schema 2020-12; OpenAPI 3.0 and Swagger 2.0 do not have them (OpenAPI 3.0,
+# 4.7.24).
 _NEW: Final = frozenset(
     {
         "const", "prefixItems", "contains", "minContains", "maxContains", "patternProperties", "propertyNames", "if",
@@ -162,12 +163,12 @@ _NEW: Final = frozenset(
     }
 )  # fmt: skip
 _BOUNDS: Final = frozenset({"exclusiveMinimum", "exclusiveMaximum"})
-# In a document of 3.0, what stands beside a $ref is ignored; `nullable` is taken as its author means it.
+# OpenAPI 3.0 ignores keywords beside a $ref, but authors mean `nullable` there.
 _BESIDE_REFERENCE: Final = frozenset({"$ref", "nullable"})
 _OF_2020: Final = ("https://json-schema.org/draft/2020-12/", "https://spec.openapis.org/oas/3.")
-# A vendor's extension, whose content is no part of the description.
+# Vendor extensions, whose content is no part of the description.
 _EXTENSION: Final = re.compile(r"(?<!/headers)(?<!/schemas)(?<!/properties)(?<!/definitions)/x-(?!roaas-files/)")
-# Places that are named for one word.
+# Places of a keyword that a message names.
 _PLACES: Final = 20
 
 

@@ -11,16 +11,16 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed
 
-#: Words with one schema, with several, and with several by name.
+#: Keywords with one schema; below, those with several schemas, and with several by name.
 ONE: Final = (
     "items", "additionalProperties", "contains", "propertyNames", "not", "if", "then", "else", "unevaluatedItems",
     "unevaluatedProperties",
 )  # fmt: skip
 MANY: Final = ("allOf", "anyOf", "oneOf", "prefixItems")
 NAMED: Final = ("properties", "patternProperties", "dependentSchemas")
-#: Words that no validator judges, though they say what a value means.
+#: Keywords that no validator judges, although they say what a value means.
 OPAQUE: Final = ("contentMediaType", "contentEncoding", "contentSchema", "xml")
-#: The schema of a member that is not sent in this direction: it allows any value.
+#: UNSENT: schema of a member that is not sent in this direction, which allows any value.
 UNSENT: Final[Schema] = {"readOnly": True}
 _PLAIN: Final = frozenset(
     {
@@ -35,7 +35,7 @@ _RANGES: Final = {
     "int8": (-128, 127), "uint8": (0, 255), "int16": (-(2**15), 2**15 - 1), "uint16": (0, 2**16 - 1),
     "uint32": (0, 2**32 - 1), "uint64": (0, 2**64 - 1),
 }  # fmt: skip
-# Formats that every value of the type has; JSON numbers are doubles here.
+# Formats that allow every value of the type; JSON numbers are doubles here.
 _WITHOUT_MEANING: Final = frozenset({"double", "password", "binary"})
 
 
@@ -54,7 +54,7 @@ class Side:
         self.definitions: dict[str, Any] = {}
         self._absent = "readOnly" if request else "writeOnly"
         self._names: dict[tuple[str, frozenset[str], bool], str] = {}
-        # OpenAPI 3.0, 4.7.23: what stands beside a reference is ignored.
+        # OpenAPI 3.0, 4.7.23: keywords beside a reference are ignored.
         self._alone = str(document.get("openapi", "")).startswith("3.0")
         self._opaque = OPAQUE if "xml" in media_type else OPAQUE[:-1]
 
@@ -208,7 +208,7 @@ def is_same(old: Any, new: Any, one: Side, other: Side, seen: set[tuple[str, str
                 if not is_same(one.definitions[pair[0]], other.definitions[pair[1]], one, other, seen):
                     return False
         elif "$ref" in old or "$ref" in new:
-            # A reference on one side alone, with nothing beside it, is what it refers to.
+            # If only one side is a plain reference, compare the schema that it refers to.
             old, new = one.target(old), other.target(new)
             if not (isinstance(old, dict) and isinstance(new, dict)):
                 return bool(old == new)
@@ -243,7 +243,7 @@ def _named(value: Any, name: str) -> Iterator[Any]:
 
 _DEPTH: Final = 8
 _MOST: Final = 40
-# Words that speak of what other words of the same schema leave.
+# Keywords that apply to what other keywords of the same schema leave over.
 _RELATIVE: Final = frozenset(
     {"additionalProperties", "patternProperties", "unevaluatedProperties", "unevaluatedItems", "prefixItems", "items"}
 )

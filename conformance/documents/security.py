@@ -8,9 +8,9 @@ from typing import Any, Final
 from conformance.documents.json_schema import Schema, UnresolvedError, pointed
 from conformance.documents.openapi import Operation, methods_of, with_methods
 
-#: Where a credential goes, and its name there; names of headers are in lower case.
+#: Where a credential is sent (header, query, cookie), and its name there; header names are in lower case.
 Place = tuple[str, str]
-# Schemes whose credentials HTTP itself knows: Authorization, and 401 with a challenge (RFC 9110 11).
+# _OF_HTTP: schemes with credentials that HTTP knows: Authorization, and 401 with a challenge (RFC 9110 11).
 _OF_HTTP: Final = frozenset({"http", "oauth2", "openIdConnect"})
 _AUTHORIZATION: Final = ("header", "authorization")
 
@@ -78,7 +78,7 @@ def without_credentials(document: Schema, given: Collection[Place] = ()) -> Sche
             for method, one in operations.items()
             if isinstance(one, dict)
         }
-        # What its operations share is no parameter where all of them take it for a credential.
+        # A parameter of the path is dropped if all its operations treat it as a credential.
         changed = kept(item, set.intersection(*taken.values())) if taken else item
         found[path] = with_methods(changed, {method: kept(operations[method], taken[method]) for method in taken})
     return {**document, "paths": found}

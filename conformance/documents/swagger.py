@@ -10,7 +10,7 @@ _METHODS = ("get", "put", "post", "delete", "patch", "head", "options")
 _FORM = "application/x-www-form-urlencoded"
 _MULTIPART = "multipart/form-data"
 _JSON = ("application/json",)
-# Keys of a parameter or header that Swagger 2.0 writes beside its name, and OpenAPI 3 in its schema.
+# Keys of a parameter or header that OpenAPI 3 moves into its schema.
 _OF_SCHEMA = frozenset(
     {
         "type", "format", "items", "default", "maximum", "exclusiveMaximum", "minimum", "exclusiveMinimum", "maxLength",
@@ -22,7 +22,7 @@ _MOVED = {
     "#/parameters/": "#/components/parameters/",
     "#/responses/": "#/components/responses/",
 }
-# How the items of an array are separated: style and explode.
+# By collectionFormat: style and explode of OpenAPI 3.
 _COLLECTIONS = {
     "csv": ("form", False),
     "ssv": ("spaceDelimited", False),
@@ -58,7 +58,7 @@ def _servers(document: Schema) -> list[Schema]:
     host, base = document.get("host"), document.get("basePath", "")
     if not host:
         return [{"url": base}] if base else []
-    # Without schemes, the scheme is that by which the description was fetched.
+    # Without `schemes`, use the scheme by which the description was fetched.
     schemes = [f"{scheme}:" for scheme in document.get("schemes", ())] or [""]
     return [{"url": f"{scheme}//{host}{base}"} for scheme in schemes]
 
@@ -123,7 +123,7 @@ def _parameter(given: Schema) -> Schema:
     found["schema"] = _schema_of(given)
     if given.get("type") == "array":
         written = _collection(given)
-        # In a path or header, commas are the style simple, and the other separators have no name in OpenAPI 3.
+        # In paths and headers, commas are the style simple; OpenAPI 3 has no name for the other separators.
         found |= {**written, "style": "simple"} if given["in"] in {"path", "header"} and _is_csv(given) else written
     if "x-example" in given:
         found["example"] = given["x-example"]

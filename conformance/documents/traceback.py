@@ -8,13 +8,13 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml
 from conformance.transport.exchange import Exchange, Request
 
-# Octets of a body that are searched.
+# _LOOKED_THROUGH: bytes of a body that are searched. _SHOWN: characters of what was found.
 _LOOKED_THROUGH = 200_000
 _SHOWN = 120
-# What a repeated text may have lost or gained in a response: JSON escapes, and a full stop after it.
+# Differences of a text that a response repeats: JSON escapes, and a full stop after it.
 _ESCAPED = re.compile(r"\\([\\\"/])")
 _END = " .,;:!"
-# What error pages of the usual languages and frameworks look like.
+# Texts of error pages of common languages and frameworks.
 _INSIDES = re.compile(
     rb"Traceback \(most recent call last\)"
     rb"|File (?:\"|&quot;|&#34;|\\\")[^\"&]{1,300}\.py(?:\"|&quot;|&#34;|\\\"), line \d+"
@@ -38,7 +38,7 @@ def inside_shown(exchange: Exchange) -> str:
     return _first(_INSIDES, exchange)
 
 
-# A file of a program: an absolute path with at least three segments, or with a drive letter.
+# Path of a source file: absolute with at least three segments, or with a drive letter.
 _PATH = re.compile(
     rb"(?<![\w:/.])/(?:home|root|usr|opt|var|srv|app|code|src|work|tmp|mnt|etc|Users)(?:/[\w.@+-]+){2,}"
     rb"|[A-Z]:\\\\?(?:[\w .-]+\\\\?){2,}"
@@ -65,7 +65,7 @@ def _sent(request: Request) -> str:
     """Return all texts of a request as a response may repeat them, in lower case."""
     given = [request.url, *(value for _, value in request.headers), request.body.decode("utf-8", "replace")]
     given += [request.raw.decode("utf-8", "replace")] if request.raw else []
-    # A form is decoded twice where a device decodes a query that holds one.
+    # Decode twice, for devices that decode a query inside a query.
     return "\n".join(_plain(form) for text in given for form in (text, unquote_plus(text), unquote_plus(unquote(text))))
 
 

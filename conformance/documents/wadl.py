@@ -11,7 +11,7 @@ from conformance.documents.representation import UnreadableError, local_name, pa
 from conformance.documents.xml import elements
 
 WADL = "http://wadl.dev.java.net/2009/02"
-# A parameter may come with a regular expression: {code: [0-9]{1,3}}.
+# A path parameter, perhaps with a regular expression: {code: [0-9]{1,3}}.
 _TEMPLATE = re.compile(r"\{\s*([^{}:\s]+)\s*(?::[^{}]*(?:\{[^{}]*\}[^{}]*)*)?\}")
 _KINDS = {"template": "path", "query": "query", "matrix": "matrix", "header": "header", "plain": "plain"}
 

@@ -83,11 +83,11 @@ def text_of(value: Any) -> str:
     return str(value)
 
 
-#: What stands between items, where it is no comma; ``tabDelimited`` is tsv of Swagger 2.0.
+#: By style: separator between items where it is no comma. ``tabDelimited`` is Swagger 2.0's tsv.
 SEPARATORS = {"spaceDelimited": " ", "pipeDelimited": "|", "tabDelimited": "\t"}
-# Reserved characters that end no parameter in any server (RFC 3986 2.2).
+# Reserved characters that no server takes for the end of a parameter (RFC 3986 2.2).
 _RESERVED = "/?:@!$'()*,"
-# How a name is written between quotes (RFC 7578 2, WHATWG multipart/form-data).
+# Escapes in a quoted name (RFC 7578 2, WHATWG multipart/form-data).
 _IN_QUOTES = str.maketrans({'"': "%22", "\r": "%0D", "\n": "%0A"})
 _BOUNDARY = "roaas-7d1f0c"
 

@@ -242,7 +242,7 @@ class _Reader:
     def find(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
         """Return the component that a QName in an attribute refers to, or None."""
         if path not in self._by_name:
-            self._by_name[path] = {  # of two with one name the first counts
+            self._by_name[path] = {  # of two parts with the same name, the first counts
                 clark(_space_of(one), one.get("name") or ""): one for one in reversed(self._all(path))
             }
         return self._by_name[path].get(qname(reference, reference.get(attribute)) or "")

@@ -16,11 +16,11 @@ from conformance.documents.xml import WSDL, XSD, NotXmlError, clark, namespace, 
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_assembly import SchemaDocument, resolved
 
-# Obtains a document by its resolved location. Raises OSError or ValueError with the reason where it cannot.
+# Function that returns a document by its resolved location. It raises OSError or ValueError with the reason.
 Fetch = Callable[[str], bytes]
-# Returns the location of the schema of a namespace; empty if it knows none.
+# Function that returns the location of a namespace's schema, or an empty text.
 Locate = Callable[[str], str]
-# Documents of one description at most. A robot that refers to more keeps its reader busy.
+# _MOST: documents that a description may refer to. _HEAD: bytes in which a DOCTYPE is looked for.
 _MOST: Final = 50
 _HEAD: Final = 1000
 _SHOWN: Final = 80
@@ -87,7 +87,7 @@ def _root_of(wsdl: bytes) -> etree._Element:
     Raises:
         ValueError: it is not one; the message says what it is.
     """
-    # WSDL 1.1 forbids no DOCTYPE: that one is there blames nobody, and nothing of it is read.
+    # WSDL 1.1 allows a DOCTYPE, so it is no fault; the suite does not read it.
     head = wsdl[:_HEAD].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
     if not head:
         raise ValueError("an empty document")
@@ -111,7 +111,7 @@ def _root_of(wsdl: bytes) -> etree._Element:
 
 def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
     """Add a document, and return the locations that it refers to."""
-    # Entities are not expanded, and the copies that the compilers get have no DOCTYPE that declares them.
+    # Entities are not expanded; the compilers get copies without a DOCTYPE.
     etree.strip_elements(root, etree.Entity, with_tail=False)
     targets: list[str] = []
     if root.tag == clark(WSDL, "definitions"):
@@ -126,7 +126,7 @@ def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
         targets += _schema_references(found)
     else:
         found.missing[place] = f"neither a WSDL nor a schema, but {root.tag}"
-    # Without any reference left, a namespace may still be looked for by its name.
+    # A namespace without any reference may still be found by its name.
     return [*targets, ""]
 
 
@@ -186,7 +186,7 @@ class SchemaFolder:
         return next((str(path) for path, own in self._files.items() if own == space), "")
 
 
-# Words in the errors of libxml2 and xmlschema for content models that break unique particle attribution.
+# Error texts of libxml2 and xmlschema for content models that break unique particle attribution.
 _AMBIGUOUS: Final = ("determinist", "Unique Particle Attribution")
 
 

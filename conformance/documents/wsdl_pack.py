@@ -19,9 +19,9 @@ from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, read_servi
 from conformance.documents.xml import local
 from conformance.documents.xsd_shapes import Element
 
-#: The documents of the WSDL, by location, and which of them comes first.
+#: File with the documents of a WSDL by location, and the first of them.
 DOCUMENTS_NAME: Final = "wsdl.json"
-# Operations that only read, by their first word. Others may sound so and move: FindHome, SearchReference.
+# First words of operations that only read. Others that sound so may move: FindHome, SearchReference.
 _READS: Final = re.compile(r"(?:[Gg]et|[Ll]ist|[Dd]escribe)(?![a-z])")
 # The first child of a Body, whatever the prefixes.
 _PAYLOAD: Final = re.compile(rb"<(?:[\w.-]+:)?Body\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")

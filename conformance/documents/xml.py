@@ -29,7 +29,7 @@ def parse(document: bytes, *, doctype: bool = False, comments: bool = True) -> e
     Raises:
         NotXmlError: it is not well-formed, or has a DOCTYPE.
     """
-    # A parser holds its last document's state, so each document gets one of its own.
+    # A parser keeps state of its last document, so each document gets a new parser.
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,
@@ -83,7 +83,7 @@ WSDL_SOAP: Final = "http://schemas.xmlsoap.org/wsdl/soap/"
 XSD: Final = "http://www.w3.org/2001/XMLSchema"
 XSI: Final = "http://www.w3.org/2001/XMLSchema-instance"
 WSAM: Final = "http://www.w3.org/2007/05/addressing/metadata"
-# Forms of the action attribute that came before the metadata namespace, and that tools still write.
+# Older namespaces of the action attribute, which tools still write.
 WSAW: Final = "http://www.w3.org/2006/05/addressing/wsdl"
 ADDRESSING: Final = "http://www.w3.org/2005/08/addressing"
 # SOAP 1.1, 4.2.2: the actor that stands for whoever receives the message first.
@@ -172,7 +172,7 @@ class Node:
     def written(self) -> bytes:
         """Return the document in UTF-8, with all namespaces declared at the root."""
         spaces = sorted(_namespaces(self))
-        # The usual prefixes where there are any: findings are read by people.
+        # Use common prefixes where they exist, because people read findings.
         prefixes = {space: _USUAL.get(space, f"n{number}") for number, space in enumerate(spaces)}
         bindings = "".join(f" xmlns:{prefix}={quoteattr(space)}" for space, prefix in prefixes.items())
         return _text(self, prefixes, bindings).encode()

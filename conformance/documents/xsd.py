@@ -21,15 +21,15 @@ from conformance.documents.xsd_assembly import Component, SchemaDocument, assemb
 from conformance.documents.xsd_shapes import Element, shape
 
 _SHOWN: Final = 300
-# Depth of the groups of a type, with those of its base types.
+# Deepest nesting of the groups of a type and its base types.
 _DEEPEST: Final = 400
-# How xmlschema compiles, in this order: as XSD 1.0, as XSD 1.1, and in spite of errors, which are recorded.
+# How xmlschema compiles, in this order: as XSD 1.0, as XSD 1.1, and leniently, with its errors recorded.
 _WAYS: Final = (("XMLSchema10", "strict"), ("XMLSchema11", "strict"), ("XMLSchema10", "lax"))
 
 
 _TYPE: Final = clark(XSI, "type")
 _PATTERN: Final = clark(XSD, "pattern")
-# A repeated group with a repetition or alternatives in it.
+# A repeated group that contains a repetition or alternatives: matching may take exponential time.
 _SLOW: Final = re.compile(r"\((?:.*[+*}|].*)\)[+*{]", re.DOTALL)
 
 
@@ -51,7 +51,7 @@ class Types:
         # Imported late: it takes a sixth of a second, and nothing is compiled before the robot is on its way to a goal.
         import xmlschema  # noqa: PLC0415
 
-        # By itself it refuses types derived over 15 levels.
+        # The library's own default refuses types derived over 15 levels.
         xmlschema.limits.MAX_MODEL_DEPTH = _DEEPEST
         self.libxml: etree.XMLSchema | None = None
         self.python: Any = None
@@ -113,15 +113,15 @@ class Types:
         try:
             if self.libxml is None or self.libxml.validate(element):
                 return ""
-        except etree.LxmlError:  # a pattern that takes more steps than libxml2 makes
+        except etree.LxmlError:  # a pattern that needs more steps than libxml2 allows
             return ""
         log: Any = self.libxml.error_log
         return str(log[0].message) if len(log) else "invalid"
 
     def python_problem(self, element: etree._Element) -> str:
         """Return why an element is invalid according to xmlschema; empty if it is valid."""
-        # A copy, because what stands around the element is none of the schema's business; without comments, because
-        # xmlschema takes a value to end at the first one.
+        # Copy the element alone, because its surroundings are not validated. Drop comments, because xmlschema ends a
+        # value at the first one.
         alone = copy.deepcopy(element)
         etree.strip_tags(alone, etree.Comment, etree.PI)
         try:
@@ -178,17 +178,18 @@ def _without_slow_patterns(folder: Path) -> bool:
     return found
 
 
-# Particles of a type: a compiler's automaton may have the square of their number. A group counts as often as it is
-# referred to, and a base type for each type that is derived from it.
+# Particles of a type: an automaton may grow with their square. A group counts as often as it is used, and a base type
+# for each derived type.
 _MOST_PARTICLES: Final = 1_000
-# Sum of these squares over all types: some 100 bytes and two microseconds each.
+# Sum of the squared particles of all types: some 100 bytes and two microseconds each.
 _MOST_SQUARES: Final = 20_000_000
 # Particles of a group times its minOccurs: compilers unroll it, in nearly 40 kB for each.
 _MOST_UNROLLED: Final = 10_000
-# Components that may each refer to the next one: compilers follow them by recursion.
+# _MOST_CHAINED: components in a chain of references, which compilers follow recursively. _LONGEST_PATTERN: characters.
 _MOST_CHAINED: Final = 150
 _LONGEST_PATTERN: Final = 5_000
-# Groups, quantifiers and alternatives of one pattern (time grows with their cube), and of all patterns.
+# _MOST_OPERATORS: groups, quantifiers and alternatives of one pattern (time grows with their cube); below, of all
+# patterns.
 _MOST_OPERATORS: Final = 900
 _MOST_OPERATORS_OF_ALL: Final = 20_000
 _OPERATOR: Final = re.compile(r"\\.|\[(?:\\.|[^\]\\])*\]|([(*+?{|])", re.DOTALL)
@@ -220,7 +221,7 @@ def beyond_compilers(documents: Sequence[SchemaDocument]) -> str:
 def _unrolled(root: etree._Element) -> str:
     for model in root.iter(*_MODELS):
         around = [model]
-        for outer in model.iterancestors():  # as far as the type, which has an automaton of its own
+        for outer in model.iterancestors():  # only up to the type, which has an automaton of its own
             if outer.tag not in _MODELS:
                 break
             around.append(outer)
@@ -254,7 +255,7 @@ def _chain(uses: Mapping[Component, Sequence[Component]]) -> str:
     """Return the component at the start of a chain that is too long; empty if there is none."""
     depths: dict[Component, int] = {}
     for start, first in uses.items():
-        # What is under way has no depth yet: a type within itself is no longer chain.
+        # A component that is still being measured has no depth yet: a recursive type makes no longer chain.
         waiting: list[tuple[Component, Iterator[Component]]] = [(start, iter(first))]
         under_way = {start}
         while waiting:
@@ -278,7 +279,7 @@ def _sizes(found: Mapping[Component, etree._Element]) -> str:
 
     def size(component: Component) -> int:
         if component not in sizes:
-            sizes[component] = 1  # of a component within itself
+            sizes[component] = 1  # used where a component contains itself
             sizes[component] = max(sum(_parts(found[component])), found[component].tag.endswith("simpleType"))
         return sizes[component]
 

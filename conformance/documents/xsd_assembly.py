@@ -20,7 +20,7 @@ from conformance.transport.reach import joined
 _IMPORT, _INCLUDE = clark(XSD, "import"), clark(XSD, "include")
 _REDEFINE: Final = (clark(XSD, "redefine"), clark(XSD, "override"))
 _SCHEMA: Final = clark(XSD, "schema")
-# Which kind of component an attribute names; a type may be of either kind.
+# By attribute: the kind of component that it names; a type may be simple or complex.
 _NAMED: Final = {
     "type": "type",
     "base": "type",
@@ -29,7 +29,7 @@ _NAMED: Final = {
     "substitutionGroup": "element",
 }
 _XML: Final = "http://www.w3.org/XML/1998/namespace"
-# Numbers of occurrences beyond this make libxml2's automata larger than any memory.
+# Counts of occurrences beyond this would exhaust libxml2's memory.
 _MANY: Final = 1000
 
 
@@ -86,7 +86,7 @@ def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
     made = Assembly(folder / "entry.xsd")
     documents = [one for one in documents if not _only_imports(one)]
     spaces, inner = _spaces(documents), _redefined(documents)
-    # An inline schema may use prefixes that the WSDL around it declares. A copy loses them, a text has them.
+    # Write and parse the inline schema again: a copy would lose the prefixes that the WSDL around it declares.
     roots = [etree.fromstring(etree.tostring(one.root, with_tail=False)) for one in documents]
     names = {one.location: f"document{number}.xsd" for number, one in enumerate(documents)}
     members: dict[str, list[str]] = {space: [] for one in documents for space in sorted(spaces[one.location])}
@@ -254,7 +254,7 @@ def rpc_wrapper(name: str, space: str, parts: Sequence[tuple[str, str]]) -> Sche
     return SchemaDocument(f"rpc:{name}", root, inline=True)
 
 
-#: Marks a type that is not known, because no document declares it.
+#: UNKNOWN: stands for a type that no document declares.
 UNKNOWN: Final = "{urn:example:roaas}unknown"
 _COMPLEX, _SIMPLE = clark(XSD, "complexType"), clark(XSD, "simpleType")
 
@@ -293,7 +293,7 @@ def allow_anything(spaces: Sequence[str], roots: Sequence[etree._Element], unkno
                         unknown.add(clark(space, whole.get("name", "")))
                     waiting = True
     for root in roots:
-        # An element without a type holds anything, and an xsi:type may say what.
+        # An element without a type may contain anything; its xsi:type may name the type.
         for element in root.iterfind(f".//{clark(XSD, 'element')}[@type]"):
             prefix, _, local = element.get("type", "").rpartition(":")
             if clark(element.nsmap.get(prefix or None), local) in unknown and "substitutionGroup" not in element.attrib:

@@ -29,7 +29,7 @@ from conformance.verdict.run import Run
 
 _NO_ADDRESS = "the robot's {} interface has no address"
 _Interface = TypeVar("_Interface")
-# Marks a check whose reason to be skipped is recorded already, such as an earlier check that met the same failure.
+# Marks a check whose skip reason is recorded already, for example by an earlier check with the same failure.
 _TOLD_BEFORE: pytest.StashKey[bool] = pytest.StashKey()
 
 
@@ -140,7 +140,7 @@ class ChecksPlugin:
         run = self._robot().run
         self._robot().begin(item.nodeid.rsplit("/", 1)[-1])
         if run.interrupted:
-            # The exception was swallowed where nobody could see it.
+            # Ctrl-C arrived in code that swallows exceptions: raise it again here.
             raise KeyboardInterrupt
         if run.aborted and not self._is_recorded(item):
             pytest.skip(run.aborted)
@@ -191,7 +191,7 @@ class ChecksPlugin:
             record_exception(robot.run, robot.alive, ids, judged, error)
             result = None
         if recent and recent[-1].kind is not None and recent[-1] is not before:
-            # The check may have put up with a request without a response.
+            # A check may have ignored a missing response, so see whether the robot still responds.
             robot.alive()
         self._tell(item, robot.run)
         return result

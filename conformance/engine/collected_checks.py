@@ -43,7 +43,7 @@ class _Checks:
     def pytest_itemcollected(self, item: pytest.Item) -> None:
         """Record the requirement ids of one check."""
         marked = (id_ for mark in item.iter_markers("requirement") for id_ in mark.args)
-        # What the generic suite judges by convention binds only packs whose ledger has it.
+        # Conventional checks of the generic suite apply only to packs whose ledger has their requirement.
         own = self._everywhere or GENERIC_RULES not in item.path.parents
         for part in expanded(marked, self._ledger):
             id_ = self._renamed.get(part, part)

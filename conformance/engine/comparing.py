@@ -24,7 +24,7 @@ def compared(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
         _of_result(one) if _is_of_result(one) else fetch_description(one, (), connection, allow_files=allow_files)
         for one in (old, new)
     ]
-    # What a reference leads to may have changed, even if the reference did not.
+    # The target of an unread reference may have changed, even if the reference did not.
     unread = [
         Change(None, source, f"not compared: {reference}")
         for source, description in zip((old, new), descriptions, strict=True)
@@ -55,7 +55,7 @@ def _of_result(source: str) -> Description:
         if place != source:
             raise OSError("the description of a result leads nowhere else")
         octets = read_octets(Path(source))
-        read_json(octets)  # a run writes JSON, and reading YAML takes much longer
+        read_json(octets)  # runs write JSON, and reading it as YAML takes much longer
         return octets
 
     return read_description(source, load)

@@ -10,11 +10,11 @@ from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import NoValueError, angle_of
 from conformance.statement.motion_map import Angle
 
-# Budget of one document: depth, numbers, items of one list.
+# Budget of one document: _DEEP levels, _MANY numbers, _LISTED items of one list.
 _DEEP, _MANY, _LISTED = 8, 400, 24
-# A quaternion's length differs from 1 by less than this.
+# Greatest difference of a quaternion's length from 1.
 _UNIT: Final = 0.02
-#: Stands between the pointer of a quaternion and the angle that is meant.
+#: ANGLE: separates the pointer of a quaternion from the name of an angle.
 ANGLE: Final = "#"
 _ANGLES: Final[tuple[Angle, ...]] = ("roll", "pitch", "yaw")
 
@@ -36,7 +36,7 @@ def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
     if isinstance(value, bool) or not deep:
         return
     if isinstance(value, int | float):
-        # An integer of thousands of digits is no measurement.
+        # A number with thousands of digits is no measurement.
         if abs(value) < 1e300:  # noqa: PLR2004
             yield at, float(value)
     elif isinstance(value, Mapping):

@@ -17,7 +17,7 @@ from conformance.documents.openapi import Operation, read_operations
 from conformance.engine.first_motion import proposed_map, why_no_map
 from conformance.statement.statement import Api, Calls
 
-# Operations without a proposed map that a comment names.
+# _MOST_REASONS: operations without a proposed map that a comment names. _TEMPLATE: a first statement.
 _MOST_REASONS = 20
 _TEMPLATE = """\
 # Statement on a device that is judged by its own description, and by what binds every web API.

@@ -15,7 +15,7 @@ from typing import Final
 from conformance.commandline.endings import ended_by, ending_signals
 from conformance.verdict.run import Run
 
-# Time after KeyboardInterrupt in which further signals are only recorded, because the checks are being left, s.
+# For this time after KeyboardInterrupt, s, further signals are only recorded, because the checks are ending.
 _LEAVES_S: Final = 2.0
 
 

@@ -71,7 +71,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
         requests, ended = _judge_history(robot, result, folder / HISTORY_NAME)
     lacking = _judge_traces(robot, rules, traces)
     for evidence in run.judge.evidence.values():
-        # A part that takes an experiment is the run's affair.
+        # Parts that need an experiment cannot be judged again from records.
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
     judged = tuple(one for one in draw_verdicts(run)[0] if one.evidence.cases)
     return Judged(judged, requests, ended, tuple(run.judge.faults), lacking)

@@ -27,10 +27,11 @@ from conformance.verdict.run import Run
 _CRASH: Final = "robustness/no-crash"
 _HANG: Final = "robustness/no-hang"
 _SOAP: Final = "soap/answered"
-# Default wait for a lost device: one that a supervisor restarts, and one that a command restarts, s.
+# Default wait for a lost device, s: _RETURN_S if a supervisor may restart it, _RESTART_S if a command does.
 _RETURN_S: Final = 20.0
 _RESTART_S: Final = 60.0
-# Requests that the search for the smallest one may take; its time, s; earlier requests that are sent with it.
+# _SENDS: requests to find the smallest fatal one. _LOOKING_S: time for that, s. Below: earlier requests that are sent
+# too.
 _SENDS: Final = 30
 _LOOKING_S: Final = 120.0
 _BEFORE: Final = (1, 3, 7)
@@ -38,10 +39,10 @@ _BEFORE: Final = (1, 3, 7)
 _DYING_S: Final = 0.3
 # A device that is lost more often than this is not awaited again.
 _MOST_LOSSES: Final = 5
-# Requests before the last one that the finding names.
+# _NAMED: requests before the last that the finding names. _HANGS: outcomes that mean a hang.
 _NAMED: Final = 5
 _HANGS: Final = frozenset({NoAnswer.TIMEOUT, NoAnswer.GATEWAY_TIMEOUT})
-# Outcomes of a request that may have been the last straw: it was sent.
+# Outcomes of a request that may have crashed the device: it was sent.
 _SUSPECT: Final = frozenset({NoAnswer.CLOSED, NoAnswer.TIMEOUT, *OF_GATEWAY.values()})
 
 
@@ -98,7 +99,7 @@ class LostDevice:
             self._tell(f"the device stopped responding after {_named(sent[-1])}; waiting for it to come back")
         self._is_back = self._comes_back()
         if self._is_back:
-            # It may go on with what it did when it was lost.
+            # The device may continue what it did when it was lost.
             self._stop()
         if not requirement:
             if not self._is_back:
@@ -128,7 +129,7 @@ class LostDevice:
         if id_ not in ledger:
             return ""
         if run.claims and not ledger[id_].binds(run.claims):
-            # Whatever the user chose: nothing can be judged of a device that is lost.
+            # Whatever classes the user selected, a loss counts: nothing else can be judged.
             ledger[id_] = replace(ledger[id_], also=(*ledger[id_].also, run.claims[0]))
         return id_
 
@@ -209,7 +210,7 @@ class LostDevice:
             return False
         self._is_back = self._comes_back()
         if self._is_back:
-            # It may go on with what it did when it was lost.
+            # The device may continue what it did when it was lost.
             self._stop()
         return True
 

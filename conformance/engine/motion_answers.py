@@ -17,7 +17,7 @@ from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import counted
 from conformance.verdict.verdicts import Value, Verdict
 
-#: The questions, and the requirements by which each is answered.
+#: By question: the requirements that answer it.
 QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
     "Does it move as told?": ("velocity", "reaches", "stays", "last-of-many", "new-target", "one-client"),
     "Does it stop when told?": ("velocity-stop", "stop", "stop-lasts"),
@@ -25,7 +25,7 @@ QUESTIONS: Final[dict[str, tuple[str, ...]]] = {
     "Does it refuse what is beyond its limits?": ("beyond-limits", "refused-still"),
 }
 _BROKEN: Final = frozenset({"fail", "warn"})
-# A released device that still moves at this share of its velocity drives on.
+# _DRIVES_ON: a released device that still has this share of its velocity drives on. _LONG: characters of an answer.
 _DRIVES_ON: Final = 0.5
 _LONG: Final = 240
 _NO_LIMITS: Final = "no limits are declared that are refused"
@@ -54,7 +54,7 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
         elif value == "not seen" and said.startswith("no: "):
             value, said = "no", said.removeprefix("no: ")
         elif value == "not seen" and said != _NO_LIMITS:
-            # What could not be tried says more than what the map lacks.
+            # A requirement that could not be tried says more than one that the map does not declare.
             tried = sorted(own, key=lambda one: one.value is Value.NOT_CLAIMED)
             said = next((one.reason for one in tried if one.reason), "") or said or "nothing was tried"
         found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
@@ -175,7 +175,7 @@ def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
     if not rate or len(after) < SEVERAL:
         return None
     end = sorted(value for _, value in after[-SEVERAL:])[SEVERAL // 2]
-    # From the middle of the last readings under way: one of them alone is as far off as its noise.
+    # Use the middle of the last readings while moving, because a single one has noise.
     there = sorted(under_way[-SEVERAL:], key=lambda one: one[1])[SEVERAL // 2]
     return there[0] + (end - there[1]) / rate - since
 

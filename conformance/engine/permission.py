@@ -22,16 +22,16 @@ from conformance.statement.statement import empty_statement
 from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.verdict.run import Run
 
-# Names in a query or field by which a server may take another method than the request line's: _method=PUT,
+# Names in a query or header by which a server may see another method than the request line's: _method=PUT,
 # X-HTTP-Method-Override.
 _OVERRIDES: Final = re.compile(r"method|verb|override|(?:PUT|POST|DELETE|PATCH)[ \t]", re.IGNORECASE)
-# Fields by which a server may take another target, or another end of the request: X-Original-URL, Transfer-Encoding.
+# Headers by which a server may see another target or another end of the request: X-Original-URL, Transfer-Encoding.
 _ALTERS: Final = re.compile(
     r"transfer|trailer|upgrade|expect|settings|destination"
     r"|(?:original|rewrite|forwarded)[-_]?(?:url|uri|path|prefix)",
     re.IGNORECASE,
 )
-# Words in a target on which a device may act, whatever the method: GET /robot/move, GET /relay/0?turn=on.
+# Words in a target that a device may act on, whatever the method: GET /robot/move, GET /relay/0?turn=on.
 _ACTS: Final = frozenset(
     {
         "move", "moveto", "drive", "walk", "run", "go", "goto", "turn", "rotate", "spin", "jog", "start", "launch",
@@ -39,7 +39,7 @@ _ACTS: Final = frozenset(
         "unlock", "toggle", "trigger", "fire", "jump", "set",
     }
 )  # fmt: skip
-# Query parameters whose value is data although it looks like such a word: ?format=json, ?start=20.
+# Query parameters whose value is data although their name is such a word: ?format=json, ?start=20.
 _DATA: Final = re.compile(r"(?i)(?:^|(?<=[&;]))(?:format|start|open|auth|token|script|network|firmware)(?==)")
 # Levels of percent-encoding that are undone: a proxy may undo one and the server another.
 _MOST_DECODINGS: Final = 8
@@ -57,7 +57,7 @@ def moves(failure: Mapping[str, Any], contract: Contract | None = None, base_url
     Raises:
         ValueError, KeyError, TypeError: the finding is malformed.
     """
-    # What was too large to be kept is not sent.
+    # A request that was too large to be stored is not sent.
     requests = read_sequence(failure.get("sequence") or ())
     permission = None
     if contract is not None and base_url:

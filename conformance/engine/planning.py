@@ -23,7 +23,7 @@ def pytest_options() -> list[str]:
         f"--config-file={os.devnull}",
         f"--rootdir={_SUITE}",
         "--import-mode=importlib",
-        "--noconftest",  # pytest would run those in all folders above the checks as well; see conftests()
+        "--noconftest",  # otherwise pytest would also run the conftest files above the checks; see conftests()
         "--capture=no",
         "-Wignore",
         "--assert=plain",

@@ -19,9 +19,9 @@ from conformance.verdict.finding import counted
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
 
-# Longest time between two lines, s.
+# A line at least this often, s.
 _OFTEN_S = 2.0
-# Columns of the bar alone, and of the bar with brackets, counts and blanks.
+# _BAR: columns of the bar. _BEFORE_TEXT: columns of the bar with brackets, counts and blanks.
 _BAR, _BEFORE_TEXT = 24, 42
 # Words for a requirement that is not met, by level; what a robot MAY do is no failure.
 _WORDS = {Level.MUST: "fail", Level.SHOULD: "warn"}
@@ -88,7 +88,7 @@ class Progress:
         run = self._robot.run
         failures = sum(run.judge.refuted().values())
         if failures != self._failures:
-            # One cause is one finding, told by one requirement.
+            # One cause counts as one finding, under the first requirement that reports it.
             self._failures = failures
             _, causes = by_cause(run.judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
             broken = {cause.finding.requirement for cause in causes if run.selection.has(cause.finding.requirement)}

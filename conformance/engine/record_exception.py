@@ -25,10 +25,10 @@ def record_exception(
         for id_ in ids:
             run.out_of_time(id_)
         return
-    # A description may be such that no valid request can be made from it.
+    # A description may be such that the suite can make no valid request.
     unmade = isinstance(error, HarnessError) and not run.contract.is_claimed
     if isinstance(error, NotPossibleError | NotPermittedError) or unmade:
-        # A note is the reason of a skip where nothing was judged, and changes nothing where other checks have judged.
+        # A note becomes the reason for a skip if nothing was judged; it changes nothing otherwise.
         tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip
         tell = run.judge.unclaimed if isinstance(error, NotDeclaredError) else tell
         tell = run.judge.not_seen if isinstance(error, NotSeenError) else tell
@@ -37,7 +37,7 @@ def record_exception(
         return
     known = [id_ for id_ in ids if run.judge.of(id_) is not None]
     now = run.judge.counts(known)
-    # Those that the check had not come to; when it had come to all, all: each might have had a further case.
+    # Requirements that the check had not judged yet. If it had judged all, all of them: each may have lacked a case.
     open_ids = [id_ for id_ in known if now[id_] == judged[id_]] or known
     if isinstance(error, NoAnswerError):
         _no_answer(run, alive, known, open_ids, error)
@@ -56,7 +56,7 @@ def _no_answer(
     losses = run.losses
     goes_on = alive()
     if run.losses > losses or (run.aborted and run.judge.ended_by):
-        # The loss is a finding of its own, or a gateway's doing.
+        # The loss of the device is reported as a finding of its own, or blamed on a gateway.
         for id_ in open_ids:
             if run.aborted or run.judge.ended_by:
                 run.judge.stopped(id_, run.aborted)
@@ -67,7 +67,7 @@ def _no_answer(
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
         run.judge.silent(error.unanswered)
         for finding in run.judge.met:
-            # One that was there before may be of a check that judged this requirement by itself.
+            # An earlier finding may come from a check that judged this requirement itself.
             if finding.exchange is error.unanswered and finding.seen == 1:
                 finding.among = len(open_ids)
     else:

@@ -152,7 +152,7 @@ class RefusalListener(Listener):
     @property
     def text(self) -> str:
         """How the device refused the run's credentials, and what to do; empty if it accepted them."""
-        # 403 and its like may be about one request, as from a firewall; 401 never is.
+        # 403 and 423 may concern one request only, as from a firewall; 401 and 407 never do.
         is_clear = bool(self.refused.keys() & {401, 407}) or self.refused.total() > self.other
         if not is_clear or (self.accepted and not self.expired) or (self.open and not self.has_credentials):
             return ""

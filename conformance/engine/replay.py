@@ -36,19 +36,18 @@ from conformance.verdict.evidence import CheckerListener
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeLimit
 
-# Longest pause between two requests that is kept, s: the judged effect may need the pause.
+# Longest pause between two requests that is repeated, s: the effect may need the pause.
 _LONGEST_PAUSE_S = 10.0
-# A replay sends for the first time at most, with the second for each recorded request in addition, and never longer
-# than the last, s.
+# Time for a replay, s: _LEAST_S, plus _EACH_S for each recorded request, and at most _MOST_S.
 _LEAST_S, _EACH_S, _MOST_S = 60.0, 2.0, 1800.0
 _BY_JUDGEMENT = "as in the run"
 _BY_STATUS = "by the status"
 _BY_SILENCE = "by the missing response"
 _ALONE = "from the request alone: give --statement, so that the requirement's own checks judge the device"
-# Statuses by which a gateway says that the device is away, or the device that it cannot answer now.
+# Statuses by which a gateway or device says that the device is temporarily unavailable.
 _AWAY = frozenset({502, 503, 504})
 _SERVER_ERROR = 500
-# Characters of the text on a missing response that say of which kind it was.
+# Characters in the text on a missing response that tell its kind.
 _ALIKE = 20
 
 
@@ -270,15 +269,15 @@ def _still_there(
     fields = tuple(
         (name, str(value))
         for name, values in recorded["headers"].items()
-        # The result has the content without its coding, where that can be undone.
+        # The result has the decompressed content, where that is possible.
         if name.lower() != "content-encoding" or id_ == "http/content-coding"
         for value in (values if isinstance(values, list) else [values])
     )
     before = Exchange(request, Response(recorded["status"], fields, (recorded["body"] or "").encode(), 0.0))
     now = Exchange(request, came.response)
-    # The device may refuse this request, or fail, before it comes to what was found.
+    # The device may refuse the request, or fail, before it reaches the fault.
     hidden = status != recorded["status"] and (is_refused(now) or status >= _SERVER_ERROR)
-    # Of a long body the result has only the beginning, of which nobody can judge.
+    # The result has only the beginning of a long body, which cannot be judged.
     if rest and contract and "body_length" not in recorded:
         for fails in (_observed_to_fail, fails_by_description):
             if fails(contract, rest, id_, before):

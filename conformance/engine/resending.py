@@ -39,17 +39,18 @@ from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.finding import Again, Finding, Sent
 from conformance.verdict.run import Run
 
-# Octets of one request in a result, compressed; octets that are sent for one, and for all.
+# _MOST: bytes of one request in a result, compressed. _MOST_SENT: bytes sent for one finding; below, for all.
 _MOST = 64 * 1024
 _MOST_SENT = 25 * 1024 * 1024
 _MOST_IN_ALL = 4 * _MOST_SENT
-# What a request is made of on the wire (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): no place for another request in it.
+# Grammar of a method and a target (RFC 9110 5.6.2, 5.5; RFC 9112 3.2): another request cannot hide in them.
 _TOKEN = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 _TARGET = re.compile(r"https?://[\x21-\x7e]+")
 _VALUE = re.compile(r"[^\x00\r\n]*")
-# Fields that the client writes itself.
+# Headers that the client writes itself.
 _OF_THE_CLIENT = frozenset({"host", "content-length", "connection"})
-# Times that a finding's request is sent again; time for all, s: the first finding of each requirement is first.
+# _TIMES: how often a finding's request is repeated. _LONGEST_S: time for all, s; the first finding of each requirement
+# comes first.
 _TIMES = 5
 _LONGEST_S = 8.0
 
@@ -245,7 +246,7 @@ def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Con
         return now is not None and fails_by_description(run.contract, base_url, finding.requirement, now)
     if not isinstance(came, Exchange) or not is_same(before, came):
         return False
-    # A SOAP fault is not an error page with its status.
+    # A SOAP fault and an error page with the same status are different responses.
     return bool(unreadable(before.media_type, before.body)) == bool(
         unreadable(came.response.media_type, came.response.body)
     )

@@ -27,10 +27,10 @@ from conformance.verdict.verdicts import ClassValue, Value, Verdict, overall, ve
 
 RESULT_FORMAT = "roaas-result/1"
 RESULT_NAME = "result.json"
-# Characters of a body that the result keeps; its length is always given.
+# _SHOWN_BODY: characters of a body that the result keeps, beside its length. _SHOWN_CURL: characters of a command.
 _SHOWN_BODY = 4096
 _SHOWN_CURL = 20_000
-# Operations of one finding that get a command, and characters of such a command.
+# _COMMANDS: operations of a finding that get a command. _SHORT_CURL: characters of such a command.
 _COMMANDS = 30
 _SHORT_CURL = 2000
 _LIBRARIES = ("schemathesis", "hypothesis", "zeep", "lxml", "xmlschema", "h11")
@@ -52,7 +52,7 @@ def result_document(
     """Return the content of result.json for a run."""
     run, statement = robot.run, robot.run.statement
     if not run.digests:
-        # Of what judges: when the run ends, the files may be gone.
+        # Digests are computed at the start: the files may be gone when the run ends.
         run.digests.update(suite=suite_digest(run.contract), contract=contract_digests(run.contract))
     aside = [one for one in verdicts if one.requirement.class_ in run.beside]
     verdicts = [one for one in verdicts if one not in aside]

@@ -47,7 +47,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
         raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")
     claims = statement.claimed(contract)
     if statement.claims is None:
-        # A test fails or passes: there is no place beside.
+        # A pytest test passes or fails, so classes beside the verdict are left out.
         claims = tuple(name for name in claims if not contract.classes[name].beside)
     run = Run(
         statement=statement,

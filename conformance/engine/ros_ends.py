@@ -12,11 +12,11 @@ from conformance.statement.ros_map import Acts, RosMap
 from conformance.transport.exchange import Attempt, Request
 from conformance.verdict.finding import Finding
 
-# The kind of an operation by the key that names its end, as readers are told it.
+# By kind of operation: the words for its ROS side in messages.
 _DOES: Final = {
     "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to", "lists": "lists",
 }  # fmt: skip
-#: Requirements for which the web's value is the expected one, and ROS's the observed one.
+#: Requirements that expect the web API's value, and observe ROS's.
 _SEEN_ON_ROS: Final = frozenset(
     f"{ROS}/{name}"
     for name in (
@@ -68,7 +68,7 @@ class RosEnds:
             if mine:
                 web, ros = mine[0].observed, f"expected: {mine[0].expected}"
                 if mine[0].requirement in _SEEN_ON_ROS:
-                    # The response is the web's, what came of it ROS's.
+                    # The response came from the web API, the effect was seen on ROS.
                     response, _, seen = web.partition(": ")
                     web, ros = f"{ros}; {response}" if seen else ros, seen or web
                 numbers = [finding.number for finding in mine]

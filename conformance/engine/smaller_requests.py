@@ -8,7 +8,7 @@ from typing import Any, Final
 from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import Request
 
-# Fields without which a body is not read at all, or that the client adds to each request.
+# Headers that every request needs or that the client adds.
 _KEPT: Final = frozenset({"host", "accept", "content-type", "content-length", "connection"})
 # A text longer than this is also tried at half its length.
 _LONG: Final = 64
@@ -28,7 +28,7 @@ def smaller(request: Request) -> Iterator[Request]:
         yield replace(request, url=f"{place}?{'&'.join(pairs[:index] + pairs[index + 1 :])}")
     for index, pair in enumerate(pairs):
         if len(pair) > _LONG:
-            # An escape that is cut in two would be another fault.
+            # Do not cut a percent-escape in two: that would be another fault.
             half = pair[: len(pair) // 2].rstrip("%") if "%" not in pair[len(pair) // 2 - 2 :] else ""
             yield replace(request, url=f"{place}?{'&'.join([*pairs[:index], half, *pairs[index + 1 :]])}")
     for name in dict.fromkeys(name.lower() for name, value in request.headers if not is_shown(value)):

@@ -14,7 +14,7 @@ from conformance.verdict.verdicts import holds_back
 
 _PACKAGE = Path(__file__).parents[1]
 _PROBE = _PACKAGE.parent / "ros_probe"
-# The rooms that decide what is asked and what is said of it.
+# Rooms whose code decides what is sent and judged.
 JUDGING = (
     "contract",
     "statement",
@@ -103,7 +103,7 @@ def _known(item: Requirement, contract: Contract, sets: Mapping[str, Requirement
         "classes": list(item.classes),
         "aliases": list(item.aliases),
         "sets": [name for name, one in sets.items() if not ids.isdisjoint(one.requirements)],
-        # Of a device that claims no contract, a run leaves out what no permitted request shows.
+        # For a device without a contract, a run leaves out requirements that no permitted request can test.
         "decides": holds_back(item) and contract.is_claimed,
         "beside": contract.classes[item.class_].beside,
     }

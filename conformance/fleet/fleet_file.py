@@ -92,7 +92,7 @@ def _member(path: Path, number: int, robot: _Robot, file: _File, contract: Contr
         try:
             described = api_of(statement).openapi
             if described:
-                # Judged by its own description, so that the contract does not say what else the statement may have.
+                # With a description, do not apply the contract's rules to the statement.
                 endpoints = msgspec.structs.replace(endpoints_of(statement), rest=described)
             else:
                 declared = load_statement(statement, contract)
@@ -122,7 +122,7 @@ def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
     """Refuse robots with the same folder, whose results would overwrite each other, or the same address."""
     named, found_at = defaultdict(list), defaultdict(list)
     for number, member in enumerate(members, 1):
-        named[member.name.lower()].append(number)  # some file systems know no other case
+        named[member.name.lower()].append(number)  # some file systems ignore case
         for address in _addresses(member.endpoints):
             found_at[address].append(number)
     for what, found in (("are both called", named), ("have the same address,", found_at)):

@@ -41,7 +41,7 @@ _WRITTEN = (
     "gl-*.json",
     "annotations.txt",
 )
-# A run that is told to end stops the robot, for up to 20 s, and writes its result: it gets this long, s.
+# A run that has to end stops the robot, for up to 20 s, and writes its result: this is its time, s.
 _GRACE_S = 45.0
 _PROGRESS = re.compile(rb"(\d+/\d+) checks[^\n]*\n[^\n]*\Z")
 _SHOWN = 400
@@ -148,7 +148,7 @@ class MemberRun:
             try:
                 ended = await self._wait(process, stop)
             finally:
-                _kill(process)  # whatever ends the wait, no run outlives it
+                _kill(process)  # no run may outlive the wait
         except OSError as error:
             return MemberResult(self.member, Outcome.NOT_JUDGED, reason=f"it could not be started: {error}")
         return self._result(process.returncode, ended, time.monotonic() - started)

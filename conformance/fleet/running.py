@@ -95,6 +95,6 @@ class FleetRun:
     def _tell(self, text: str) -> None:
         if self._out is not None:
             spent = time.monotonic() - self._started
-            # What a robot's run said last is foreign text.
+            # A robot's last line of progress is foreign text.
             self._out.write(f"[{spent:5.1f} s] {self._done}/{len(self._runs)} judged | {inert(text)}\n")
             self._out.flush()

@@ -18,7 +18,7 @@ from conformance.transport.passage import EyeState, Heard, Passage
 
 #: Version of the file format.
 VERSION: Final = 1
-# Octets of a body that are kept; of a longer one, only hash and length.
+# Bytes of a body that are kept; a longer body has only hash and length.
 _MOST_KEPT: Final = 1 << 20
 
 
@@ -227,7 +227,8 @@ Event = Began | Sent | Withdrawn | Span | Seen | Eye | Ended
 
 
 _MOST: Final = 512 << 20
-# Octets of all events, unpacked, and of one of them: a request and a response of 1 MiB each, escaped and in base64.
+# _MOST_UNPACKED: bytes of all events, unpacked. _MOST_LINE: bytes of one event with 1 MiB of request and response,
+# escaped.
 _MOST_UNPACKED: Final = 4 << 30
 _MOST_LINE: Final = 64 << 20
 _PIECE: Final = 1 << 20
@@ -273,7 +274,7 @@ def _lines(octets: bytes) -> Iterator[bytes]:
             raise ValueError(f"no gzip data: {error}") from error
         octets = opened.unconsumed_tail
         if not piece:
-            return  # the process that wrote it was killed
+            return  # the process that wrote the file was killed
         unpacked += len(piece)
         *lines, rest = (rest + piece).split(b"\n")
         if unpacked > _MOST_UNPACKED or len(rest) > _MOST_LINE:

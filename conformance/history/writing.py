@@ -25,9 +25,9 @@ from conformance.transport.passage import EyeState, Passage, Recorder
 HISTORY_NAME: Final = "history.jsonl.gz"
 _GZIP: Final = 31
 _FAST: Final = 1
-# Events are gathered this long before they are written, s: no more than these can be lost.
+# Events are collected this long before they are written, s: at most these are lost.
 _GATHERED_S: Final = 0.1
-# Octets of a history on disk: ten times what a long run writes.
+# _MOST: bytes of a history on disk, ten times those of a long run. _LAST_S: pause between looks at the disk, s.
 _MOST: Final = 512 << 20
 _LAST_S: Final = 60.0
 
@@ -71,7 +71,7 @@ class HistoryWriter(Recorder):
 
     def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
         """Add what an eye saw."""
-        # JSON has no word for what is not finite.
+        # JSON has no infinity or NaN.
         told = (str(one) if isinstance(one, float) and not math.isfinite(one) else one for one in values)
         self._queue.put(Seen(self._since(at_s), eye, tuple(told)))
 
@@ -109,7 +109,7 @@ class HistoryWriter(Recorder):
                         piece = piece[file.write(piece) :]
         except (OSError, MemoryError) as error:
             self.problem = str(error) or type(error).__name__
-            # A full disk has room for the result again.
+            # Removing the history leaves room for the result on a full disk.
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
             with suppress(MemoryError):

@@ -9,14 +9,14 @@ from typing import Final, NamedTuple
 
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 
-# A number has responded if it changed by this many standard deviations, and at least by this much.
+# A number has changed by a drive if it moved by _FAR standard deviations, and at least by _LEAST.
 _FAR: Final = 6.0
 _LEAST: Final = 1e-6
-# A number that changes at rest by this share of its rate under way changes by itself, as a clock does.
+# A number that changes at rest by this share of its rate while driving changes by itself, like a clock.
 _BY_ITSELF: Final = 0.3
-# Share of its value under way that a velocity may show at rest.
+# Share of its driving value that a velocity may have at rest.
 _RESTS: Final = 0.3
-# The first share of a drive, in which a device gets to its velocity.
+# First share of a drive, in which the device accelerates.
 _RISES: Final = 0.4
 # Two drives agree if their ratios differ by less than this share.
 _ALIKE: Final = 0.4

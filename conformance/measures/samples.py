@@ -15,7 +15,7 @@ SEVERAL: Final = 3
 LATE: Final = 3
 # Converts the median distance from the median to the standard deviation of normal noise.
 _SIGMA: Final = 1.4826
-# Standard deviations of noise within which a sample lies: normal noise exceeds them once in fifteen thousand.
+# A sample lies within this many standard deviations of noise: normal noise exceeds them once in fifteen thousand.
 FARTHEST: Final = 4.0
 
 Sample = tuple[float, float]

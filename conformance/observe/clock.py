@@ -33,7 +33,7 @@ class _WallClock:
 WALL_CLOCK: Final[Clock] = _WallClock()
 
 
-# Longest time that is given back to a device that is always late, s.
+# Most time that a device that is always late gets back, s.
 _MOST_GIVEN_BACK_S = 5.0
 
 

@@ -87,7 +87,7 @@ def test_what_is_described_is_there(api: RestInterface, rest: HttpClient) -> Non
             judge_there(api, _BEHAVIOUR, example_call(api, operation))
     document, _, _ = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
-    # A robot may serve the contract's own description, with an extension in it that it does not have.
+    # A robot may serve the contract's own description, although it lacks an optional extension in it.
     known = {Described(item, item.template).address for item in operations_of(api.run.contract)}
     for item in found:
         if item.address not in known and item.path == item.operation.template:

@@ -50,11 +50,11 @@ def _look(interfaces: Interfaces, name: Interface) -> tuple[str, Attempt | None]
         if service is None:
             return f"no address of the {name} interface", None
         if service.client.refusal("POST", service.path):
-            # Whatever GET is answered, something is there; more than GET is not permitted.
+            # Any response to GET shows that the address exists; only GET is permitted.
             return "", service.client.send("GET", service.path)
         exchange = service.post(EMPTY)
     except NoAnswerError as none:
         return f"{name}: {none}", none.unanswered
-    # Any response from something that handles POST will do: a fault, a 4xx for the empty Body, even a server error.
+    # Any response shows a handler of POST: a fault, a 4xx for the empty Body, even a server error.
     status = exchange.response.status
     return (f"status {status} for POST at the {name} interface" if status in {404, 405, 501} else ""), exchange

@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
 _PATH = "/application.wadl"
 _BEHAVIOUR = "describe/wadl-behaviour"
 _IDS = ("describe/wadl", "describe/wadl-resources", _BEHAVIOUR)
-# Methods that a WADL may list beside a resource's own, as Jersey does.
+# _BESIDE: methods that a WADL may add to a resource's own, as Jersey does.
 _BESIDE = frozenset({"HEAD", "OPTIONS", ""})
 _MEDIA_TYPES = {"application/vnd.sun.wadl+xml", "application/wadl+xml", "application/xml", "text/xml"}
 

@@ -72,7 +72,7 @@ def _served(service: SoapService) -> _Served:
     except WsdlError as error:
         return _Served(exchange, None, str(error))
     missing = [(place, why) for place, why in description.documents.missing.items() if is_same(place, source)]
-    # A document of another host (a public schema) matters only where something that is used comes from it.
+    # A missing document of another host matters only if the description uses something from it.
     problem = next((f"a reference to {place}: {why}" for place, why in missing), "") or next(unusable(description), "")
     return _Served(exchange, description, problem)
 
@@ -101,7 +101,7 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
                 expect(judge, f"describe/{name_}", served.exchange).that(not problem, expected, problem)
 
 
-# Not while the robot settles: it has its time to do so from the last POST on.
+# Not while the robot settles after the last POST: the check before this one started that time.
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("describe/wsdl-address")
 def test_address(soap: SoapServices, judge: Judge) -> None:

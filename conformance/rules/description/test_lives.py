@@ -61,7 +61,7 @@ def deleted_is_gone(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     for life in trace:
         if life.deleted is None or life.gone is None or life.deleted.response.status not in _DONE:
             continue
-        # One that can be restored may be read, and says so.
+        # A deleted thing that can be restored may still be read, if it is marked as deleted.
         if not is_marked_deleted(read_json(life.gone.response.body).value):
             yield Case(not life.gone.response.ok, life.gone, f"status 404 or 410 after {life.delete}", cause=life.read)
     yield from _looks(trace, Kind.GONE)

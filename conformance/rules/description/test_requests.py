@@ -24,7 +24,7 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
-# Texts of a description that say that two values depend on each other, which no schema can say.
+# Phrases in a description which say that two values depend on each other, which no schema can express.
 _TOGETHER = re.compile(
     r"[<>≤≥≠]|\b(than|before|after|below|above|between|exceeds?|equal|differ\w*|both|either|together|unless|requires?)\b",
     re.IGNORECASE,
@@ -52,7 +52,7 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
     """Judge whether requests with values that the description forbids are refused."""
     sure = [one for one in trace.probes if one.kind in _WRONG and one.validity != VALID and one.exchange is not None]
     sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
-    # What a path cannot name is not there either.
+    # A thing that a path cannot name does not exist either.
     absent = _deletes_the_absent(trace)
     sure = [one for one in sure if not (one.ok and one.operation in absent and _is_in_path(one))]
 
@@ -60,7 +60,7 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
         if not probe.ok:
             return None
         why = "" if probe.says else probe.why
-        # A type that a framework converts, it converts in every operation.
+        # If a framework converts a type, it does so in every operation.
         converted = _CONVERTED.search(why)
         given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
         if given == "boolean":
@@ -126,7 +126,7 @@ def optional(trace: Survey) -> Iterable[Outcome]:
     for label in {one.operation: None for one in trace.probes}:
         least = trace.of(label, Kind.USUAL)
         more = [one for one in trace.of(label, Kind.OPTIONAL) if one.ok]
-        # What is required nowhere may be so together (minProperties, anyOf).
+        # Parameters that are all optional may be required together (minProperties, anyOf).
         refused = [one for one in least if one.status in _REFUSED and not one.invents and one.validity != INVALID]
 
         def fault(
@@ -168,7 +168,7 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     alone = (one for one in _named(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
     trace = replace(trace, probes=tuple(alone))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
-    # An operation that never accepts anything may need a state; which status it has then, another rule judges.
+    # An operation that never accepts a request may need another state; another requirement judges its status.
     works = {one.operation for one in trace.probes if one.ok}
     generated = [one for one in trace.probes if one.kind is Kind.GENERATED and one.operation in works]
     generated = [one for one in generated if one.status not in HELD]
@@ -198,7 +198,7 @@ def _named(trace: Survey, run: Run) -> Iterator[Probe]:
         for item in operations_of(run.contract)
         if any(is_free_text(one.schema) for one in item.parameter("path"))
     }
-    # The generation sends other methods as well, such as OPTIONS.
+    # Schemathesis also sends other methods, such as OPTIONS.
     own = [one for one in trace.probes if one.operation.startswith(f"{one.attempt.request.method} ")]
     known = {_path_of(one) for one in own if one.ok}
     yield from (one for one in own if one.operation not in free or _path_of(one) in known)
@@ -226,9 +226,9 @@ def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: 
     """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is."""
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
-    # Nobody but the device knows which ids and cursors there are.
+    # Only the device knows which ids and cursors exist.
     probes = [one for one in sent if (anyway or one.operation in works) and not one.invents and one.status not in HELD]
-    # What is accepted in one state, or not judged in it, may be refused in another one.
+    # An input accepted in one state may be refused in another.
     other = {_asked(one) for one in trace.probes if (one.ok or one.status in HELD) and one.place.startswith("body /")}
     probes = [one for one in probes if one.ok or _asked(one) not in other]
 
