@@ -26,9 +26,9 @@ from conformance.commandline.secret_file import read_secret
 if TYPE_CHECKING:
     from conformance.transport.digest import DigestUser
 
-# Shorter secrets are not searched for in responses: they would be found everywhere.
+# Shorter secrets are not searched for in responses, because they occur everywhere.
 _SHORTEST: Final = 4
-# Shorter values of other cookies are words, as in theme=dark, and are not masked.
+# Shorter cookie values are words, as in theme=dark, and are not masked.
 _SHORTEST_IN_COOKIE: Final = 8
 _VARIABLE: Final = re.compile(r"\$ROAAS_[A-Z0-9_]+")
 # The head of a request, and the response to a challenge in it (RFC 7616 3.4).
@@ -53,14 +53,14 @@ class Kind(StrEnum):
     COOKIE = "cookie"
 
 
-# A whole header field is none of them if it is of cookies.
+# Kinds of which each is a whole header, unless the header is a cookie.
 _PLAIN: Final = frozenset({Kind.BEARER, Kind.HEADER})
-# What is nearly a secret, by a word for it, and what then follows the secret's variable. Another scheme has the secret.
+# By name: how a nearly right secret is made from the secret, and what is appended to the secret's variable.
 _NEARLY: Final[dict[str, tuple[Callable[[str], str], str]]] = {
     "": (str, ""),
     "lengthened": (lambda secret: f"{secret}-{WRONG}", f"-{WRONG}"),
     "shortened": (lambda secret: secret[:-1], "_SHORTENED"),
-    # Hexadecimal digits are the same number in both cases.
+    # Hexadecimal digits mean the same in both cases.
     "recased": (lambda secret: secret if _HEX.fullmatch(secret) else secret.swapcase(), "_RECASED"),
     "emptied": (lambda _: "", "_EMPTIED"),
     "schemed": (str, ""),
@@ -212,7 +212,7 @@ class Credentials:
                     value = item.digest.answer(method, target)
                     if not value:
                         continue
-                # Cookies share one header (RFC 6265 5.4); of two others the last one is meant.
+                # Cookies share one header (RFC 6265 5.4); of other headers with one name, the last counts.
                 together = item.kind is Kind.COOKIE and item.header in found
                 found[item.header] = f"{found[item.header]}; {value}" if together else value
         return list(found.items())
@@ -252,7 +252,7 @@ class Credentials:
 
     def revealed(self, octets: bytes) -> bytes:
         """Return bytes with the secrets in place of variables, to send a recorded request again."""
-        # The longest first: one variable may be the beginning of another.
+        # Longest first, because one variable's name may begin another's.
         for item in sorted(self.items, key=lambda item: -len(item.variable)):
             if item.kind is Kind.DIGEST and (line := _REQUEST_LINE.match(octets)):
                 answer = item.digest.answer(line[1].decode("latin-1"), line[2].decode("latin-1"))
@@ -303,7 +303,7 @@ def quoted(word: str) -> str | None:
     return '"' + "".join(part.replace("!", "\"'!'\"") for part in escaped) + '"'
 
 
-# Placeholders for the texts that differ in each message, and the places of these texts.
+# _VARIABLES: placeholders for the texts that differ in each message. _TOKEN: the places of these texts.
 _VARIABLES: Final = (b"$WSSE_DIGEST", b"$WSSE_NONCE", b"$WSSE_CREATED")
 _TOKEN: Final = re.compile(rb"(:Password [^>]*>)[^<]*(<.*?:Nonce [^>]*>)[^<]*(<.*?:Created>)[^<]*", re.DOTALL)
 

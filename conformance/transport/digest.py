@@ -25,7 +25,7 @@ class DigestUser(HTTPDigestAuth):
         self._pair = pair
         user, _, password = pair.partition(":")
         super().__init__(user, password)
-        # requests keeps a challenge for each thread; a device that counts the uses of one wants one count for all.
+        # requests keeps a challenge per thread, but a device that counts its uses expects one count for all threads.
         self._thread_local: Any = SimpleNamespace()
         self._lock = threading.Lock()
         self.init_per_thread_state()
@@ -40,7 +40,7 @@ class DigestUser(HTTPDigestAuth):
             with self._lock:
                 before = self._thread_local.chal
                 self._thread_local.chal = parse_dict_header(offer[at + len(_SCHEME) :])
-                # By this hash one is the user as well, in this realm (RFC 7616 3.4.2).
+                # The realm's hash takes the place of the user name (RFC 7616 3.4.2).
                 user, _, password = self._pair.partition(":")
                 whole = f"{user}:{self._thread_local.chal.get('realm', '')}:{password}".encode()
                 for algorithm in ("md5", "sha256"):

@@ -28,7 +28,7 @@ from conformance.transport.passage import Heard, Passage
 from conformance.transport.reach import ElsewhereError, Trust, UnreachableError
 
 _REDIRECTS: Final = 4
-# Octets of one document, and of all that one description refers to; time, s.
+# _MOST_OCTETS: bytes of one document. _MOST_IN_ALL: of all documents that a description refers to. Below: time, s.
 _MOST_OCTETS: Final = 32 * 1024 * 1024
 _MOST_IN_ALL: Final = 256 * 1024 * 1024
 _MOST_SECONDS: Final = 300.0
@@ -68,7 +68,7 @@ class Fetcher:
         if time.monotonic() - self._began > _MOST_SECONDS:
             raise ValueError(f"fetching took more than {_MOST_SECONDS:g} s in all")
         seconds = self._connection.timeout_s
-        # httpx bounds each read and not their sum, which a server that sends single bytes makes endless.
+        # httpx limits the time of each read but not of all, and a server may send single bytes without end.
         done: SimpleQueue[bytes | Exception] = SimpleQueue()
         running = click.get_current_context(silent=True)
         threading.Thread(target=lambda: done.put(self._outcome(url, running)), daemon=True).start()
@@ -87,7 +87,7 @@ class Fetcher:
 
     def _outcome(self, url: str, running: click.Context | None) -> bytes | Exception:
         if running is not None:
-            push_context(running)  # whose options an error may name
+            push_context(running)  # an error may name an option of that command
         try:
             return self._content(url)
         except Exception as error:  # noqa: BLE001 - the caller's thread raises it
@@ -183,7 +183,7 @@ class _Guard(httpx.BaseTransport):
             raise ElsewhereError(f"it redirects to {request.url}: {error}") from None
         parts = httpx.URL(url)
         target = credentials.target(parts.raw_path.decode("ascii"))
-        # Those of the server as the user named it are made below.
+        # Credentials for the server as the user named it are added below.
         given = [pair for pair in request.headers.items() if pair[0] not in {"host", "authorization", "connection"}]
         for last in (False, True):
             sent = httpx.Request(
@@ -243,7 +243,7 @@ def _maybe_tls(error: httpx.TransportError) -> str:
     """Return that a port which closes a connection may speak TLS, if TLS was not tried."""
     try:
         return "; is the address https://?" if error.request.url.scheme == "http" else ""
-    except RuntimeError:  # it has no request
+    except RuntimeError:  # the error has no request
         return ""
 
 

@@ -15,9 +15,9 @@ class Heard(StrEnum):
     """Whether the checkers judge a response."""
 
     ALWAYS = "always"
-    #: Several clients ask at once: that the device has too much to do is no fault.
+    #: several clients send requests at once: an overload response is no fault
     UNLESS_BUSY = "unless busy"
-    #: Such as a login, a sign of life, or the commands that keep a device going while it is measured.
+    #: a login, a sign of life, or commands that keep a device moving during a measurement
     NEVER = "never"
 
 

@@ -19,7 +19,7 @@ from conformance.transport.exchange import Exchange, NoAnswer, NoAnswerError, Re
 from conformance.transport.passage import Heard, Passage
 from conformance.transport.streams import Stream
 
-# How long a call behind a publication, and word of a goal that is rejected at once, are waited for, s.
+# _BEHIND_S: wait for the response to a call after a publication. _AT_ONCE_S: for the rejection of a goal, s.
 _BEHIND_S: Final = 2.0
 _AT_ONCE_S: Final = 0.3
 _BEHIND: Final = "/rosapi/get_time"
@@ -103,7 +103,7 @@ class BridgeClient(HttpClient):
             self._say(link, op="cancel_action_goal", id=name, action=goal["action"])
             return self._told(link, HTTPStatus.CONFLICT)
         if what not in {"publish", "call", "act"}:
-            # A subscription is a connection of its own; this one tells whether the rosbridge serves anybody.
+            # Each subscription opens a connection of its own; here only see whether the rosbridge responds.
             return self._told(link, HTTPStatus.BAD_REQUEST, within_s)
         link.send(body.decode(errors="replace"))
         if what == "publish":
@@ -169,7 +169,7 @@ class Subscription(Stream):
     def __init__(self, client: HttpClient, body: dict[str, Any], timeout_s: float, throttle_s: float) -> None:
         topic = body["topic"]
         super().__init__(client, "/", "websocket", timeout_s, lambda octets: _object(octets).get("topic") == topic)
-        # The same as an operation of the client, which counts those that were called.
+        # The counterpart of a client's operation, which counts the calls.
         said = json.dumps({**body, "throttle_rate": round(throttle_s * 1000), "queue_length": 0})
         self.request = client.send("GET", f"/subscribe{topic}", body=said.encode(), timeout_s=timeout_s).request
         self._ends = json.dumps({"op": "unsubscribe", "topic": topic})

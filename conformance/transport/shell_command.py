@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 from conformance.transport.credentials import is_shown, quoted
 
 _PLAIN_LIMIT = 4000
-# The placeholder for the response to a challenge: curl computes it itself.
+# Placeholder for a digest, which curl computes itself.
 _DIGEST = "Digest $ROAAS_DIGEST"
 # Fields that curl writes itself.
 _OF_CURL = frozenset({"content-length", "connection", "user-agent", "host"})
@@ -23,12 +23,12 @@ _TARGET = re.compile(r"[\x21\x22\x24-\x7e]*")
 _NAME = re.compile(r"[!#$%&'*+.^_`|~0-9A-Za-z-]+")
 _FIELD = re.compile(r"[!-9;-~]+")
 _VALUE = re.compile(r"[\x20-\x7e]*")
-# curl announces longer bodies by Expect: 100-continue.
+# _EXPECTED: curl announces longer bodies by Expect: 100-continue.
 _EXPECTED = 1024
 _REVEALED = (
     r'o=re.sub(rb"\$(ROAAS_[A-Z0-9_]+)",lambda m:os.environb.get(m[1],m[0]),zlib.decompress(base64.b64decode("{}")))'
 )
-# Reads until the device closes the connection or is silent for three seconds.
+# Python code that reads until the device closes the connection or is silent for three seconds.
 _TALK = (
     "s=socket.create_connection(({host!r},{port}),10){tls};s.sendall(o);"
     '[sys.stdout.buffer.write(d) for d in iter(lambda:s.recv(65536) if getattr(s,"pending",int)() '
@@ -57,7 +57,7 @@ def shell_command(method: str, url: str, headers: Sequence[tuple[str, str]], bod
     elif method != "GET" or body:
         words += ["-X", method]
     names = {name.lower() for name, _ in headers}
-    # curl writes no length where there is no body, and the host of the URL.
+    # curl sends no Content-Length without a body, and takes Host from the URL.
     own = {("content-length", value) for name, value in headers if name.lower() == "content-length" and not body}
     own |= {("host", value) for name, value in headers if name.lower() == "host" and value != urlsplit(url).netloc}
     for name, value in headers:
@@ -75,7 +75,7 @@ def shell_command(method: str, url: str, headers: Sequence[tuple[str, str]], bod
         pipe, data = _given(body)
         words += ["--data-binary", data]
     words.append(url + query)
-    # The shell has to expand the variables of credentials.
+    # The shell expands the variables of credentials.
     return pipe + " ".join(quoted(word) or shlex.quote(word) for word in words)
 
 
@@ -108,7 +108,7 @@ def _given(body: bytes) -> tuple[str, str]:
         text = body.decode()
         if not {"\n", "\t"} & set(text):
             return "", text
-        # printf makes line ends and tabs of the escapes.
+        # printf turns the escapes into line ends and tabs.
         escaped = text.replace("\\", "\\\\").replace("\n", "\\n").replace("\t", "\\t")
         return f"printf %b {quoted(escaped) or shlex.quote(escaped)} | ", "@-"
     if is_shown(body.decode("latin-1")):

@@ -134,7 +134,7 @@ def accepted_until(verdicts: Iterable[Verdict]) -> str:
 
 def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
     day = entry.expires.isoformat()
-    # What could not be tested because of another requirement's finding would have failed by it as well.
+    # A requirement that another finding kept from being tested counts as failed by that finding.
     if verdict.value in {Value.FAIL, Value.WARN} or verdict.because is not None:
         if entry.expires < today:
             return replace(verdict, reason=f"its baseline entry expired on {day}: {verdict.reason}")

@@ -28,7 +28,7 @@ from conformance.verdict.finding import Finding
 _LEVELS = tuple(Level)
 _KINDS = tuple(CauseKind)
 _TOPICS = tuple(Topic)
-# A check of more requirements than this looks at many things, and says less about each.
+# A check of more requirements than this looks at many things, and explains each of them less well.
 _FEW = 5
 
 
@@ -80,7 +80,7 @@ def by_cause(
         return weight(finding), not forbids, finding.unsent, finding.among > _FEW, finding.met
 
     findings = [finding for id_ in judged for finding in evidence[id_].findings.values()]
-    # By finding: for each of its causes, the finding by which that is told.
+    # By finding: for each of its causes, the finding that reports the cause.
     told_by: defaultdict[int, list[Finding]] = defaultdict(list)
     for group in _groups(findings):
         told = min(group, key=first)

@@ -13,14 +13,14 @@ from typing import TypeVar
 
 _Item = TypeVar("_Item")
 EFFORTS = ("quick", "standard", "deep")
-#: Approximate duration of a deep run that names none, min.
+#: DEEP_MINUTES: duration of a deep run without --minutes. _FACTORS: share of the standard cases, by effort.
 DEEP_MINUTES = 10.0
 _FACTORS = {"quick": 0.1, "standard": 1.0}
 _BUDGETS_S = {"quick": 2.0, "standard": 10.0}
 _FEWEST = 3
-# Share of the values of one kind that a fast robot gets.
+# Share of the values of one kind that a fast robot gets at quick effort.
 _KEPT = {"quick": 0.5}
-# Greatest factor by which load may stretch a run: beside others, a run takes twice its time.
+# Greatest factor by which load may lengthen a run: beside other programs, a run takes twice its time.
 _LONGEST = 3.0
 
 
@@ -59,8 +59,8 @@ class Speed:
         return f"about {before:g} to {self.up_to_ms:g} ms for an answer"
 
 
-# Classes of speed. A robot on a network nearby is local, even one in Python on a loaded machine; one on a wireless link
-# is near, with or without kept connections; an Arduino is far.
+# Classes of speed: local is a robot on a nearby network, even in Python on a loaded machine; near is a wireless link;
+# far is an Arduino.
 SPEEDS = (Speed("local", 40, 1.0), Speed("near", 130, 0.2), Speed("far", 800, 0.05), Speed("slow", math.inf, 0.02))
 # A speed must exceed a class's bound by this factor to count as the next class.
 _CLEARLY = 1.25

@@ -27,18 +27,19 @@ from conformance.verdict.finding import (
     subject_of,
 )
 
-# Findings of one requirement that are kept, the last for all further causes; findings that keep all of their requests.
+# MAX_FINDINGS: findings of one requirement; the last stands for all further causes. MAX_SEQUENCES: findings that keep
+# all their requests.
 MAX_FINDINGS = 100
 MAX_SEQUENCES = 10
 # Requests before a finding that are kept with it.
 MAX_SEQUENCE = 40
 _REST = "the rest"
-# Characters of a suite error's message; operations that it names.
+# _FAULT: characters of a suite error's message. _NAMED: operations that it names.
 _FAULT, _NAMED = 200, 3
 _REFUSED = 400
-# What differs between two cases of one finding: numbers, and values in quotes.
+# Numbers and quoted values: the parts of a text that differ between cases of one finding.
 _VALUES = re.compile(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"")
-# What a requirement about missing responses expects, by the kind of silence.
+# By kind of missing response: what a requirement expected instead.
 _SILENT = {
     NoAnswer.TIMEOUT: "a response within the deadline",
     NoAnswer.CIRCUIT_OPEN: "a response within the deadline",
@@ -85,7 +86,7 @@ def case(
     return Case(holds, exchange, expected, found, cause, requirement=requirement)
 
 
-#: Judges the exchanges of a run one after another, in the order in which they ended.
+#: Function that judges the exchanges of a run, in the order in which they ended.
 Checker = Callable[[Attempt], Iterator[Case]]
 
 
@@ -168,7 +169,7 @@ class Judge:
         self.judged: Callable[[str, Attempt | None], None] = lambda _requirement, _exchange: None
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
         self._renamed, self._twins = renamed(self._ledger), twins(self._ledger)
-        # The requirement that is about missing responses of one kind, and about nothing else.
+        # By kind of missing response: the requirement that forbids only that kind.
         self._on_silence = {one.forbids[0]: id_ for id_, one in self._ledger.items() if len(one.forbids) == 1}
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
         self._findings = 0
@@ -272,7 +273,7 @@ class Judge:
                 operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
             self._found(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
             required, kind = self._ledger.get(requirement), kind_of(exchange, found)
-            # What only SHOULD be answered may be left unanswered.
+            # A missing response breaks no SHOULD: it says only what should be in a response.
             if required and required.level is Level.MUST and kind in _SILENCES and kind not in required.forbids:
                 self.silent(exchange)
         return holds
@@ -320,7 +321,7 @@ class Judge:
         kind = self._kind(requirement, exchange, found)
         observed = observed_in(exchange, found)
         causes = causes_of(kind, exchange)
-        # Not what came beside it: a header that each response lacks is one cause, whatever the responses' status.
+        # Only the fault counts, not its circumstances: a missing header is one cause, whatever the responses' status.
         said = _VALUES.sub("#", f"{expected}|{found or observed}")
         key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), said))}"
         if key not in evidence.findings and len(evidence.findings) >= MAX_FINDINGS:
@@ -474,7 +475,7 @@ def occasion_of(attempt: Attempt) -> str:
 @lru_cache(maxsize=256)
 def _occasion(method: str, media_type: str) -> str:
     kinds = {"JSON": is_json(media_type), "XML": media_type.endswith("xml"), "text": media_type == "text/plain"}
-    # Others are one kind: a device may name as many as it likes.
+    # Other media types count as one kind, because a device may invent any number.
     kind = next((name for name, fits in kinds.items() if fits), "other" if media_type else "without body")
     return f"{method} {kind}"
 

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
     from conformance.verdict.effort import Effort
 
-# Hypothesis also takes values from the source of all loaded modules that are not in site-packages. The cases would then
-# depend on how the suite is installed; and reading the source takes a quarter of a second.
+# Hypothesis also takes values from the source of loaded modules outside site-packages. The cases would then depend on
+# how the suite is installed, and reading the source takes a quarter of a second.
 providers._get_local_constants = lambda: providers._local_constants  # noqa: SLF001 - there is no setting for it
-# The folder in which the command was started is the user's. Made once, Hypothesis' table of characters saves a third of
-# a second.
+# Do not write Hypothesis's folder into the user's working directory. Kept once, its table of characters saves a third
+# of a second.
 if "HYPOTHESIS_STORAGE_DIRECTORY" not in os.environ:
     with suppress(RuntimeError):  # a user without a home, as in some containers
         set_hypothesis_home_dir(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "roaas/hypothesis")
@@ -76,7 +76,7 @@ class Explorer:
             if silence:
                 return
             if time.monotonic() > until:
-                # After a failure, what is left are attempts to make it smaller, and no cases.
+                # After a failure, the remaining examples only make it smaller: they are no cases.
                 if not refuted:
                     self.left_out(1)
                 return
@@ -99,10 +99,10 @@ class Explorer:
         Raises:
             NoAnswerError: the robot did not respond.
         """
-        # Walks are not made smaller: with a robot that moves, each try would cost seconds.
+        # Sequences of steps are not made smaller: on a moving robot each try would cost seconds.
         chosen = settings(self._settings(cases), stateful_step_count=steps, phases=(Phase.generate,))
         self._tally.planned += self._effort.cases(cases) * steps
-        # A factory that may be a class, which is not to carry this walk's seed to the next one.
+        # A new function each time: Hypothesis stores the seed on it, and the factory may be a class.
         seeded: Any = seed(self._next_seed())(partial(factory))
         _swallow_refuted(lambda: run_state_machine_as_test(seeded, settings=chosen))
 

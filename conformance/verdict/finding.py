@@ -22,7 +22,7 @@ _KINDS = {
     NoAnswer.GATEWAY_TIMEOUT: CauseKind.HANG,
     NoAnswer.MALFORMED: CauseKind.UNREADABLE,
 }
-# Fields that every request has, or that say nothing about what is special in it.
+# _USUAL_FIELDS: headers that every request has or that do not explain a failure. _SHOWN_TARGET: characters of a target.
 _USUAL_FIELDS = frozenset({"host", "content-length", "connection", "authorization", "user-agent"})
 _SHOWN_TARGET = 120
 _SHOWN_FIELD = 100
@@ -30,7 +30,7 @@ _SHOWN_BODY = 200
 _SHOWN_CURL = 2000
 # Operations that one text names; result.json and the pages have all.
 _NAMED = 10
-# Numbers, times and ids, which differ between two responses of one fault.
+# _NUMBERS: numbers, times and ids, which differ between responses with the same fault.
 _NUMBERS = re.compile(r"[0-9a-f.:TZ+-]*\d[0-9a-f.:TZ+-]*")
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>]")
 
@@ -172,7 +172,7 @@ def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
         return CauseKind.RULE
     response = exchange.response
     if response.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
-        # SOAP says what is wrong with a request by a fault with status 500 (BP 1.1 R1126).
+        # A SOAP fault with status 500 describes what is wrong with a request (BP 1.1 R1126).
         fault = response.status == HTTPStatus.INTERNAL_SERVER_ERROR and _FAULT.search(response.body)
         says_so = not found or str(response.status) in found
         return CauseKind.SERVER_ERROR if says_so and not fault else CauseKind.RULE
@@ -196,7 +196,7 @@ def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:
     """
     if kind is CauseKind.RULE or exchange is None:
         return set()
-    # HEAD is GET without its content: one handler answers both (RFC 9110 9.3.2).
+    # HEAD and GET count as one endpoint: one handler answers both (RFC 9110 9.3.2).
     parts = [kind.value, exchange.request.endpoint.replace("HEAD ", "GET ", 1)]
     if isinstance(exchange, Exchange):
         parts.append(f"{exchange.response.status}")

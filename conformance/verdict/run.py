@@ -42,7 +42,8 @@ class Selection:
         return self.exit_first and self.has(requirement) and requirement not in self.accepted
 
 
-# If less than this share was left out for lack of time, a verdict says so in the notes, and not in its first line.
+# _NEXT_TO_ALL: if more of the cases than this share were sent, the verdict's first line does not mention the time
+# limit.
 _NEXT_TO_ALL = 0.99
 _FEWEST_SHARE = 0.04
 

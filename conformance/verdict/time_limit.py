@@ -95,7 +95,7 @@ class TimeLimit:
                 try:
                     is_done = next(step, self) is self
                 except Exception:
-                    # A step that the end of the time interrupts ends the survey for all operations.
+                    # A step that the time limit interrupts ends the survey of all operations.
                     if self.over:
                         self.shortened |= waiting.keys()
                     raise

@@ -16,7 +16,7 @@ from conformance.verdict.evidence import Evidence
 from conformance.verdict.finding import Finding, counted
 from conformance.verdict.run import Run
 
-# Why behaviour that a robot shows or not by itself has no verdict.
+# Why optional behaviour that a robot did not show has no verdict.
 NOT_SEEN = "it was not seen in this run, so it is not judged"
 
 
@@ -51,8 +51,8 @@ class Overall(StrEnum):
 class View(StrEnum):
     """What observed a class: the web services alone, or ROS too."""
 
-    BLACK_BOX = "black box"  # through its web services alone
-    ON_ROS = "seen on ROS"  # by a probe as well
+    BLACK_BOX = "black box"  # observed through the web services only
+    ON_ROS = "seen on ROS"  # also observed by a ROS probe
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
     found = [partial(read_awaited, api.client, one) for one in api.device.accepted]
     for read in found:
         with suppress(NoAnswerError):
-            read()  # what is listed before the first delivery is older
+            read()  # entries before the first delivery are older ones
     return [*found]
 
 
@@ -113,7 +113,7 @@ def _looked_at(_lists_read: list[Callable[..., None]], _beats: list[Beats]) -> I
     Here nothing is between two requests whose responses are compared.
     """
     yield
-    with suppress(NoAnswerError):  # the next check meets that as well
+    with suppress(NoAnswerError):  # the next check meets the same failure
         for read in _lists_read:
             read()
         for beats in _beats:

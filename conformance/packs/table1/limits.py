@@ -17,8 +17,8 @@ from conformance.measures.samples import FARTHEST
 #: One limit for both directions, or the least and the greatest velocity, m/s or rad/s. It has no bounds of its own:
 #: msgspec 0.22 reads them from the wrong place in a union with a tuple, and crashes.
 Range = float | tuple[float, float]
-#: Fewest multiples of tolerance and noise in a limit: below, rest could pass for any velocity, and nothing that depends
-#: on reaching a velocity can be judged (contract.md#judging-by-windows).
+#: A limit must be at least this multiple of tolerance plus noise. Otherwise a robot at rest could pass for one that
+#: drives, and nothing that depends on reaching a velocity is judged (contract.md#judging-by-windows).
 RESOLVED: Final = 4.0
 
 

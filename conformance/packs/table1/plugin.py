@@ -68,7 +68,7 @@ class Device(device.Device):
     doubts = MappingProxyType({"safety": "to claim it, declare limits and hold time below"})
     fixtures = ("conformance.packs.table1.fixtures",)
     comes_and_goes = frozenset({"GetGoal"})
-    #: Checkers to which one reading more may tell whether something is wrong.
+    #: Checkers for which one more reading may decide whether something is wrong.
     doubting: "tuple[AcrossInterfaces, ...]" = ()
 
     @property

@@ -25,14 +25,14 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELD
 from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.evidence import Case, case
 
-# Deliveries that may wait to be looked for; longest wait of the oldest, s.
+# _MANY: accepted deliveries that may wait until the list is read. _WAITS_S: longest wait of the oldest, s.
 _MANY: Final = 10
 _WAITS_S: Final = 1.0
-# Deliveries that the list holds at least.
+# Fewest deliveries that the list has to hold.
 _HELD: Final = 50
-# Lists that are remembered: several clients may read it at once.
+# Earlier lists that are remembered, because several clients may read the list at once.
 _LISTS: Final = 8
-# Messages longer than this are not read, octets.
+# _LARGE: longer messages are not read, bytes. _OPERATIONS: SOAP operations that deliver.
 _LARGE: Final = 100_000
 _OPERATIONS: Final = {clark(NAMESPACE, f"Execute{name}Request"): name == "Coffee" for name in ("Coffee", "Delivery")}
 
@@ -69,12 +69,12 @@ class Deliveries:
     def __init__(self, url: Callable[[str], str], *, has_probe: bool) -> None:
         self._url, self._has_probe = url(DELIVERIES), has_probe
         self._waiting: list[_Accepted] = []
-        # Entries of the list that was read last, with how often each is there; None: none was read.
+        # Entries of the last list, with how often each occurs; None: no list was read yet.
         self._before: Counter[str] | None = None
-        # New entries that no accepted delivery has been found for, yet: its response may come after the list.
+        # New entries without an accepted delivery: its response may still arrive.
         self._new: Counter[tuple[Delivery, str]] = Counter()
         self.has_list = True
-        # The lists that were read last, with the time of the response, s: what a later one shows has to have these.
+        # Earlier lists with their times, s: a later list must contain their entries.
         self._lists: list[tuple[float, Sequence[str]]] = []
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
@@ -128,9 +128,9 @@ class Deliveries:
         for entry in (entries - before).elements():
             request, _, interface = json.loads(entry)
             self._new[Delivery.of(request), interface] += 1
-        # Equal deliveries that were accepted within one unit of the robot's clock cannot be told apart.
+        # Equal deliveries accepted within one tick of the robot's clock cannot be told apart.
         there = self._new if max(entries.values(), default=1) == 1 else self._new | listed
-        # What was listed before they were accepted is older; where it still is, they were not pushed out.
+        # If older entries are still in the list, newer ones cannot have been pushed out.
         whole = len(value) < _HELD or bool(entries & before)
         asked_s = exchange.response.received_s - exchange.response.elapsed_ms / 1000
         waiting, self._waiting, self._before = self._waiting, [], entries

@@ -15,14 +15,14 @@ from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.transport.exchange import Attempt, Exchange, Request, Response
 from conformance.verdict.evidence import Case, case
 
-# Changes, and share of all changes, after which a value must be the old goal's before it counts as stale.
+# A value counts as stale if it was the old goal's after _OFTEN changes, and after the share _MOST of all changes.
 _OFTEN: Final = 3
 _MOST: Final = 0.5
-# The first two readings after a change judge the change; later ones judge what is left of the old goal.
+# The first readings after a change judge the change; later ones judge what remains of the old goal.
 _AT_FIRST: Final = 2
-# Readings of a goal that show a swap: one value, another, and the first again.
+# Readings that show a swap of goals: one value, another, and the first again.
 _SHOWN: Final = 3
-# Prefix of the members that a goal's own progress changes.
+# _PROGRESS: prefix of the members that change as a goal advances.
 _PROGRESS: Final = "status."
 Shown = dict[str, Any]
 
@@ -36,12 +36,13 @@ class Goals:
 
     def __init__(self, url: Callable[[str], str]) -> None:
         self._url = url(GOAL_PATH)
-        # What was shown last before something was asked of the goal, and since then.
+        # The goal as last read before a command. Below: since the command.
         self._before: Shown | None = None
         self._since: list[Shown] = []
         self._first: Exchange | None = None
         self._newest: deque[tuple[Shown, Exchange]] = deque(maxlen=_SHOWN)
-        # How often a value has changed with the goal, and was the old one first; what changes by itself.
+        # How often a member changed with the goal, and how often it first had the old value. Below: members that change
+        # by themselves.
         self._changed: Counter[str] = Counter()
         self._stale: Counter[str] = Counter()
         self._living: set[str] = set()
@@ -131,7 +132,7 @@ class Goals:
         others = {place for place, value in later.items() if before.get(place) != value}
         stale = {place for place in others if first.get(place) == before.get(place)}
         self._changed.update(others)
-        # A goal that is not shown yet is no mixture.
+        # A goal that is not yet shown is not mixed with another.
         self._stale.update(stale if stale != others else ())
         for place in sorted(stale):
             often = self._stale[place] >= max(_OFTEN, _MOST * self._changed[place])

@@ -16,12 +16,12 @@ from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# Times that an interface must be behind the other before it counts; time after a change in which it may be, s.
+# _OFTEN: how often an interface must lag behind the other. _BEHIND_S: how long after a change it may lag, s.
 _OFTEN: Final = 2
 _BEHIND_S: Final = 0.5
 _XML: Final = "application/xml"
 _LARGE: Final = 100_000
-# Marks a value that was not read yet, and one that only HEAD showed to be there.
+# _UNREAD: marks a value that was not read yet. _THERE: marks one that only HEAD showed.
 _UNREAD: Final = object()
 _THERE: Final = object()
 _HEAD: Final = "http/head"
@@ -78,7 +78,7 @@ class AcrossInterfaces:
         """Take one exchange of the run."""
         if isinstance(attempt, Exchange):
             yield from self._answered(attempt)
-        elif attempt.request.method not in SAFE_METHODS:  # it may have been carried out
+        elif attempt.request.method not in SAFE_METHODS:  # the request may have been carried out
             self._forget(self._received_s)
 
     def _answered(self, exchange: Exchange) -> Iterator[Case]:

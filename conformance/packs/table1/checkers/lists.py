@@ -16,7 +16,7 @@ from conformance.packs.table1.robot.soap_services import returned
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-#: The lists: path, shape of the list, shape of a type named in full, and requirement, by the SOAP response's member.
+#: By member of the SOAP response: path, shape of the list, shape of a named type, and requirement.
 _LISTS: Final[Mapping[bytes, tuple[str, Shape, Shape, str]]] = {
     b"GetSensorsResponse": (SENSORS, SENSORS_SHAPE, MESSAGE_TYPE, "equivalence/sensors"),
     b"GetNavigationServicesResponse": (SERVICES, SERVICES_SHAPE, SERVICE_TYPE, "equivalence/services"),

@@ -18,19 +18,21 @@ from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
 from conformance.verdict.evidence import Case, case
 
-# A leap is longer than this, m, and than this many of the path's own steps.
+# A leap in a path is longer than _LEAP_M, m, and longer than _STEPS usual steps of the path.
 _LEAP_M: Final = 1.0
 _STEPS: Final = 4.0
 # A leap aside and back ends within this share of the leap from where it began.
 _BACK: Final = 0.5
-# Numbers up to this are exact enough to compare; a shorter tolerance is not judged; the default tolerance, m.
+# _FAR_M: greater coordinates are too inexact to compare. _NEAR_M: smaller tolerances are not judged. Below: default
+# tolerance, m.
 _FAR_M: Final = 1e4
 _NEAR_M: Final = 0.01
 _TOLERANCE_M: Final = 0.1
 _FRAME: Final = "map"
 _YAW_OFF_RAD: Final = 0.2
 _ROUNDING_M: Final = 1e-6
-# Requirements on a plan's end, start, frame and given start, by media type; the last is SOAP's. YAML takes too long.
+# By media type: requirements on a plan's end, start, frame and given start; the last is SOAP's. YAML would take too
+# long.
 _JUDGED: Final = {
     "application/json": (
         "rest-resources/plan-end",
@@ -43,7 +45,7 @@ _JUDGED: Final = {
 }
 # Poses that a path needs to show its usual step.
 _FEWEST: Final = 6
-# A robot that moves less than this stands still, m; plans that must start elsewhere before it counts.
+# _STANDS_M: a robot that moves less than this stands still, m. _OFTEN: plans that must start elsewhere.
 _STANDS_M: Final = 0.02
 _OFTEN: Final = 2
 
@@ -61,7 +63,7 @@ class Plans:
         self._frame, self._in_map = motion.frame, Pose(*motion.odom_to_map)
         self._noise_m = FARTHEST * said.limits.noise.position_m
         self._longest_m = said.limits.plan_step_m
-        # The pose that was read last since anything was asked of the robot; plans from where it is, since then.
+        # The last pose since a command. Below: plans from the robot's place since then.
         self._here: Exchange | None = None
         self._from_here: list[tuple[Pose, Exchange]] = []
         self._elsewhere = 0
@@ -86,7 +88,7 @@ class Plans:
         else:
             return
         if value is None or GET_PLAN.problem(value):
-            return  # which others judge
+            return  # other checks judge that
         plan = plan_of(value)
         poses = plan.poses
         yield from self._judge_end(exchange, asked, poses[-1])

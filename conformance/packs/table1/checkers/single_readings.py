@@ -25,22 +25,23 @@ from conformance.verdict.evidence import Case, case
 
 Stamp = tuple[int, int]
 _SAMPLE: Final = "rest-resources/pose-sample"
-# A velocity may be behind the odometry by this time, s.
+# How old a velocity may be compared with the odometry, s.
 _BEHIND_S: Final = 0.4
-# Odometry samples around a velocity, without a missed one between them: a velocity may be one message behind.
+# Odometry samples needed on either side of a velocity, without a gap: a velocity may be one message late.
 _AROUND: Final = 2
-# Samples are neighbours if their stamps are apart by at most this many shortest lapses.
+# Samples are neighbours if their stamps differ by at most this multiple of the shortest difference.
 _NEIGHBOURS: Final = 1.5
-# Readings that must be wrong: whole runs of good robots, also of noisy ones, had none.
+# Wrong readings needed: runs with good robots, even noisy ones, had none.
 _SEVERAL: Final = 2
-# A reading is wrong if it is off by this many tolerances.
+# _OUT: a reading is wrong if it is off by this many tolerances.
 _OUT: Final = 1.5
 _LAPSES: Final = 50
-# Readings of a message that show a swap: one value, another, and the first again.
+# Readings of one message that show a swap: one value, another, and the first again.
 _TOLD: Final = 3
-# Difference that rounding may make between two responses, m, rad, m/s and rad/s.
+# Greatest difference between two responses by rounding, m, rad, m/s and rad/s.
 _ABSOLUTE: Final = 0.02
-# A pose may be off by this much, m, and its heading as a vector: a robot may turn between two samples.
+# _PLACE_M: how far off a pose may be, m. _HEADING: how far off a heading, as a vector: a robot may turn between two
+# samples.
 _PLACE_M: Final = 0.05
 _HEADING: Final = 0.2
 

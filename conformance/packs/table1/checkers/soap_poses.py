@@ -11,9 +11,9 @@ from conformance.packs.table1.robot.state_over_soap import answered, contradicti
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# A process of the robot may lag behind another one by this, s.
+# How far one of the robot's processes may lag behind another, s.
 _BACK_S: Final = 1.0
-# Times that a clock must go back: once, somebody may have set it.
+# How often a clock must go back: a single time, somebody may have set it.
 _SEVERAL: Final = 2
 
 

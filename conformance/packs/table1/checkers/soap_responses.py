@@ -31,10 +31,10 @@ from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
 _IDS: Final = {"publishers": "soap-delivery/response-valid", "subscribers": "soap-subscribers/response-valid"}
-# Plans longer than this are judged only by the check that requests them, octets.
+# _LARGE: longer plans are judged only by the check that requests them, bytes.
 _LARGE: Final = 100_000
 _SUFFIX: Final = "Response"
-#: Name of the requirement, and shape, of what an operation returns.
+#: By operation: the requirement and the shape of its content.
 _CONTENT: Final[Mapping[str, tuple[str, Shape]]] = {
     "GetPose": ("pose", ODOMETRY),
     "GetVelocity": ("velocity", TWIST),
@@ -63,7 +63,7 @@ class SoapResponses:
         if service is None or attempt.request.method != "POST" or not isinstance(attempt, Exchange):
             return
         exchange, response = attempt, attempt.response
-        # With 202 a service says that it sends its response elsewhere, as WS-Addressing allows.
+        # Status 202 says that the response is sent elsewhere, as WS-Addressing allows.
         if response.ok and response.status != HTTPStatus.ACCEPTED and not response.body:
             yield case(_IDS[service.name], False, exchange, "a SOAP response", found="nothing")  # noqa: FBT003
         if not response.ok or response.media_type != "text/xml" or len(response.body) > _LARGE:
@@ -76,7 +76,7 @@ class SoapResponses:
         inside = [child for part in parts for child in elements(part)]
         if SOAP_12 in exchange.request.body or (inside and local(str(inside[0].tag)) == "Fault"):
             return
-        # What the robot says of itself is fetched by the checks, and not while an exchange is judged.
+        # Use the description that the checks have fetched; fetch nothing while an exchange is judged.
         described = [vars(service).get("described", service.contract), service.contract]
         tag = str(inside[0].tag) if inside else ""
         known = next((one for one in described if tag.endswith(_SUFFIX) and one.shape(tag) is not None), None)

@@ -32,7 +32,7 @@ _READINGS: Final[dict[str, tuple[str, Shape, str]]] = {
 _PLAIN_FIELDS: Final = frozenset({"host", "accept", "connection"})
 _PLAIN_ACCEPT: Final = frozenset({"", "*/*", "application/json"})
 _UNIT: Final = 1e-3
-# Odometry that was first seen this long ago is older than one second by all clocks, s.
+# Odometry first seen this long ago is older than one second by any clock, s.
 _OLD_S: Final = 1.5
 
 
@@ -74,7 +74,7 @@ class State:
         self._readings = {url(path): (path, *reading) for path, reading in _READINGS.items()}
         self._last_stamp: tuple[int, int] | None = None
         self._last_received = 0.0
-        # When the odometry had a stamp that it had not before, and what told a velocity although there was no odometry.
+        # When the odometry last got a new stamp. Below: a velocity that the robot returned although it had no odometry.
         self._fresh_at = math.inf
         self._none: bool = False
         self._velocity_of_none: Exchange | None = None
@@ -132,7 +132,7 @@ class State:
         after = bool(exchange.response.header("retry-after"))
         yield case(f"rest-resources/{name}", after, exchange, "Retry-After with 503")
         if path == POSE:
-            # Not at once: the velocity may have been asked for just before the odometry came, or was too old.
+            # Judge it later: the velocity may have been read just before odometry came.
             if self._none and self._velocity_of_none is not None:
                 earlier = self._velocity_of_none
                 expected = "503 for the velocity while the pose is 503"
@@ -141,7 +141,7 @@ class State:
 
     def _plain(self, exchange: Exchange) -> bool:
         """Return whether a request has only usual headers, so that the robot must answer 200."""
-        # A check may send other credentials than the client's own, or none, to see them refused.
+        # A check may send wrong credentials or none, to see them refused.
         request, own = exchange.request, self._credentials.fields(shown=True)
         if (
             request.method != "GET"
@@ -161,11 +161,11 @@ class State:
             "an orientation of unit length within 1e-3",
             found=f"an orientation of length {length:.6g}",
         )
-        # Of several clients' answers one is told after another, when all have come.
+        # Responses of several clients are judged one after another, when all have come.
         now, elapsed_ms = exchange.response.received_s, exchange.response.elapsed_ms
         sent = now - elapsed_ms / 1000
         stamp = (int(odometry["header"]["stamp"]["sec"]), int(odometry["header"]["stamp"]["nanosec"]))
-        # Two answers that crossed on their way say nothing of order.
+        # Two exchanges that overlapped have no order.
         if self._last_stamp is not None and sent >= self._last_received:
             yield case(
                 "rest-resources/pose-stamp",

@@ -7,11 +7,11 @@ from typing import Final
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.statement import Motion
 
-#: Indexes into Velocity of what a robot on wheels has: ahead, and about the vertical axis.
+#: Indexes into Velocity of the components that a wheeled robot has: ahead, and about the vertical axis.
 AHEAD, ABOUT = 0, 5
-# The components by which a robot is told to move, the one that needs the least room first.
+# Components of a velocity, the one that needs least room first.
 _BY_ROOM: Final = (ABOUT, AHEAD, 1, 2, 3, 4)
-# A circle this much wider than the narrowest one is wide enough despite rounding.
+# A circle this much wider than the narrowest is driveable despite rounding.
 _WIDER: Final = 1.02
 
 

@@ -27,7 +27,7 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
         return _in_lists(before, between, after, slack, where)
     if is_number(before) and is_number(after):
         low, high = sorted((float(before), float(after)))
-        # What did not change is the same double in every interface, to the last place (contract.md#equivalence).
+        # A value that did not change is exactly the same double over every interface (contract.md#equivalence).
         room = 0.0 if low == high else slack.absolute + slack.relative * max(abs(low), abs(high))
         if not is_number(between) or not low - room <= float(between) <= high + room:
             wanted = f"{low!r}" if low == high else f"{low!r} to {high!r}"
@@ -44,7 +44,7 @@ def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slac
         path = f"{where}.{name}" if where else name
         last = after[name]
         if name == "orientation" and isinstance(between, dict):
-            # A quaternion and its negative are one orientation: whichever is nearer to the one before is compared.
+            # A quaternion and its negative are the same orientation: compare the nearer one.
             first, last = _turned(first, between.get(name)), _turned(last, between.get(name))
         if not isinstance(between, dict) or name not in between:
             return f"{path} is missing"

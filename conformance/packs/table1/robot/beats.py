@@ -30,13 +30,13 @@ from conformance.packs.table1.robot.robot import (
 from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.statement import said_of
 
-# At quick effort, a beat follows every second check.
+# At quick effort, one beat after this many checks.
 _EVERY: Final = 2
-# An odd reading is repeated after this time, s: one interface may be behind the other.
+# An odd reading is repeated after this time, s, because one interface may lag.
 _AGAIN_S: Final = 0.3
-# Plans lead this far from the robot's place at the first request, m.
+# Distance from the robot's first place to the goals of plans, m.
 _AWAY_M: Final = 0.5
-#: What a beat reads: paths as JSON or XML, and SOAP operations.
+#: By beat: what it reads, as JSON or XML paths and SOAP operations.
 _BEATS: Final = (
     (GOAL_PATH, "GetGoal", GOAL_PATH),
     (GOAL_PATH, f"{XML} {GOAL_PATH}", GOAL_PATH),
@@ -76,7 +76,7 @@ class Beats:
         self._gone: set[str] = set()
         frame = said_of(run).motion.frame
         self._frame: dict[str, str] = {} if frame == "map" else {"frame_id": frame}
-        # Where plans lead, in the frame of goals, and where some of them start.
+        # Goals of plans, and starts of some, in the frame of goals.
         self._places: tuple[Pose, Pose] | None = None
 
     def _is_claimed(self, what: str) -> bool:
@@ -103,7 +103,7 @@ class Beats:
             if any(one.suspects for one in self._doubting):
                 WALL_CLOCK.sleep(_AGAIN_S)
                 self._read((*beat, VELOCITY))
-            connection.acted_at = acted  # a beat only reads, over SOAP too: nobody has to wait for an effect of it
+            connection.acted_at = acted  # a beat only reads, so nobody has to wait for its effects
         self._sent = connection.sent
 
     def _read(self, beat: tuple[str, ...]) -> None:

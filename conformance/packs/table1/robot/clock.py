@@ -6,15 +6,15 @@ from typing import Final
 
 from conformance.measures.samples import slope
 
-# Readings this far apart show the clock's rate, s: over 3 s, two late responses can make a right clock 10 % wrong.
+# Readings this far apart show the clock's rate, s: over 3 s, two late responses can make a right clock seem 10 % wrong.
 SPAN_S: Final = 5.0
-# One reading is kept in this time, s, and at most this many: then every other one goes.
+# One reading per _EVERY_S is kept, at most _MOST; when there are more, every other one is dropped.
 _EVERY_S: Final = 0.1
 _MOST: Final = 80
-# Error that the rate may have; age that a stamp may have more than the others at its reading, s.
+# _SHARE: error that the rate may have. _OLDER_S: how much older than usual a stamp may be when it is read, s.
 _SHARE: Final = 0.05
 _OLDER_S: Final = 0.05
-# Readings that show whether the part below a second has the right unit: how many, and how far apart two are, s.
+# Fractions of a second are judged by _FINE readings, two of which are _NEAR_S apart, s.
 _FINE: Final = 60
 _NEAR_S: Final = (0.2, 0.45)
 _ENOUGH: Final = 10

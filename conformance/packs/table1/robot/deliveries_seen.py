@@ -14,10 +14,10 @@ from conformance.packs.table1.robot.robot import ACCEPT_JSON, DELIVERIES
 from conformance.packs.table1.statement import said_of
 from conformance.transport.client import Connection, HttpClient
 
-# How long after the last message another is still looked for, s.
+# QUIET_S: how long the suite waits for another message after the last one, s. _STEP_S: pause between two looks, s.
 QUIET_S: Final = 0.15
 _STEP_S: Final = 0.02
-# Pause between two readings of a list in which deliveries are awaited, s.
+# Pause between two reads of the list while a delivery is awaited, s.
 _AGAIN_S: Final = 0.1
 
 
@@ -116,7 +116,7 @@ class ProbeObserver:
 
     def mark(self) -> None:
         """Forget the messages received so far."""
-        # A message of a request since the last collect() may still be on its way.
+        # A message caused by a request since the last collect() may still be on its way.
         if self._connection.acted_at > self._probe.heard_at:
             self._clock.sleep(self._connection.acted_at + QUIET_S - self._clock.now())
             self._probe.heard_at = self._clock.now()

@@ -18,9 +18,9 @@ from conformance.transport.client import Headers
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import until_taken
 
-# Both ends of a double, of its subnormals and of what an integer holds exactly; the paper's own example.
+# Greatest and least doubles, subnormals and exact integers, and the paper's own example.
 _KNOWN: Final = (*EXTREMES["double"], 76.02, 41.35, 60.633, 2.2250738585072009e-308)
-# Plain numbers below this are written by digits alone.
+# Smaller numbers are written with digits alone, without an exponent.
 _ONLY_DIGITS: Final = 1e15
 
 

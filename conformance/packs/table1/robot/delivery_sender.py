@@ -54,7 +54,7 @@ class DeliverySender:
     observer: DeliveryObserver
     batches: list[Batch] = field(default_factory=list)
     lost: int = 0
-    # However its XML is written, a message has the same values.
+    # XML styles in rotation; the values of a message do not depend on its style.
     _styles: Iterator[XmlStyle] = field(default_factory=lambda: cycle(value_styles()))
     _collected: float = 0.0
     _judged: int = 0

@@ -16,17 +16,17 @@ from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
-# Shortest time between two rounds of readings, s: the robot's odometry has tens of hertz.
+# Shortest time between two rounds of readings, s: odometry comes some tens of times per second.
 _PACE_S: Final = 0.02
-# A velocity with too few samples is read this much longer, s.
+# A velocity with too few samples is read for this much longer, s.
 _LONGER_S: Final = 1.0
-# Share of the hold time: a look that takes longer makes a renewal late.
+# Share of the hold time: a round of reads that takes longer makes a renewal late.
 _LOOK_SHARE: Final = 0.25
-# Requests of one look.
+# Requests of one round of reads.
 _LOOK: Final = 3
-# Tries of a stop whose response is late.
+# How often a stop is sent if its response is late.
 _STOPS: Final = 3
-# Tries of a velocity that was renewed too late, so that it may have ended.
+# How often a velocity is commanded again if its renewal was late.
 _LAPSES: Final = 2
 
 
@@ -195,26 +195,26 @@ class Drive:
         first = len(self.trace.turns)
         count = SEVERAL if ids else 1
         lapses = 0
-        # A velocity may end before it is reached, where it does not hold for as long as the robot takes to settle.
+        # Without renewal, a velocity may end before it is reached, if it holds for less than the settle time.
         every = COUNTED_ON_S if limits.hold_s is None else _renewed_s(limits.hold_s, limits.settle_s)
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             now = self.clock.now()
             lapsed = limits.hold_s is not None and now > self.trace.sent + certain_s(limits.hold_s)
-            # A command that has had no effect when the robot has had its time is not given again: that would hide it.
+            # Do not repeat a command that had no effect within the settle time: that would hide the fault.
             if not lapsed and now > begun + limits.settle_s:
                 renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
             if renews and self.trace.commands and now > self.trace.sent + every:
                 self._renew()
                 if lapsed and lapses < _LAPSES:
-                    # Whoever looks was late, not the robot: that one may have slowed down meanwhile.
+                    # The suite was late, not the robot, which may have slowed down meanwhile: start again.
                     lapses, first = lapses + 1, len(self.trace.turns)
                     begun = self.trace.commands[-1].answered
             until = begun + patience
             self.look()
             turns = self.trace.turns[first:]
             there = windows.shown(limits, turns, wanted, part=part, count=count)
-            # What was seen while it had time left, before whoever looks was held up, is not held against the robot.
+            # Readings from before the suite was held up, while the robot still had time, are not held against it.
             settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
             late = [turn for turn in turns if turn.at >= settled]
             decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
@@ -222,7 +222,7 @@ class Drive:
                 break
         counted = settled if not there and windows.newest(late) else begun
         if wanted == STILL:
-            # By the time of such a response the watchdog may have stopped the robot, and the command did not.
+            # After such a late response, the watchdog may have stopped the robot instead of the command.
             outlasted = bool(there) and within is not None and self.trace.answered > begun + patience
         else:
             outlasted = not there and (self._outlasts_hold or lapses == _LAPSES)

@@ -17,13 +17,13 @@ from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
-# Readings that agree for this long are steady, so that two resources may be compared, s.
+# Readings that agree for this long are steady, so that two resources can be compared, s.
 _STEADY_S: Final = 0.3
-# Readings in a row that must be wrong while the velocity changes: fewer may come from sampling.
+# Consecutive readings that must be wrong while the velocity changes: fewer may come from sampling.
 _IN_A_ROW: Final = 5
-# Rounds that are looked at: more than any window has.
+# Rounds of readings to judge: more than any window has.
 _LOOKED_AT: Final = 200
-#: Two writings of one double differ by less than this, whatever tolerance is accepted.
+#: ECHO: texts of the same double differ by less than this, whatever tolerance is declared.
 ECHO: Final = 1e-9
 _OUTLASTED: Final = NotTested("a response takes so long that a velocity ends before it is read")
 _RESOURCES: Final = "rest-resources"
@@ -174,7 +174,7 @@ def _same(
 ) -> Case:
     limits, samples = by
     measured = middle(readings)
-    # Either median is off by its own noise, and by a quarter more than a mean would be.
+    # Both medians have their own noise, a quarter more than a mean has.
     holds = is_near(limits, measured, wanted, samples=samples / math.pi)
     return Case(holds, exchange, expected, str(measured), "differs")
 

@@ -11,9 +11,10 @@ from conformance.verdict.evidence import Case
 
 #: All components of a velocity, its linear part, its angular part.
 ALL, LINEAR_PART, ANGULAR_PART = slice(None), slice(0, 3), slice(3, 6)
-#: How long a velocity is counted on to hold where no hold time is declared, s.
+#: Assumed hold time of a velocity where none is declared, s.
 COUNTED_ON_S: Final = 0.5
-#: Of the hold time: for so long what holds is judged. A client that still has to send something counts on less.
+#: JUDGED: share of the hold time in which a velocity is judged. _COUNTED_ON: share that a client relies on if it still
+#: has to send.
 JUDGED: Final = 0.95
 _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02

@@ -10,10 +10,10 @@ from conformance.packs.table1.robot.plan import ask, reachable
 from conformance.packs.table1.robot.robot import Robot, Velocity
 from conformance.packs.table1.statement import Statement
 
-# Far enough to be on the way for a while, near enough to be inside every room; nearer where there is no room.
+# _FAR_M: far enough to be under way for a while, near enough for every room; the second where room is short.
 _FAR_M = (1.5, 0.5)
 _SLOW_M_S = 0.1
-# Offset that gives a place all its digits, m: whole numbers do not show that a robot rounds.
+# Offset that gives coordinates many digits, m: whole numbers would not show that a robot rounds.
 _ASIDE_M = 0.0137
 
 
@@ -26,7 +26,7 @@ class Examples:
 
     def __init__(self, statement: Statement) -> None:
         self._statement = statement
-        # Where the robot could go when it was first asked: good for plans and deliveries, wherever it is by now.
+        # The first place that the robot could reach, for plans and deliveries from anywhere.
         self._first_place: Pose | None = None
         self._turns = 0
         self._fitted: dict[str, Callable[[RestInterface, dict[str, Any]], dict[str, Any]]] = {
@@ -56,7 +56,7 @@ class Examples:
 
     def _slow(self, part: str, axes: dict[str, float], sign: int) -> dict[str, float]:
         limits = self._statement.limits
-        # Half of the limit also in the direction in which it is lower, if there is any.
+        # Half of the lower limit of the two directions, if there are two.
         ranges = [limits.range_of(index) for index in ((0, 1, 2) if part == "linear" else (3, 4, 5))]
         most = min(_SLOW_M_S, *(min(filter(None, map(abs, each)), default=0.0) / 2 for each in ranges))
         actuated = self._statement.motion.actuated

@@ -13,16 +13,16 @@ from conformance.transport.exchange import Exchange
 
 NEW: Final = frozenset({201, 202})
 REPEATED: Final = frozenset({200, 202, 204})
-# The contract has 204; a response with a body says the same.
+# Statuses for a cancelled goal: the contract has 204, and a response with a body means the same.
 CANCELLED: Final = frozenset({200, 202, 204})
-# A media type that a client prefers: whatever that is, a goal is cancelled.
+# RATHER_XML: an Accept header with a preference, which must not matter for cancelling.
 RATHER_XML: Final = ("Accept", "application/xml, */*;q=0.1")
 SUCCEEDED: Final = 4
 CANCELED: Final = 5
 ACTIVE: Final = frozenset({1, 2, 3})
 _STEP_S: Final = 0.02
 _CLOSE: Final = 1e-6
-# A robot this near its goal may end it while the suite asks, m: its tolerance, and its way in the meantime.
+# Within this distance of its goal, a robot may end the goal while the suite reads, m.
 _ARRIVED_M: Final = 0.1
 
 

@@ -11,21 +11,21 @@ from conformance.packs.table1.robot.plan import EXACT, ask, reachable
 from conformance.packs.table1.robot.robot import Robot
 from conformance.scenarios.scenario import NoOccasionError
 
-# How far velocities may take a robot, aside and straight ahead, m.
+# How far velocities may move a robot: _NEAR_M to the side, _FAR_M ahead, m.
 _NEAR_M: Final = 0.4
 _FAR_M: Final = 0.7
-# A robot that cannot reverse needs this multiple of the room ahead, and in a circle this many radii aside.
+# A robot that cannot reverse needs _ONE_WAY times the room ahead, and _CIRCLE radii to the side in a circle.
 _ONE_WAY: Final = 2.0
 _CIRCLE: Final = 2.2
 _PLACES: Final = 8
-# How far away open places are looked for: the nearest first, for the way there takes time.
+# Distances at which free places are looked for, m: the nearest first, because the way takes time.
 _DISTANCES_M: Final = (0.3, 0.5, 0.8, 1.5, 2.5)
-# Distance of a goal that has to last, where there is room, m; tries to be in time.
+# _FARTHEST_M: distance of a goal that must last, m. _ATTEMPTS: tries to be in time.
 _FARTHEST_M: Final = 1.5
 _ATTEMPTS: Final = 3
-# By how much the headings of goals in a series differ, rad.
+# Difference between the headings of goals in a series, rad.
 _TURN_RAD: Final = 0.37
-# Wait for a robot that makes room, s.
+# How long the suite waits for a robot that makes room, s.
 _ARRIVES_S: Final = 10.0
 
 
@@ -85,10 +85,10 @@ def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[
         try:
             pose, other = choose_goals(robot, _FARTHEST_M, 2)
         except NoOccasionError:
-            return False  # what was judged before stays judged
+            return False  # verdicts so far remain
         body, against = (goal_body(one, frame, f"{id_} {number}") for one in (pose, other))
         if not put_goal(robot, body).response.ok:
-            return False  # which is for others to judge
+            return False  # another check judges that
         if act(body, pose, against):
             return True
     return False
@@ -121,7 +121,7 @@ def make_room(robot: Robot, ahead_m: float = _FAR_M) -> None:
 
 def _is_open(robot: Robot, pose: Pose, ahead_m: float) -> bool:
     """Return whether the robot has straight plans from a pose in all directions, ``ahead_m`` long ahead and back."""
-    # In a circle a robot comes twice its radius aside.
+    # In a circle, a robot moves aside by twice its radius.
     aside = max(_NEAR_M, _CIRCLE * (robot.statement.motion.min_radius_m or 0.0))
     around = [pose.ahead(aside, math.radians(angle)) for angle in range(60, 360, 60)]
     for there in (pose.ahead(ahead_m), pose.ahead(-ahead_m), *around):

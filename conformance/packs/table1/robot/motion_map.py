@@ -18,10 +18,10 @@ from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.statement import Statement
 from conformance.statement.motion_map import MotionMap, Way
 
-#: How a velocity is commanded last: by both parts, by a PUT of the linear part, by both as XML, or on a connection that
-#: is then closed.
+#: How the last velocity is commanded: both parts, the linear part alone, as XML, or on a connection that is then
+#: closed.
 By = Literal["velocity", "linear", "xml", "closing"]
-#: The same as a noun phrase.
+#: By way of commanding: a noun phrase for messages.
 COMMANDS: Final[dict[By, str]] = {
     "velocity": "a PUT of the velocity",
     "linear": "a PUT of its linear part",

@@ -21,27 +21,26 @@ from conformance.packs.table1.robot.geometry import wrapped
 from conformance.packs.table1.robot.robot import Odometry, Velocity
 from conformance.verdict.evidence import Case
 
-# Shortest drive and turn that are judged, m and rad.
+# _SHORTEST: shortest drive that is judged, m. _LEAST_TURN: smallest turn, rad.
 _SHORTEST: Final = 0.08
 _LEAST_TURN: Final = 0.2
-# Fewest readings: a sum over one step says nothing.
+# Fewest readings to sum: one step says nothing.
 _FEWEST: Final = 3
-# Difference between the sum of a sampled velocity and the way: as a share, in m, and in rad.
+# Difference allowed between the summed velocity and the distance: _SHARE of it, plus _OFF m; below, rad.
 _SHARE: Final = 0.1
 _OFF: Final = 0.03
 _OFF_TURN: Final = 0.06
-# Share of the greatest speed: below, a robot does not count as driving in a direction.
+# A robot drives in a direction if it has at least this share of its greatest speed.
 _MOVES: Final = 0.25
-# Between readings farther apart than this a velocity may have ended and begun again: its sum is a guess, s.
+# Between readings farther apart than this, s, a velocity may have ended and begun again: its sum is a guess.
 _FINE_S: Final = 0.25
-# A window's share of the way; the noise at its ends as a multiple for the whole way.
+# _WINDOW: share of the way in one window. _NOISES: noise at its ends, as a multiple for the whole way.
 _WINDOW: Final = 0.25
 _NOISES: Final = 8.0
-# A gap between readings, s, and as a multiple of the others', in which the robot's velocity is unknown: a response was
-# late, and a velocity may have ended and begun again.
+# The velocity is unknown in a gap between readings longer than _HELD_UP_S and _HELD_UP_TIMES the usual gap.
 _HELD_UP_S: Final = 0.5
 _HELD_UP_TIMES: Final = 3.0
-# The same for the robot's own samples, by their stamps, s: odometry comes at least five times a second.
+# The same for gaps between stamps of odometry samples, s: odometry comes at least five times a second.
 _SKIPPED_S: Final = 0.15
 
 
@@ -76,7 +75,7 @@ class _Sum(NamedTuple):
         way = math.hypot(self.x_error - earlier.x_error, self.y_error - earlier.y_error)
         way = max(way, abs(self.along_error - earlier.along_error))
         turn = max(abs(self.turn_error - earlier.turn_error), abs(self.turned_error - earlier.turned_error))
-        # A heading that is no number is nowhere.
+        # A heading that is not a number matches no heading.
         return _Miss(way, math.inf if math.isnan(turn) else turn)
 
 

@@ -21,13 +21,13 @@ from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 
 _TURNS: Final = tuple(math.radians(angle) for angle in (0, 40, -40, 80, -80, 130, -130, 180))
-# A path this much longer than the distance goes around something, and is no use for a short drive.
+# A path longer than this multiple of the distance avoids an obstacle, and is too long for a short drive.
 _DETOUR: Final = 1.3
 # A plan that ends within this distance ends at the pose itself, and not only within its tolerance, m.
 EXACT: Final = 1e-6
-# A plan that ends farther away than this was not made for the requested place, m.
+# A plan that ends farther away than this was made for another place, m.
 _BESIDE: Final = 0.3
-# Distance from the robot, or from the given start, at which a path may begin, m: a planner's grid may be as coarse.
+# How far from the robot or the given start a path may begin, m: a planner's grid may be that coarse.
 START_OFF: Final = 0.25
 # Notations of a number beside the shortest: with an exponent, with a sign, with other digits before the dot.
 NOTATIONS: Final[tuple[Callable[[float], str], ...]] = (
@@ -35,7 +35,7 @@ NOTATIONS: Final[tuple[Callable[[float], str], ...]] = (
     lambda value: f"{value:+.20e}",
     lambda value: f"{value:+.17f}".replace("0.", ".", 1) if abs(value) < 1 else f"00{value:.17f}".replace("00-", "-00"),
 )
-# Plans and readings that must agree that paths begin elsewhere.
+# Plans and readings that must agree before a path's start counts as wrong.
 _STARTS: Final = 3
 
 
@@ -128,14 +128,14 @@ def reachable(robot: Robot, here: Pose, distance: float, count: int = 1) -> list
                 continue
             _, plan, _ = ask(robot, goal)
             if plan is not None:
-                # A plan may end beside a place that is too near to something, within its tolerance; a goal may not be
-                # put there. Where the plan ends, it may.
+                # A plan may end near its goal, within the tolerance, if the goal is too near an obstacle. The plan's
+                # end is a place that the robot can reach.
                 end = plan.poses[-1]
                 beside = EXACT <= end.distance(goal) < _BESIDE and robot.in_arena(end)
                 goal = Pose(end.x, end.y, goal.yaw) if beside else goal
                 plain = not beside and plan.length <= _DETOUR * here.distance(goal) + 0.1
                 (found if plain else round_about).append(goal)
-    # Where no way is plain, any way will do: what is odd about the plans is for others to judge.
+    # If no way is straight, take any: other checks judge the plans.
     return [*found, *round_about][:count]
 
 
@@ -198,7 +198,7 @@ def _beyond_start(plan: Plan, before: Pose, after: Pose) -> float:
 
 _PLACES = 4
 _FAR_M = 1.0
-# Places nearer to each other than this cannot be told apart by a plan's end, m.
+# Nearer places cannot be told apart by the end of a plan, m.
 _APART_M = 0.4
 
 

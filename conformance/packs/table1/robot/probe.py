@@ -16,12 +16,12 @@ from ros_probe.process import ProbeError, RosProcess
 #: every 3 s.
 ARRIVES_S: Final = 5.0
 
-# Names of what the probe sees.
+# _EYES: what the probe observes.
 _EYES: Final = ("deliveries", "velocities")
 _NS: Final = 1_000_000_000
 # Wait for the robot's discovery, and pause between two looks at the graph, s.
 _DISCOVERY_S, _STEP_S = 10.0, 0.05
-# Time after which both ends know of a subscription, s.
+# _MATCHED_S: time after which both ends know of a subscription, s.
 _MATCHED_S: Final = 0.2
 _DELIVERY: Final = "mybot_delivery_app/msg/DeliveryRequestMsg"
 _TWIST, _STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"

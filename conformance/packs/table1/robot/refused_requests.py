@@ -26,34 +26,36 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Listener, Request, Response
 from conformance.verdict.effort import Effort
 
-# Statuses that say that the request is wrong in every state: not because of its sender, size or rate.
+# _WRONG: statuses for a request that is wrong in every state, regardless of sender, size or rate. _FAULTS: the same in
+# SOAP.
 _WRONG: Final = frozenset({400, 404, 405, 406, 415, 422})
 _FAULTS: Final = frozenset({"Client", "MustUnderstand", "VersionMismatch"})
-# Fields that frame a request in an unusual way, or that change what it means later.
+# _SPECIAL: headers that change the framing of a request or its later meaning.
 _SPECIAL: Final = frozenset({"transfer-encoding", "expect", "range", "idempotency-key", "if-match", "if-none-match"})
 _OF_THE_CLIENT: Final = frozenset({"host", "content-length", "connection"})
-# Octets of a request that is kept. Larger ones, and attacks on XML parsers, are sent by the checks of these.
+# _LARGEST: bytes of a request that is kept; checks of their own send larger ones and attacks. _LONGEST: characters of a
+# target.
 _LARGEST: Final = 8192
 _LONGEST: Final = 1024
 _ATTACKS: Final = (b"<!DOCTYPE", b"<!ENTITY", b"XInclude")
-# Words of a refusal without values, which tell kinds of faults apart.
+# _DETAIL, _VALUES: reduce a refusal to its words, by which kinds of faults are told apart.
 _DETAIL: Final = re.compile(r"detail\W+|faultstring\W*")
 _VALUES: Final = re.compile(r"'[^']*'|\d+")
 _KIND: Final = 48
-# Requests that are kept of one operation, and of one kind of fault there.
+# _MOST: requests of one operation that are kept. _ALIKE: requests with one kind of fault.
 _MOST: Final = 400
 _ALIKE: Final = 2
-# A velocity and a delivery that every robot refuses.
+# _BEYOND: a velocity that every robot refuses; below, a delivery.
 _BEYOND: Final = Velocity(angular_z=1e4)
 #: A frame that no robot knows.
 NO_FRAME: Final = "no_such_frame"
 _NO_NUMBER: Final = ("3", "1", "2", "3", "4", "5", "abc")
-# Requests that are sent again: for a fast robot by effort, and at least.
+# _COUNTS: requests sent again to a fast robot, by effort. _FEWEST: at least.
 _COUNTS: Final = {"quick": 60, "standard": 300}
 _FEWEST: Final = 8
-# Longest time for them where the rate of requests is limited, s.
+# Longest time for these requests if --request-rate limits them, s.
 _LONGEST_S: Final = 0.5
-# Kinds of fault of an operation that are sent before the next ones of all operations, by the operation's rank.
+# By rank of an operation: kinds of fault to send before the next kinds of all operations.
 _DEPTH: Final = (6, 2, 1)
 
 

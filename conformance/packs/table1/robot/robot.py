@@ -122,9 +122,9 @@ class Robot:
         self._contract = api.run.contract
         self.statement = said_of(api.run)
         self.limits = self.statement.limits
-        # A ceiling on the rate of requests makes a robot as slow as one that answers slowly.
+        # A limit on the request rate slows the suite as much as a slow robot does.
         self.usual_s = max(api.run.effort.usual_ms / 1000, 1 / (api.client.connection.request_rate or 1e9))
-        # How long what must not happen is watched for, in relation to standard effort.
+        # Factor of the time for which the suite watches that something does not happen.
         self.watchfulness = 0.5 if api.run.effort.name == "quick" else 1.0
 
     @property

@@ -24,14 +24,15 @@ from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Response
 from conformance.transport.pace import Hangs, Pace
 
-# Time for which a cancellation is repeated, s: a robot with a queue of missions starts the next one.
+# How long a cancellation is repeated, s: a robot with a queue of missions starts the next one.
 _CANCEL_S: Final = 3.0
-# Time that is allowed beyond the settle time, which a loaded machine and a far network may stretch, s.
+# _GRACE_S: time beyond the settle time, for a loaded machine and a distant network, s. _STEP_S: pause between two
+# reads, s.
 _GRACE_S: Final = 1.5
 _STEP_S: Final = 0.02
 # Pause between two readings that must both show rest, s.
 _AGAIN_S: Final = 0.002
-# Deadline of one request, and of all, for a robot that does not respond at the end of a run, s.
+# _LAST_TIMEOUT_S: deadline of one request at the end of a run. _LAST_S: deadline of all, s.
 _LAST_TIMEOUT_S: Final = 0.7
 _LAST_S: Final = 3.0
 
@@ -85,8 +86,7 @@ def leave_at_rest(api: RestInterface) -> str:
     if not api.run.allow_motion:
         return ""
     try:
-        # A client of its own: no listener judges any more, an endpoint that hung once is asked again all the same, and
-        # nothing is late.
+        # A client of its own: no checker judges its responses, and it calls an endpoint that hung before.
         timeout_s = min(_LAST_TIMEOUT_S + 3 * api.run.effort.usual_ms / 1000, api.client.connection.timeout_s)
         connection = api.client.connection.unheard(timeout_s=timeout_s, pace=Pace(math.inf), hangs=Hangs())
         client = HttpClient(api.client.base_url, connection)
@@ -130,7 +130,7 @@ class _Stiller:
     def halt(self, cancel_s: float) -> str:
         """Cancel the goal within ``cancel_s`` and command zero; return why something is still active, or nothing."""
         cancelled = self._no_goal_left(self._patience(cancel_s))
-        # Also where the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
+        # Send it even if the goal could not be cancelled: a robot that takes velocities meanwhile stops for a moment.
         self._ask("PUT", VELOCITY, JSON_BODY, body_of(STILL.twist))
         return "" if cancelled else f"its goal is still active after {cancel_s:g} s of cancelling it"
 
@@ -143,8 +143,8 @@ class _Stiller:
             if cancelled is not None and cancelled.response.status == HTTPStatus.NOT_FOUND:
                 return True
             current = self._ask("GET", GOAL_PATH, ACCEPT_JSON)
-            # Anything but a goal that can be read: there is none, or no such resource, or no telling. Whether the robot
-            # moves is seen by its velocity.
+            # No readable goal: the robot has none, lacks the resource, or gives no information. Its velocity shows
+            # whether it moves.
             if current is None or not current.response.ok or not _shows(current.response):
                 return True
             if cancelled is None or not cancelled.response.ok:
@@ -169,12 +169,12 @@ class _Stiller:
         """Return the measured velocity, and why it cannot be read."""
         read = self._ask("GET", VELOCITY, ACCEPT_JSON)
         if read is not None and read.response.status == HTTPStatus.NOT_FOUND:
-            return STILL, ""  # a robot without this resource: nothing says that it moves
+            return STILL, ""  # a robot without this resource: nothing shows that it moves
         twist: Any
         odometry: Any
         twist, problem = read_as(read.response, TWIST) if read else (None, self._silent)
         if problem:
-            # What the velocity does not say, the odometry may.
+            # The odometry may show motion where the velocity resource does not.
             read = self._ask("GET", POSE, ACCEPT_JSON)
             odometry, unread = read_as(read.response, ODOMETRY) if read else (None, self._silent)
             if unread:

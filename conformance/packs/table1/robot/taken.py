@@ -18,17 +18,17 @@ from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.stopping import bring_to_rest
 from conformance.transport.exchange import Exchange
 
-# How a PUT is sent.
+# Function that sends a PUT.
 Put = Callable[[], Exchange]
 PutGoal = Callable[[dict[str, Any]], Exchange]
 # An action that is carried out; returns whether it had its effect, or None if that is not known.
 Act = Callable[[], bool | None]
-# Readings at rest, each of another odometry sample, that show that it is no chance.
+# _READINGS: readings at rest, each of another odometry sample, before rest is certain.
 _READINGS: Final = 3
 _STEP_S: Final = 0.02
-# Multiple of the settle time after which a velocity has to be reached.
+# Multiple of the settle time in which a velocity has to be reached.
 _SETTLED: Final = 1.1
-# Turn to a goal with another heading, rad: large enough to last until it is read.
+# Turn to a goal with another heading, rad: long enough to be read under way.
 _TURN: Final = 2.5
 # A robot that has moved by this much towards a goal had that goal, m and rad.
 _MOVED_M: Final = 0.2
@@ -89,7 +89,7 @@ def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
     """PUT a velocity repeatedly; return whether the robot moves, or None if undecided."""
     limits = robot.limits
     hold_s = certain_s(limits.hold_s)
-    since = last_sent = math.inf  # from when on it holds without a gap; when it was put last
+    since = last_sent = math.inf  # since when the velocity holds without a gap; when it was sent last
     counted = -math.inf
     at_rest = 0
     patience = robot.patience(2 * robot.settle_s + (_READINGS + 1) * (robot.sample_s + 4 * robot.usual_s))
@@ -99,12 +99,12 @@ def _moves(robot: Robot, wanted: Velocity, put: Put) -> bool | None:
             return None
         answered = robot.clock.now()
         if answered > last_sent + hold_s or since == math.inf:
-            since, at_rest = answered, 0  # it may have ended meanwhile, and has to be reached anew
+            since, at_rest = answered, 0  # the velocity may have ended meanwhile, and must be reached again
         last_sent = sent
         requested = robot.clock.now()
         velocity, _ = robot.velocity()
         if velocity is None:
-            return None  # which the checkers have judged
+            return None  # the checkers have judged that
         if robot.near(velocity, wanted) or not robot.near(velocity, STILL, 2):
             return True
         settled = since + _SETTLED * limits.settle_s + robot.sample_s
@@ -130,7 +130,7 @@ def _follows(robot: Robot, put: PutGoal, lasts: int = 1) -> bool | None:
         return None
     goal, problem, _ = await_goal(robot, body)
     if goal is not None and problem:
-        return None  # the robot's own, or another client's
+        return None  # a delivery of the robot's own or another client's
     if not problem:
         return all(robot.goal()[0] is not None for _ in range(lasts - 1))
     here = robot.map_pose()

@@ -8,7 +8,8 @@ from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.motion_map import By
 from conformance.packs.table1.robot.robot import Robot, Velocity
 
-# A slow velocity, as a share of its limit, or as a multiple of what may pass for rest, but at most the last share.
+# _SLOW: slow velocity, as a share of its limit. _TOLD: as a multiple of what may pass for rest. Below: at most this
+# share.
 _SLOW: Final = 0.1
 _TOLD: Final = 4
 _MOST: Final = 0.6

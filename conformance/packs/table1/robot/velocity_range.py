@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 
 # Share of the assumed figures that a robot may reach where it declares no limits.
 _UNDECLARED: Final = 0.6
-# Share of that for a drive, which needs more room than a turn.
+# Factor on that for a drive, which needs more room than a turn.
 _SLOWER: Final = 0.5
 # A robot faster than this multiple of tolerance and noise does not rest.
 _MOVES: Final = 1.6

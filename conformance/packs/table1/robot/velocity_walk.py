@@ -75,7 +75,7 @@ class VelocityMachine(RuleBasedStateMachine):
         if trace and trace[0].pose.distance(trace[-1].pose) > _LEASH_M:
             step = trace[-1].pose.ahead(0.1 * sign)
             if step.distance(trace[0].pose) >= trace[-1].pose.distance(trace[0].pose):
-                # Whoever cannot drive back has to turn first.
+                # A robot that cannot reverse has to turn first.
                 sign = -sign if robot.reverses else 0
         return robot.share_of_limits(sign * share * _LINEAR_SHARE, 0.0).linear_x
 
@@ -100,7 +100,7 @@ class VelocityMachine(RuleBasedStateMachine):
     def _linear(self, ahead: float) -> bool:
         wanted = self._wanted._replace(linear_x=ahead)
         if self._robot.drivable(wanted) != wanted:
-            return True  # too narrow a circle for the angular part, or too fast a curve
+            return True  # the circle is too narrow for the angular part, or the curve too fast
         self._drive.refresh(self._wanted)
         self._walk.prelude()
         if not self._drive.command(wanted, linear=True, xml=self._as_xml(wanted)):
@@ -108,7 +108,7 @@ class VelocityMachine(RuleBasedStateMachine):
         self._wanted = wanted
         if not self._drive.reach(wanted, "rest-resources/linear-put", part=LINEAR_PART):
             return False
-        # Whether the angular part lasts longer than it was asked for is the robot's affair.
+        # The angular part may last longer than commanded.
         keeps, seen = self._drive.sees(wanted, 1.5, part=ANGULAR_PART, until=self._drive.holds_until)
         expected = f"the angular part as it was, {self._wanted}"
         self._drive.saw("rest-resources/linear-keeps-angular", expected, seen, "changed", holds=keeps)

@@ -13,9 +13,9 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_trace import ALL, Turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
 
-# Where stamps do not advance: odometry is at least this frequent, so that a later reading is another sample, s.
+# Longest time between two odometry samples, s, if stamps do not advance.
 LONGEST_SAMPLE_S: Final = 0.25
-# A distance that is still this share of the first one has not become shorter.
+# A distance that is still this share of the first has not become shorter.
 _NO_NEARER: Final = 0.8
 
 
