@@ -78,7 +78,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         if options.ros and not base_url:
             raise StatementError(f"{source} does not say where the operations are: give --base-url")
         client = HttpClient(base_url or "", connection_of(where))
-        domain_id = RosMap({}, options.ros_domain_id).domain
+        domain_id = RosMap({}, domain_id=options.ros_domain_id).domain
         ros = partial(ros_proposals, domain_id=domain_id, client=client) if options.ros else None
         write_described_statement(path, found, api, Calls(options.allow, options.never), ros)
     except (OSError, ProbeError) as error:

@@ -110,31 +110,14 @@ class Publishes(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     type: MessageType
 
 
-class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An operation that calls a service.
-
-    Attributes:
-        service: its full name.
-        type: of the service.
-        result: where the response of the service is in the response's body.
-        unavailable: the statuses when the service is not there; empty: any that is no success.
-        too_late: the statuses when the service does not respond in time; empty: any that is no success.
-    """
-
-    service: Topic
-    type: ServiceType
-    result: Pointer = ""
-    unavailable: tuple[Status, ...] = ()
-    too_late: tuple[Status, ...] = ()
-
-
 class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How a goal's state is read.
+    """How the state of a goal or a call is read.
 
     Attributes:
-        read: the operation, a template: "{id}" is the goal's id.
-        at: where the word for its state is in the response.
+        read: the operation, a template: "{id}" is the id.
+        at: where the word for the state is in the response.
         running, succeeded, aborted, canceled, rejected: these words; an empty list: not judged.
+        body: of the request, a template as well.
     """
 
     read: Call
@@ -144,6 +127,29 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     aborted: tuple[str, ...] = ()
     canceled: tuple[str, ...] = ()
     rejected: tuple[str, ...] = ()
+    body: dict[str, Any] = {}
+
+
+class Calls(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation that calls a service.
+
+    Attributes:
+        service: its full name.
+        type: of the service.
+        result: where the response of the service is in the response's body, or in that of ``state.read``.
+        id: where the call's id is in the response; None: at the end of its Location.
+        state: what the call says of itself until it has ended; None: the response to the call is its outcome.
+        unavailable: the statuses when the service is not there; empty: any that is no success.
+        too_late: the statuses when the service does not respond in time; empty: any that is no success.
+    """
+
+    service: Topic
+    type: ServiceType
+    result: Pointer = ""
+    id: Pointer | None = None
+    state: State | None = None
+    unavailable: tuple[Status, ...] = ()
+    too_late: tuple[Status, ...] = ()
 
 
 class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -152,21 +158,23 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     Attributes:
         action: its full name.
         type: of the action.
-        id: where the goal's id is in the response.
+        id: where the goal's id is in the response; None: at the end of its Location.
         state: what the goal says of itself; None: not judged.
         feedback: where the last feedback is in the response of ``state.read``; None: nowhere.
         result: where the result is in the response of ``state.read``; None: nowhere.
         cancel: the operation that cancels the goal, a template: "{id}" is the goal's id.
+        cancel_body: of that request, a template as well.
         rejected: the statuses when the action server rejects a goal; empty: any error, or a state that says so.
     """
 
     action: Topic
     type: ActionType
-    id: Pointer
+    id: Pointer | None = None
     state: State | None = None
     feedback: Pointer | None = None
     result: Pointer | None = None
     cancel: Call | Literal[""] = ""
+    cancel_body: dict[str, Any] = {}
     rejected: tuple[Status, ...] = ()
 
 
@@ -196,24 +204,32 @@ _KINDS: Final[dict[str, type[Operation]]] = {
 }  # fmt: skip
 
 
-class RosMap(msgspec.Struct, frozen=True):
-    """What a gateway makes of a ROS graph.
+class _Forms(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a robot is, and how all its messages are written.
 
     Attributes:
-        operations: by operation.
         domain_id: the robot's ROS domain; None: that of the environment.
         non_finite: how NaN and infinities are written: as null, as the strings "NaN", "Infinity" and "-Infinity", as a
             bare NaN or Infinity, or not at all but refused with an error status; None: not judged.
-        rosbridge: URL of the rosbridge that has these operations; empty: they are a web API's.
         integers: how integers of 64 bits are written; None: either, but exactly.
         bytes: how uint8[] and byte[] are written; None: either.
     """
 
-    operations: dict[str, Operation]
-    domain_id: int | None = None
+    domain_id: Annotated[int, Meta(ge=0, le=_MOST_DOMAINS)] | None = None
     non_finite: Literal["null", "string", "refused", "literal"] | None = None
     integers: Literal["number", "string"] | None = None
     bytes: Literal["base64", "array"] | None = None
+
+
+class RosMap(_Forms, frozen=True):
+    """What a gateway makes of a ROS graph.
+
+    Attributes:
+        operations: by operation.
+        rosbridge: URL of the rosbridge that has these operations; empty: they are a web API's.
+    """
+
+    operations: dict[str, Operation]
     rosbridge: str = ""
 
     @property
@@ -225,9 +241,9 @@ class RosMap(msgspec.Struct, frozen=True):
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
-        actions = [one for one in self.operations.values() if isinstance(one, Acts)]
-        states = [one.state.read for one in actions if one.state]
-        return (*self.operations, *states, *(one.cancel for one in actions if one.cancel))
+        found = [one for one in self.operations.values() if isinstance(one, Acts | Calls)]
+        states = [one.state.read for one in found if one.state]
+        return (*self.operations, *states, *(one.cancel for one in found if isinstance(one, Acts) and one.cancel))
 
     @property
     def described(self) -> tuple[str, ...]:
@@ -254,7 +270,7 @@ class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def operations(self) -> Iterator[tuple[str, Operation]]:
         """Yield the operations, as if each had a path of its own (ROSBRIDGE_PROTOCOL.md, 3.3 to 3.4)."""
-        words: dict[str, tuple[str, ...]] = {
+        words: dict[str, Any] = {
             "running": ("running",), "succeeded": ("4",), "canceled": ("5",), "aborted": ("6",), "rejected": ("0",)
         }  # fmt: skip
         goal: dict[str, Any] = {
@@ -278,15 +294,11 @@ class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 yield f"{call}{name}", kind(**named, **more)
 
 
-class _Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _Ros(_Forms, frozen=True, forbid_unknown_fields=True):
     """The table ``[ros]`` as it is written; its operations are of several kinds."""
 
     operations: dict[str, dict[str, Any]] = {}
     rosbridge: _Rosbridge | None = None
-    domain_id: Annotated[int, Meta(ge=0, le=_MOST_DOMAINS)] | None = None
-    non_finite: Literal["null", "string", "refused", "literal"] | None = None
-    integers: Literal["number", "string"] | None = None
-    bytes: Literal["base64", "array"] | None = None
 
 
 class _File(msgspec.Struct, frozen=True):
@@ -305,7 +317,7 @@ def read_ros_map(table: Any, where: str, error: type[TomlFileError]) -> RosMap:
         TomlFileError: as ``error``: a key is unknown or missing, or a value is invalid.
     """
     found = fit({"ros": table}, _File, where, error).ros
-    given = {name: getattr(found, name) for name in ("domain_id", "non_finite", "integers", "bytes")}
+    given = {name: getattr(found, name) for name in _Forms.__struct_fields__}
     bridge = found.rosbridge
     if bool(found.operations) == bool(bridge):
         raise error(f"{where}: [ros] needs one of [ros.operations] and [ros.rosbridge], each in a statement of its own")
@@ -323,10 +335,12 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
         found = f"has {' and '.join(kinds)}" if kinds else "has none"
         raise error(f"{place}: one key of {', '.join(_KINDS)} must say what it is; it {found}")
     made = fit(table, _KINDS[kinds[0]], place, error)
-    if isinstance(made, Acts):
-        for name, path in (("state.read", made.state.read if made.state else "{id}"), ("cancel", made.cancel)):
-            if path and "{id}" not in path and "/{" not in path:
-                raise error(f"{place}: {name} = {path!r} must name the goal by {{id}}")
+    if isinstance(made, Acts | Calls):
+        cancel = (made.cancel, made.cancel_body) if isinstance(made, Acts) else ("", {})
+        state = (made.state.read, made.state.body) if made.state else ("", {})
+        for name, path, body in (("state.read", *state), ("cancel", *cancel)):
+            if path and "{id}" not in path + str(body) and "/{" not in path:
+                raise error(f"{place}: {name} = {path!r} must name what it is about by {{id}}, or its body must")
     elif isinstance(made, Reads) and not call.startswith(("GET ", "POST ")):
         raise error(f"{place}: topic = {made.topic!r} is read by GET, or by an operation of a WSDL")
     return made

@@ -11,7 +11,7 @@ from contextlib import suppress
 from http import HTTPStatus
 from importlib import import_module
 from socket import SHUT_RDWR, socket
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, cast
 
 from conformance.commandline.extras import told
 from conformance.transport.client import HttpClient
@@ -42,10 +42,12 @@ class Stream:
         kind: server-sent events or WebSocket.
         timeout_s: until it is open, s.
         wanted: whether a message is one of those that are listened for.
+        after: the id of the last event that its client has had; empty: none.
 
     Attributes:
         request: by which it was opened; for a WebSocket, the handshake.
         last: the last message; None: none came yet.
+        last_id: the id of the last event; empty: it has none.
         ended: whether no more comes.
 
     Raises:
@@ -60,15 +62,17 @@ class Stream:
         kind: Kind,
         timeout_s: float,
         wanted: Callable[[bytes], bool] = lambda _: True,
+        after: str = "",
     ) -> None:
         shared, began = client.connection, time.monotonic()
         shared.take_slot(("GET", client.url(target)))
         fields = [("Accept", _EVENTS)] if kind == "sse" else []
+        fields += [("Last-Event-ID", after)] if after else []
         credentials = shared.credentials if shared.may_authorize(client.base_url) else type(shared.credentials)()
         self.request = Request("GET", client.url(target), tuple(credentials.added(fields, shown=True)))
         path = client.prefix + credentials.target(target)
         headers = dict(credentials.added(fields, "GET", path))
-        self.last: Message | None = None
+        self.last, self.last_id = cast("Message | None", None), ""
         self.ended, self._wanted = False, wanted
         self._came: deque[Message] = deque(maxlen=_KEPT)
         self._news = threading.Condition()
@@ -107,7 +111,10 @@ class Stream:
     def _listen(self) -> None:
         # Whatever a server sends, and however the stream ends: that it did, is all that counts.
         with suppress(Exception):
-            for octets in filter(self._wanted, self._pieces):
+            for octets, id_ in self._pieces:
+                self.last_id = id_
+                if not self._wanted(octets):
+                    continue
                 message = Message(time.monotonic(), octets)
                 with self._news:
                     self.last = message
@@ -122,7 +129,8 @@ class _Refused(Exception):  # noqa: N818 - a response
     """Raised when a server does not open a stream."""
 
 
-_Opened = tuple[Iterator[bytes], Callable[[str], object]]
+# Messages with the ids of their events; and what sends.
+_Opened = tuple[Iterator[tuple[bytes, str]], Callable[[str], object]]
 
 
 def _events(link: socket, url: str, headers: dict[str, str], timeout_s: float) -> _Opened:
@@ -139,15 +147,17 @@ def _events(link: socket, url: str, headers: dict[str, str], timeout_s: float) -
     return _data(response), lambda _: None
 
 
-def _data(response: http.client.HTTPResponse) -> Iterator[bytes]:
-    """Yield the data of each event (9.2.6)."""
-    data: list[bytes] = []
+def _data(response: http.client.HTTPResponse) -> Iterator[tuple[bytes, str]]:
+    """Yield the data of each event, and the last id (9.2.6)."""
+    data, last_id = list[bytes](), ""
     while line := response.readline(_LONGEST):
         name, _, value = line.rstrip(b"\r\n").partition(b":")
         if name == b"data":
             data.append(value.removeprefix(b" "))
+        elif name == b"id":
+            last_id = value.removeprefix(b" ").decode("latin-1")
         elif not name and not value and data:
-            yield b"\n".join(data)
+            yield b"\n".join(data), last_id
             data = []
 
 
@@ -165,4 +175,4 @@ def _messages(link: socket, url: str, headers: dict[str, str], timeout_s: float)
         )  # fmt: skip
     except import_module("websockets.exceptions").WebSocketException as error:
         raise _Refused(str(error)) from error
-    return (one if isinstance(one, bytes) else one.encode() for one in opened), opened.send
+    return ((one if isinstance(one, bytes) else one.encode(), "") for one in opened), opened.send

@@ -11,7 +11,7 @@ from conformance.rules.ros_gateway.judging import differing, fails_as, mapped, s
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
 from conformance.scenarios.ros.web import changed, succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
-from conformance.statement.ros_map import RosMap, State
+from conformance.statement.ros_map import RosMap
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
@@ -81,7 +81,7 @@ def outcomes(trace: Goals) -> Iterator[Outcome]:
             continue
         if not name or not one.looks or (one.course is not Course.ABORTS and _end_of(one) is None):
             continue
-        words = _words(state, name)
+        words: tuple[str, ...] = getattr(state, name)
         if not words:
             continue
         last, end = one.looks[-1], _end_of(one)
@@ -93,11 +93,6 @@ def outcomes(trace: Goals) -> Iterator[Outcome]:
         expected = f"the state {' or '.join(words)} within {one.body.within_s:g} s after the end of a goal {one.course}"
         yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=one.course)
         yield from _steady(one)
-
-
-def _words(state: State, name: str) -> tuple[str, ...]:
-    found: tuple[str, ...] = getattr(state, name)
-    return found
 
 
 def _end_of(one: Goal) -> float | None:

@@ -65,9 +65,13 @@ def own(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether an operation returns the messages of its topic while others have as new ones."""
     for one in trace.presences:
         if one.publisher == _ALL:
-            found = f"the message of {one.instead}" if one.instead else ""
+            found = f"the message of {one.instead}" if one.instead else _older(one)
             expected = "the message of its own topic, while all topics have one"
-            yield Case(one.shown, one.exchange, expected, observed=found, cause="another" if found else "")
+            yield Case(one.shown, one.exchange, expected, observed=found, cause="another" if one.instead else "")
+
+
+def _older(one: Presence) -> str:
+    return "an older message" if one.exchange.response.ok else ""
 
 
 @rule("ros-gateway/recovers", on=(publishers_end,))
@@ -75,14 +79,14 @@ def recovers(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether messages are returned again after their publisher was away."""
     for one in trace.presences:
         if one.publisher != _ALL:
-            yield Case(one.shown, one.exchange, f"the message of {one.publisher}", cause=one.publisher)
+            yield Case(one.shown, one.exchange, f"the message of {one.publisher}", _older(one), one.publisher)
 
 
 @rule("ros-gateway/qualities", on=(publishers_of_each_quality,))
 def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
     """Judge whether publishers of each reliability and durability are heard."""
     for one in trace:
-        yield Case(one.shown, one.exchange, f"the message of {one.publisher}", cause=one.publisher)
+        yield Case(one.shown, one.exchange, f"the message of {one.publisher}", _older(one), one.publisher)
 
 
 @rule("ros-gateway/lists", on=(graph_lists,))
@@ -92,6 +96,8 @@ def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
         wanted = f"{one.name} ({one.kind})" if one.there else f"no {one.name}"
         when = "it came to" if one.there else "it left"
         expected = f"{wanted} within {one.body.timeout_s:g} s after {when} the graph"
+        if "/_" in one.name and not one.there:
+            expected = f"no {one.name}, a hidden name"
         yield Case(
             one.right, one.exchange, expected, one.found or "no such name", cause=f"{one.there} {bool(one.found)}"
         )

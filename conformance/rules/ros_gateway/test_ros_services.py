@@ -106,10 +106,10 @@ def failures(trace: Services) -> Iterator[Outcome]:
         if one.server is not Server.SILENT and not body.unavailable:
             declared = ()
         expected = f"{statuses(declared)} within {body.within_s:g} s for {body.service}, {one.server}"
-        if not isinstance(one.attempt, Exchange) and body.timeout_s is None:
+        if one.is_open and body.timeout_s is None:
             yield NotClaimed(f"the map does not say how long a call of {body.service} may take: `timeout_s`")
             continue
-        if not isinstance(one.attempt, Exchange):
+        if one.is_open or not isinstance(one.attempt, Exchange):
             yield Case(holds=False, exchange=one.attempt, expected=expected, cause=f"{one.server} silent")
             continue
         holds, status = fails_as(one.attempt, body, declared), one.attempt.response.status

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from conformance.scenarios.ros.topic_streams import Streamed, topic_streams
-from conformance.scenarios.rule import NotTested, Outcome, rule
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.verdict.evidence import Case
 
 
@@ -21,6 +21,13 @@ def stream_once(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
         strange = {exchange.response.body for exchange, place in one.came if place < 0}
         cause = f"{one.operation} once"
         missing = [place for place in range(len(one.sent)) if place not in places]
+        if one.known:
+            # Whether it sends what came meanwhile, and how much of that, is open.
+            again = [place for place in places if 0 <= place < one.known]
+            expected = f"no message on {one.body.topic} that the client has had ({one.how})"
+            yield Case(not again, one.opened, expected, f"message {_list(again)} again", f"{one.operation} again")
+            new = [place for place in places if place >= one.known]
+            missing = [place for place in missing if new and min(new) < place < max(new)]
         twice = sorted({place for place in places if place >= 0 and places.count(place) > 1})
         expected = f"each message on {one.body.topic} once ({one.how})"
         if not one.sent:
@@ -30,7 +37,7 @@ def stream_once(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
         if twice:
             yield Case(False, one.opened, expected, f"message {_list(twice)} more than once", cause)
         elif not missing or one.body.throttle_s:
-            yield Case(bool(places), one.opened, expected, "none", cause)
+            yield Case(bool(places or one.known), one.opened, expected, "none", cause)
         elif not one.reliable:
             yield NotTested(f"the gateway subscribes to {one.body.topic} with best effort, and may lose messages")
         elif len(strange) < len(missing):  # else they came, and were changed
@@ -53,6 +60,8 @@ def stream_order(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
 @rule("ros-gateway/stream-throttle", on=(topic_streams,))
 def stream_throttle(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
     """Judge whether a throttled stream sends no more messages than its interval allows; one more is let pass."""
+    if not any(one.body.throttle_s for one in trace):
+        yield NotClaimed("no stream of the map has `throttle_s`")
     for one in trace:
         if (throttle_s := one.body.throttle_s) and one.sent:
             most, number = int(one.lasted_s / throttle_s) + 2, len(one.came)

@@ -12,7 +12,6 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
@@ -227,20 +226,13 @@ class _Sender:
         return [first, replace(second, looks=tuple(went_on), heard=heard)]
 
     def _cancel(self, goal: Goal) -> Exchange | None:
-        made = self._of(goal, self._body.cancel)
-        return made and self._gateway.send(made, self._body.response_s)
-
-    def _of(self, goal: Goal, template: str) -> Any:
-        """Return the request of an operation on a goal; None: its response does not name it."""
-        name = value_at(document_of(goal.exchange.response.body).value, self._body.id)
-        if name is None:
-            return None
-        return self._gateway.binding.made(filled(template, {**self._body.values, "id": str(name)}), None)
+        made = self._gateway.following(goal.exchange, self._body, self._body.cancel, self._body.cancel_body)
+        return None if made is None else self._gateway.send(made, self._body.response_s)
 
     def _watched(self, goal: Goal, until: float, is_over: Callable[[list[Look]], bool]) -> list[Look]:
         looks: list[Look] = []
         state = self._body.state
-        made = self._of(goal, state.read) if state is not None else None
+        made = self._gateway.following(goal.exchange, self._body, state.read, state.body) if state else None
         while made is not None and state is not None:
             sent = WALL_CLOCK.now()
             exchange = self._gateway.send(made, self._body.response_s)

@@ -14,10 +14,10 @@ from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import filled
-from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
-from conformance.scenarios.ros.web import written
+from conformance.scenarios.ros.web import document_of, written
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange, Outgoing, Response
@@ -165,6 +165,16 @@ class Gateway:
             document = written(value, self.definition(_type_of(body)), body, self.ros)
         return self.binding.made(filled(call, body.values), document)
 
+    def following(
+        self, exchange: Exchange, body: Acts | Calls, template: str, content: dict[str, Any]
+    ) -> Outgoing | None:
+        """Return the request of an operation on a goal or a call; None: the response does not name it."""
+        name = (exchange.response.header("Location") or "").rstrip("/").rpartition("/")[2] or None
+        if body.id is not None:
+            name = value_at(document_of(exchange.response.body).value, body.id)
+        values = {**body.values, "id": str(name)}
+        return None if name is None else self.binding.made(filled(template, values), filled(content, values) or None)
+
     def read(self, call: str, reads: Reads) -> Exchange:
         """Read a topic; of a stream, return the last message.
 
@@ -177,8 +187,8 @@ class Gateway:
             return streamed(self._streams[call], self._streams[call].last)
         return self.send(self.request(call, reads), reads.response_s)
 
-    def stream(self, call: str, reads: Reads) -> Stream:
-        """Open the stream of an operation.
+    def stream(self, call: str, reads: Reads, after: str = "") -> Stream:
+        """Open the stream of an operation; ``after`` an event, where its client has had that.
 
         Raises:
             NoAnswerError: it does not open.
@@ -186,7 +196,7 @@ class Gateway:
         timeout_s = max(reads.response_s, 1.0)
         if reads.stream == "rosbridge":
             return Subscription(self.api.client, reads.body, timeout_s, reads.throttle_s)
-        return Stream(self.api.client, self.request(call, reads).target, reads.stream or "sse", timeout_s)
+        return Stream(self.api.client, self.request(call, reads).target, reads.stream or "sse", timeout_s, after=after)
 
     def send(self, made: Outgoing, timeout_s: float) -> Exchange:
         """Send a request.

@@ -16,7 +16,7 @@ from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import value_at
 from conformance.scenarios.ros.gateway import PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import differences, document_of, succeeded
+from conformance.scenarios.ros.web import content_of, differences, document_of, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Lists, Publishes, Reads
@@ -56,7 +56,8 @@ class Presence:
 
     Attributes:
         publisher: as a noun phrase.
-        shown: whether its message was returned in time.
+        shown: whether its message was returned in time, or a new one that is no other topic's: that the gateway
+            changes messages is another matter.
         exchange: the read that shows it, else the last one.
         instead: the topic whose message was returned; empty: none.
     """
@@ -142,7 +143,8 @@ class _Topics:
 
     def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
         """Publish on all topics, and yield what the gateway returns of each."""
-        values = {}
+        before = {call: content_of(self._gateway.read(call, body), body) for call, body in self._reads.items()}
+        values: dict[str, Any] = {}
         for body in self._reads.values():
             if body.topic not in values:
                 value = values[body.topic] = self._message(body.type)
@@ -154,7 +156,7 @@ class _Topics:
             # gateway that mixes topics returns the right message now and then. One of another topic settles it.
             for call in self._reads:
                 if call not in found or not found[call].instead or found[call].shown:
-                    now = self._presence(call, publisher, values)
+                    now = self._presence(call, publisher, values, before[call])
                     if call not in found or now.instead or not found[call].shown:
                         found[call] = now
             is_over = WALL_CLOCK.now() > until
@@ -163,15 +165,16 @@ class _Topics:
             WALL_CLOCK.sleep(PACE_S)
         yield from found.values()
 
-    def _presence(self, call: str, publisher: str, values: Mapping[str, Any]) -> Presence:
+    def _presence(self, call: str, publisher: str, values: Mapping[str, Any], before: object) -> Presence:
         exchange = self._gateway.read(call, self._reads[call])
         body, kinds = self._reads[call], {one.topic: one.type for one in self._reads.values()}
-        shows: list[str] = []
-        if succeeded(exchange, body):
-            document, definition = document_of(exchange.response.body), self._definitions[call]
-            alike = {topic: value for topic, value in values.items() if kinds[topic] == body.type}
-            shows = [t for t, v in alike.items() if not differences(document, v, definition, body, self._gateway.ros)]
-        return Presence(publisher, body.topic in shows, exchange, next(iter(shows), ""))
+        if not succeeded(exchange, body):
+            return Presence(publisher, shown=False, exchange=exchange)
+        document, definition = document_of(exchange.response.body), self._definitions[call]
+        alike = {topic: value for topic, value in values.items() if kinds[topic] == body.type}
+        shows = [t for t, v in alike.items() if not differences(document, v, definition, body, self._gateway.ros)]
+        is_new = not shows and content_of(exchange, body) != before
+        return Presence(publisher, is_new or body.topic in shows, exchange, next(iter(shows), ""))
 
     def _message(self, kind: str) -> dict[str, Any]:
         """Return a new message, whose stamp is the present: its age may be read from that."""
@@ -217,7 +220,7 @@ class Listed:
         body: its map.
         name: the name, and its type on the graph.
         kind: its type.
-        there: whether it is on the graph.
+        there: whether it is on the graph, and no name that the list leaves out.
         right: whether the list came to say so in time.
         found: what the list last had as its type; empty: nothing.
         exchange: the last read.
@@ -247,10 +250,14 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
         if body.lists not in _KINDS:
             continue
         kind, part = _KINDS[body.lists], secrets.token_hex(4)
-        names = [f"/roaas_{part}", f"/roaas_{part}/inner/name"]
+        names = {f"/roaas_{part}": True, f"/roaas_{part}/inner/name": True}
+        # A name that is hidden comes first: when the others are listed, it would be.
+        if body.hidden is not None:
+            names = {f"/roaas_{part}/_hidden": body.hidden, **names}
         for name in names:
             _put(gateway, body.lists, name, kind)
-        found += [_listed(gateway, call, body, name, kind, there=True) for name in names]
+        for name, there in reversed(names.items()):
+            found.append(_listed(gateway, call, body, name, kind, there=there))
         for name in names:
             gateway.robot.tell("forget", name=name)
         found += [_listed(gateway, call, body, name, kind, there=False) for name in names]

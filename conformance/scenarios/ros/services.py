@@ -12,11 +12,11 @@ from enum import StrEnum
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
-from conformance.scenarios.ros.web import TRIES, gave_up, succeeded
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, succeeded
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
@@ -105,6 +105,21 @@ class Called:
         """Whether the gateway says that the service responded."""
         return succeeded(self.attempt, self.body)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the gateway said nothing of the outcome until the suite gave up."""
+        return not isinstance(self.attempt, Exchange) or runs(self.attempt, self.body)
+
+
+def runs(attempt: Attempt, body: Calls) -> bool:
+    """Return whether a call still goes on, as the gateway says."""
+    return (
+        isinstance(attempt, Exchange)
+        and attempt.response.ok
+        and body.state is not None
+        and value_at(document_of(attempt.response.body).value, body.state.at) in body.state.running
+    )
+
 
 def is_held(call: Called, beside: Beside) -> bool:
     """Return whether a request was held up until a call had ended."""
@@ -182,7 +197,7 @@ class _Caller:
         for _ in range(ROUNDS):
             silent = self._never_answered()
             yield silent
-            if isinstance(silent.attempt, Exchange) or self._body.timeout_s:
+            if not silent.is_open or self._body.timeout_s:
                 # Else the gateway may still wait for the first call, and be right to.
                 yield self._answered(Server.AFTER, *self._usual())
             if not any(is_held(silent, one) for one in silent.beside):
@@ -203,7 +218,7 @@ class _Caller:
         robot.tell("script", name=body.service, script=[*script, {}])
         robot.heard(body.service)
         made = [[self._gateway.request(self._call, body, one)] for one in requests]
-        attempts = crowd(self._gateway.api.client, made, body.within_s + _LATE_S)
+        attempts = [(self._outcome(one),) for (one,) in crowd(self._gateway.api.client, made, body.within_s + _LATE_S)]
         heard = tuple(robot.heard(body.service, 2 * CROWD, _MORE_S))
         return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
 
@@ -245,11 +260,24 @@ class _Caller:
         robot, body = self._gateway.robot, self._body
         request = self._complete("Request", request)
         robot.heard(body.service)
-        attempt = self._sent(self._gateway.request(self._call, body, request), body.within_s + _LATE_S)
+        attempt = self._outcome(self._sent(self._gateway.request(self._call, body, request), body.within_s + _LATE_S))
         ended = WALL_CLOCK.now()
         heard = () if answer is None else tuple(robot.heard(body.service, 3, _MORE_S))
         text = "" if answer is None else json.dumps(answer)
         return Called(self._call, body, server, json.dumps(request), text, attempt, ended, heard)
+
+    def _outcome(self, attempt: Attempt) -> Attempt:
+        """Return the last reading of a call that goes on after its response, or the response itself."""
+        state, until = self._body.state, WALL_CLOCK.now() + self._body.within_s + _LATE_S
+        if state is None or not isinstance(attempt, Exchange) or not attempt.response.ok:
+            return attempt
+        made = self._gateway.following(attempt, self._body, state.read, state.body)
+        while made is not None:
+            attempt = self._sent(made, self._body.within_s)
+            if not runs(attempt, self._body) or WALL_CLOCK.now() > until:
+                break
+            WALL_CLOCK.sleep(PACE_S)
+        return attempt
 
     def _sent(self, made: Any, timeout_s: float) -> Attempt:
         try:
@@ -274,14 +302,14 @@ class _Caller:
             beside = tuple(
                 self._read(call, read, took) for (call, read), took in zip(others, self._usual_s, strict=True) if heard
             )
-        return Called(self._call, body, Server.SILENT, text, "", *hanging.result(), tuple(heard), beside)
+        attempt, ended = hanging.result()
+        outcome = self._outcome(attempt)
+        ended = ended if outcome is attempt else WALL_CLOCK.now()
+        return Called(self._call, body, Server.SILENT, text, "", outcome, ended, tuple(heard), beside)
 
     def _others(self) -> list[tuple[str, Reads | Lists]]:
-        found = self._gateway.ros.operations.items()
-        others = [(call, one) for call, one in found if isinstance(one, Reads | Lists)]
-        return [(call, one) for call, one in others if isinstance(one, Lists) or one.stream in {"", "rosbridge"}][
-            -_BESIDE:
-        ]
+        others = [(call, one) for call, one in self._gateway.ros.operations.items() if isinstance(one, Reads | Lists)]
+        return [one for one in others if isinstance(one[1], Lists) or one[1].stream in {"", "rosbridge"}][-_BESIDE:]
 
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()

@@ -31,6 +31,9 @@ _ROUNDS: Final = {"quick": 2, "standard": 3, "deep": 8}
 _INTERVALS, _IN_EACH = 4, 5
 # That of a rosbridge, s.
 _THROTTLE_S: Final = 0.2
+# Messages while a client is away; when it is back, a stream that sends those does so in this time, s.
+_AWAY: Final = 3
+_RESUMES_S: Final = 1.0
 # After the last message, what comes twice comes so soon, s.
 _MORE_S: Final = 0.3
 
@@ -48,6 +51,7 @@ class Streamed:
         lasted_s: from the first message that was published, or came, to the last, s.
         opened: request and response of the stream's beginning, or what came last.
         reliable: whether no message is lost on the way to the gateway.
+        known: how many of those that were sent the client has had, as it said when it connected.
     """
 
     operation: str
@@ -58,6 +62,7 @@ class Streamed:
     lasted_s: float
     opened: Exchange
     reliable: bool
+    known: int = 0
 
 
 @scenario(needs=(Need.REST,), leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
@@ -111,6 +116,17 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
             opened = streamed(stream, came[-1] if came else Message(began, b""))
             text = tuple(map(json.dumps, values))
             yield Streamed(call, body, how, text, shown, lasted_s, opened, published.reliably)
+            if stream.last_id and not turn and [one for _, one in shown] == list(range(number)):
+                # The next ones are published while it is away (HTML Living Standard, 9.2.4).
+                stream.close()
+                away = [gateway.complete(body.type, maker.usual().value) for _ in range(_AWAY)]
+                robot.publish(body.topic, body.type, *away, gap_s=gap_s)
+                clock.sleep(_MORE_S)
+                back = streams[place] = gateway.stream(call, body, stream.last_id)
+                came = [*back.heard(_AWAY, _RESUMES_S), *back.heard(_AWAY, _MORE_S)]
+                shown = tuple(_shown(gateway, back, one, body, definition, [*values, *away]) for one in came)
+                text, how = (*text, *map(json.dumps, away)), f"after {number} messages, with its Last-Event-ID"
+                yield Streamed(call, body, how, text, shown, 0.0, opened, published.reliably, number)
         if isinstance(streams[0], Subscription):
             streams[0].unsubscribe()
             clock.sleep(_MORE_S)

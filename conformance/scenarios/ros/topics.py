@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import Definition, value_at
+from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import differences, document_of, equal, succeeded
+from conformance.scenarios.ros.web import content_of, differences, document_of, equal, succeeded
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -122,7 +122,7 @@ class _Reader:
             lost += sample.kind is not Kind.LARGE and waited_s > self.reads.within_s
             if lost >= _GIVES_UP:
                 return
-            self.contents.add(self.content(shown.exchange))
+            self.contents.add(content_of(shown.exchange, self.reads))
 
     def of(self, sample: Sample) -> Shown:
         """Publish a message, and read until it is shown, or surely another one, or its time is over."""
@@ -145,7 +145,7 @@ class _Reader:
             if is_stale:
                 wrong, earlier = [], earlier + 1
             else:
-                here = self.content(exchange)
+                here = content_of(exchange, self.reads)
                 wrong = [*(one for one in wrong if one[1] == here), (sent, here)]
                 if len(wrong) >= _SURE and sent - wrong[0][0] > _SURE_S:
                     break
@@ -165,13 +165,9 @@ class _Reader:
         found = differences(document, value, self.definition, self.reads, self.gateway.ros)
         return succeeded(exchange, self.reads) and not found
 
-    def content(self, exchange: Exchange) -> str:
-        """Return what a response has in the message's place, as text."""
-        return str(value_at(document_of(exchange.response.body).value, self.reads.at))
-
     def is_stale(self, exchange: Exchange) -> bool:
         """Return whether a response shows no message, or one that was shown before."""
-        return not succeeded(exchange, self.reads) or self.content(exchange) in {"None", *self.contents}
+        return not succeeded(exchange, self.reads) or content_of(exchange, self.reads) in {"None", *self.contents}
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from typing import Any, Final
 from conformance.documents.xml import NotXmlError, elements, local, parse
 from conformance.documents.xsd_shapes import value_of
 from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, put_at, value_at
-from conformance.statement.ros_map import Body, RosMap
+from conformance.statement.ros_map import Body, Calls, RosMap
 from conformance.transport.exchange import Attempt, Exchange
 
 _SHOWN: Final = 80
@@ -65,14 +65,21 @@ def succeeded(attempt: Attempt, body: Body) -> bool:
     """Return whether a response is 2xx, and reports no failure by the map."""
     if not isinstance(attempt, Exchange) or not attempt.response.ok:
         return False
-    failure = body.failure
-    return failure is None or value_at(document_of(attempt.response.body).value, failure.at) not in failure.values
+    value, failure = document_of(attempt.response.body).value, body.failure
+    if isinstance(body, Calls) and body.state is not None:
+        return value_at(value, body.state.at) in body.state.succeeded
+    return failure is None or value_at(value, failure.at) not in failure.values
 
 
 def gave_up(attempt: Attempt | None, body: Body) -> bool:
     """Return whether a request failed after a while, because its deadline passed on a busy machine."""
     is_late = isinstance(attempt, Exchange) and attempt.response.elapsed_ms > _SOON_MS
     return attempt is not None and is_late and not succeeded(attempt, body)
+
+
+def content_of(exchange: Exchange, body: Body) -> str:
+    """Return what a response has in the message's place, as text."""
+    return str(value_at(document_of(exchange.response.body).value, body.at))
 
 
 def document_of(octets: bytes) -> Document:

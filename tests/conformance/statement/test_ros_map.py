@@ -75,10 +75,10 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
         ('topic = "/odom"', 'topic = "/odom", service = "/a"', "it has topic and service"),
         ("values = [false]", "value = [false]", "unknown key 'value'"),
         ("max_age_s", "max_age", "unknown key 'max_age'; known are"),
-        ("goals/{id}/cancel", "goals/cancel", "must name the goal by {id}"),
+        ("goals/{id}/cancel", "goals/cancel", "must name what it is about by {id}, or its body must"),
         ('"GET /api/v1/pose"', '"DELETE /api/v1/pose"', "is read by GET"),
         ('"GET /api/v1/pose"', '"pose"', "must be a method and a path"),
-        ('id = "/id"', "", "'id' is missing"),
+        ("GET /api/v1/goals/{id}", "GET /api/v1/goals", "state.read = 'GET /api/v1/goals' must name"),
         ("max_age_s = 2.0", 'stream = "tcp"', "stream = 'tcp' must be one of"),
     ],
 )
