@@ -21,11 +21,11 @@ from conformance.scenarios.writing import Writer
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
-# Statuses about the thing that a device may send before it looks at the credentials.
+# Statuses about the resource, which a device may send before it checks credentials.
 _UNDECIDED: Final = frozenset({404, 409, 410})
-# Operations of a slow device that are sent without credentials on a connection that has carried some.
+# Of a slow device: operations that are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
-# The turn of an identifier that nobody creates.
+# _NEVER: number for an identifier that nobody creates.
 _NEVER: Final = 97
 _ABSENT: Final = "roaas-is-not-there"
 
@@ -45,7 +45,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     with ExitStack() as stack:
         unknown, *nearly = (stack.enter_context(closing(Stranger(api, wrong))) for wrong in (own.wrong, *own.nearly))
         for number, operation in enumerate(closed):
-            # What is nearly right takes turns.
+            # Nearly right credentials are used in rotation.
             near = nearly[number % len(nearly) :][:1] if nearly else []
             tried: list[tuple[HttpClient | Stranger, bool]] = [(api.client, False)]
             tried += [(one, True) for one in ([unknown, *near] if own else [])]
@@ -53,7 +53,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                 continue
             request = written(operation, usual_inputs(operation, values)[0])
             for client, authorized in tried:
-                with suppress(NoAnswerError):  # the survey tells what gets no response
+                with suppress(NoAnswerError):  # the survey reports a missing response
                     exchange = client.send(
                         request.method,
                         request.target,
@@ -67,7 +67,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
                         found.append(api.client.send("HEAD", request.target, authorized=False, fresh=True))
                     if exchange and exchange.response.status in _UNDECIDED:
                         found += _on_new_thing(Surveyor(api, values), operation, request, client, authorized=authorized)
-        # An error of another request shows nothing of the wrong credentials before it.
+        # An error of another request does not come from the wrong credentials before it.
         reads = [one for (method, _), one in callable_operations(api).items() if method == "GET"]
         absent = (path_chosen(one, _NEVER) for one in reads if one.parameter("path"))
         with suppress(NoAnswerError):

@@ -29,18 +29,18 @@ from conformance.scenarios.whole_list import WholeList, read_whole
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
-# Filters that are looked at.
+# _FILTERS: filters that are tried. _MOST_ITEMS: items of a list.
 _FILTERS: Final = 2
 _MOST_ITEMS: Final = 1000
 _ACCEPTED: Final = 202
-# Texts of a description that say that it counts what is there now, and what was ever there.
+# Phrases in a description which say that a number counts what exists now; below, what ever existed.
 _NOW: Final = re.compile(
     r"\b(?:how many|number of)\b[^.]*\b(?:have|has|are|is|currently|now|with|in|on)\b", re.IGNORECASE
 )
 _EVER: Final = re.compile(
     r"\b(?:ever|total|so far|since|was|were|been|had|not|only|except|without|handled|processed)\b", re.IGNORECASE
 )
-# Numbers that sort the other way as texts.
+# Numbers whose order as texts is the other way round.
 _NUMBERS: Final = (9, 10)
 
 
@@ -79,12 +79,12 @@ class Chosen:
         lists = {
             value: self._list(listing, thing, {parameter.name: value}) for value in (was, *_values(parameter, was))
         }
-        # A list that has it before, and one that does not: the filter chooses by this member, as it is named.
+        # If one list had the thing before and another did not, the filter chooses by the member of its name.
         usable = [one for one, found in lists.items() if one != was and found.is_whole and thing.id not in found.ids]
         if is_stored(lists[was].exchange) or not usable:
             return
         if thing.id not in lists[was].ids:
-            # Others are there by this value, so the filter chooses by this member; the list of all names it by this id.
+            # Other things are listed for this value, so the filter chooses by this member.
             is_by = lists[was].is_whole and any(members_of(one).get(name) == was for one in lists[was].items)
             if is_by and thing.id in self._list(listing, thing, {}).ids:
                 other, expected = "a list without it", f"a list with {thing.id} by {parameter.name}={was}, as it reads"

@@ -62,7 +62,7 @@ class RulesPlugin:
 
                 record(judge, rule.requirement, rule.outcomes_apart(recording.trace, request.getfixturevalue, report))
             if recording.error is not None:
-                # Also where the trace shows something: what ended the scenario must not pass unnoticed.
+                # Raise the error that ended the scenario even if the trace is usable.
                 raise recording.error
 
         return check

@@ -11,14 +11,14 @@ from conformance.api.rest.variations import Variation, odd_variations, together,
 from conformance.documents.openapi import Operation
 from conformance.verdict.effort import Effort
 
-# Requests of one operation at standard effort: drawn cases, and valid, invalid and odd ones at most and at quick. They
-# are drawn, because schemas that refer to each other can make millions.
+# At standard effort, for each operation: _CASES drawn, of which _MOST are sent by kind. Drawn, because schemas that
+# refer to each other can make millions.
 _CASES: Final = 400
 _MOST: Final = {"valid": 60, "invalid": 60, "odd": 40}
 _LEAST: Final = {"valid": 40, "invalid": 28, "odd": 12}
-# Valid requests of an operation that changes something, because each leaves something behind.
+# Valid requests to an operation that changes something, because each leaves something behind.
 _ACTING: Final = 12
-#: An operation that once took more than a second gets this part of the requests.
+#: An operation that once took longer than a second gets this fraction of the requests.
 SLOW_SHARE: Final = 4
 
 
@@ -51,7 +51,7 @@ def drawn(
         standard = max(_MOST[name], round(_LEAST[name] / effort.factor))
         standard //= SLOW_SHARE if operation.label in slow else 1
         if name == "odd":
-            # As values that are valid or invalid, some were sent already.
+            # Some were sent already as valid or invalid values.
             variations = [one for one in variations if repr(one.inputs) not in sent]  # noqa: PLW2901 - fewer of them
         own, common = ([one for one in variations if one.is_common is is_common] for is_common in (False, True))
         found = effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")

@@ -35,15 +35,15 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# Operations of a thing that begin something; kinds of things that are looked at.
+# _BEGINNING: operations that start an activity. _KINDS: kinds of things that are tried.
 _BEGINNING, _KINDS = 2, 3
-# Texts of a description that say that 409 is for things that are in use.
+# Phrases in a description which say that 409 means a thing in use.
 _IN_USE: Final = re.compile(
     r"\b(?:in use|while|empty|refer|contain|assign|attach|link|need|depend|belong|stand|used|uses|has|have)",
     re.IGNORECASE,
 )
 
-# Operations after which a thing goes on.
+# Operations after which an activity can continue.
 _PAUSING: Final = frozenset({"pause", "halt", "interrupt"})
 
 _Operations = Mapping[tuple[str, str], Operation]
@@ -89,7 +89,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
             begins,
         ):
             api.run.limit.check()
-            with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+            with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
                 if create is None:
                     _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
                     break
@@ -130,7 +130,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
 
         writer.until(lambda: writer.send(kind.read, path), is_so)
         if KEEPS.search(step.text):
-            # What changes by itself does so now as well.
+            # Members that change by themselves have changed now too.
             writer.send(kind.read, path)
 
 

@@ -26,25 +26,25 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 from conformance.verdict.time_limit import TimeIsOverError
 
-# Schemathesis makes about this share of the requested cases: some are alike, some cannot be sent. It covers an
-# operation by about this many cases for each parameter or body member.
+# _MADE: share of the requested cases that Schemathesis makes, because some are equal or cannot be sent. _COVERING:
+# cases for each parameter or body member.
 _MADE: Final = 0.7
 _COVERING: Final = 15
-# Operations that the checks of HTTP read; requests for each; other requests; those with a slow device. OPTIONS is sent
-# to every operation.
+# _READS: operations that the checks of HTTP read. _EACH_READ: requests for each. Below: other requests, and those with
+# a slow device. OPTIONS goes to every operation.
 _READS: Final = 8
 _EACH_READ: Final = 18
 _HTTP: Final = 90
 _HTTP_SLOW: Final = 40
-# Reads on one connection for each of these operations at standard, in all at least, and with a slow device; reads of
-# several clients at standard.
+# _ON_ONE_CONNECTION: reads on one connection for each operation at standard. _LEAST_ON_ONE: at least in all. Below:
+# with a slow device, and of several clients.
 _ON_ONE_CONNECTION: Final = 60
 _LEAST_ON_ONE: Final = 120
 _FEWEST: Final = 3
 _AT_ONCE: Final = 325
-# First requests, which measure how fast the device responds, also of a device without reads.
+# First requests, which measure the device's response time even if it has no reads.
 _FIRST: Final = 12
-# Time of the suite for a request, and for one drawn by Hypothesis, ms; for its start, s.
+# _OWN_MS: the suite's own time for a request. _DRAWN_MS: for one drawn by Hypothesis, ms. Below: for its start, s.
 _OWN_MS: Final = 0.5
 _DRAWN_MS: Final = 5.5
 _START_S: Final = 0.5
@@ -148,11 +148,11 @@ def _rounded(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"
 
 
-# Timed repeats of each: the quickest of them waited for no other request. What looks slower is repeated more often: if
-# times vary by themselves, one quick response at the beginning and few at the end prove nothing.
+# TIMED_AGAIN: timed repeats; the quickest of them waited for no other request. _TIMED_OFTEN: repeats if the device
+# looks slower, because varying times prove nothing.
 TIMED_AGAIN: Final = 5
 _TIMED_OFTEN: Final = 25
-#: How many times as long, and how many ms longer, a request takes whose response time has grown.
+#: A response time has grown if it is GROWN_TIMES as long and GROWN_MS longer.
 GROWN_TIMES: Final = 3.0
 GROWN_MS: Final = 50.0
 
@@ -190,7 +190,7 @@ def timed_again(api: RestInterface) -> tuple[TimedAgain, ...]:
         try:
             timed = timed_often(label, api.first[label], partial(call.send, api))
         except (NoAnswerError, TimeIsOverError):
-            continue  # what does not respond, other rules tell
+            continue  # other requirements report a missing response
         found.append(timed)
     if not found:
         raise NotPossibleError("no operation that only reads was answered 2xx")

@@ -23,9 +23,9 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.transport.exchange import NoAnswerError, Outgoing
 
-# Operations that are tried, and others that are tried after each.
+# _HELD: operations that are tried. _OTHERS: operations tried after each of them.
 _HELD, _OTHERS = 6, 6
-# Operations after which a thing allows no other one.
+# Operations after which a thing allows no further operation.
 _FINAL: Final = frozenset({"cancel", "abort", "stop", "end", "finish", "terminate"})
 
 
@@ -60,12 +60,12 @@ class _Held:
         self.item = self.operation.template.rpartition("}")[0] + "}"
         below = [one for one in self.actions if one.template.startswith(f"{self.item}/") and one is not self.operation]
         self._endings = [one for one in below if words_of(one.template[len(self.item) :]) & _FINAL]
-        # What is beside it, and named by its description, before what is done with the thing itself.
+        # Operations that the description names come before others on the same thing.
         said = words_of(self.operation.text)
         named = [one for one in self.actions if "{" not in one.template and one is not self.operation]
         found = sorted(named, key=lambda one: -len(said & words_of(one.template)))
         found = [one for one in found if said & words_of(one.template)]
-        # One of them may want another one before it.
+        # Twice, because one of them may need another one before it.
         self._others = [*found, *([one for one in below if one not in self._endings] * 2)][:_OTHERS]
 
     def called(self) -> None:

@@ -32,15 +32,16 @@ from conformance.scenarios.whole_list import read_whole
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
-# Operations that are tried; the turn of bodies that no other check sends.
+# _OPERATIONS: operations that are tried. _TURN: number for request bodies that no other check sends.
 _OPERATIONS, _TURN = 6, 7100
 # Keys of a round: the first one, and a new one.
 _KEYS: Final = 2
-# Members in which a response identifies what was made, whatever the client sent.
+# Members by which a response identifies the created thing.
 _IDS: Final = ("id", "uuid", "guid")
 # Statuses by which an operation may refuse a key that came with another body.
 _REFUSALS: Final = frozenset({"409", "422"})
-# Texts of a description that say that a retry gets the first result, and that a refused request leaves its key free.
+# Phrases in a description which say that a retry gets the first result; below, that a refused request leaves its key
+# unused.
 _FIRST: Final = re.compile(
     r"\b(?:first|original|same|earlier|previous|stored) (?:answer|response|result|reply)\b", re.IGNORECASE
 )
@@ -81,7 +82,7 @@ def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
             continue
         tried += 1
         api.run.limit.check()
-        with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+        with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
             rounds = _Rounds(Writer(api, values), operation, key, by_key)
             first = list(rounds.play(0))
             wrong = [one for one in first if one.fault]
@@ -143,7 +144,7 @@ class _Rounds:
                 is_old = new.response.status == HTTPStatus.CREATED and self._name(new) == name
                 expected = f"something else than {name}, which was made for another key and another body"
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
-                # Other keys in between make a retry no other request; without a promise a device may keep few of them.
+                # A retry may come after other keys; without a promise, a device may remember few keys.
                 more = keys[_KEYS : _KEYS + 1] if _FIRST.search(self._promised()) else []
                 made += [self._send(self._request(one, bodies[-1])) for one in more]
                 again = self._send(request)

@@ -33,19 +33,20 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
-# Things of a collection that are created: if nothing deletes them, at quick, and at the other efforts.
+# Things to create in a collection: _KEPT if nothing deletes them, _FEW at quick, _MANY otherwise.
 _KEPT, _FEW, _MANY = 2, 3, 20
-# Multiples of an exploration's time that one collection may take; with a slow device.
+# Multiples of an exploration's time that one collection may take: normally, and with a slow device.
 _BUDGETS, _SLOW_BUDGETS = 10, 3
-# Operations of things that are called.
+# Operations of a thing that are called.
 _ACTIONS: Final = 3
-# Longest time that a thing is left alone, s.
+# How long a thing is left alone at most, s.
 _ALONE_S: Final = 6.0
-# Clients that create things at once; the first turn of their values.
+# _CLIENTS: clients that create things at the same time. _AT_ONCE: number for their first values.
 _CLIENTS, _AT_ONCE = 2, 110
-# Turns of changes, of refused requests, and of an identifier that is never created: their values differ.
+# Numbers from which values are made, so that they differ: for changes, refused requests, and an identifier that is
+# never created.
 _CHANGED, _REFUSED, _NEVER = 30, 60, 99
-# Members that say when something was changed.
+# Members with the time or version of a change.
 _TIMES: Final = re.compile(r"(?:created|updated|modified|changed|timestamp|time|at|on|version|revision|etag)$")
 
 
@@ -59,7 +60,7 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
         create = operations.get(("POST", collection)) or operations.get(("PUT", path))
         if method == "GET" and collection and create is not None:
             api.run.limit.check()
-            # What was created is deleted.
+            # Created things are deleted even after the time limit.
             with api.run.limit.lifted():
                 lives += _seen_twice(partial(_Cycle, Writer(api, values), create, read, operations, held))
     lives += singletons(Writer(api, values), operations)
@@ -113,7 +114,7 @@ class _Cycle:
         effort, things = self.writer.api.run.effort, self.living.things
         delete = self.operations.get(("DELETE", self.item))
         count = _KEPT if delete is None else _FEW if effort.name == "quick" or effort.slow else _MANY
-        with suppress(NoAnswerError):  # the survey tells what breaks a connection
+        with suppress(NoAnswerError):  # the survey reports a broken connection
             self._create_all(count)
             self.living.look_at_older()
             self._change_all()
@@ -204,7 +205,7 @@ class _Cycle:
             expected = f"{told}, as {action.label} with status {sent.response.status} said"
             living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing)
             thing.last = found.exchange if found.exchange.response.ok else thing.last
-            # An action may change what was written, and end the thing.
+            # An operation may change members that were written, and end the thing.
             wrong = living.other(thing, found.exchange)
             thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN
             thing.kept = {} if wrong else thing.kept
@@ -287,7 +288,7 @@ class _Cycle:
         status = created.response.status
         id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
-            # A POST that is answered 200 may search, or log in.
+            # A POST that is answered 200 may be a search or a login.
             status == HTTPStatus.OK and before is not None and bool(id_) and id_.casefold() not in before
         )
         paths = dict.fromkeys(self._paths(created, id_)) if is_new else {}
@@ -359,7 +360,7 @@ class _Cycle:
         is_item = self._is_item(there)
         if created.response.status == HTTPStatus.SEE_OTHER and not is_item:
             return []
-        # Two identifiers of another kind may both be right: a number, and a readable name.
+        # Two different identifiers may both be right: a number, and a readable name.
         return [there, by_id] if by_id and is_item and last != id_ and last.isdigit() and id_.isdigit() else [there]
 
     def _is_item(self, path: str) -> bool:

@@ -25,31 +25,31 @@ from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange
 
 ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
-# Things that are read after one step.
+# Things that are read after each step.
 _LOOKED: Final = 4
 # States of things that end by themselves, and may then be removed.
 _ENDED: Final = frozenset(
     {"done", "finished", "completed", "complete", "ended", "failed", "cancelled", "canceled", "succeeded", "expired"}
 )
 _STATES: Final = ("state", "status", "phase")
-# Members whose text depends on the address of the read; texts that are times.
+# Members whose text depends on the address of the read; below, texts that are times.
 _PLACES: Final = re.compile(r"(?:url|uri|href|link|links|self|path)$")
 _TIME: Final = re.compile(r"\d{4}-\d\d-\d\d")
 _MANY: Final = 10
-# Items on a page where a list is read in pages.
+# Items on a page when a list is read in pages.
 _PAGE: Final = 2
-# Newest things that a collection keeps: then it drops the oldest.
+# Newest things that a collection keeps: it drops older ones.
 _RING: Final = 3
 
 
 class Kind(StrEnum):
     """What a look shows if it is not as expected."""
 
-    THERE = "there"  # what was created is lost, not listed, or has the identifier of something else
-    KEPT = "kept"  # what was written reads otherwise later
-    GONE = "gone"  # what was deleted is back, or still listed
-    SHOWN = "shown"  # the list shows other values than the thing itself
-    CHOSEN = "chosen"  # a list by a filter has a thing by the value that it had
+    THERE = "there"  # a created thing is lost, not listed, or has another thing's identifier
+    KEPT = "kept"  # a written value reads differently later
+    GONE = "gone"  # a deleted thing is back, or still listed
+    SHOWN = "shown"  # the list shows other values than the item
+    CHOSEN = "chosen"  # a filtered list has a thing by its former value
     REFUSED = "refused"  # a refused request has changed something
 
 
@@ -166,7 +166,7 @@ class Living:
     listing: WholeList | None = None
     _shown: bool = False
     _capped: bool = False
-    # Whether a thing has outlived the creation of another one, and what was lost by one before that was seen.
+    # Whether a thing has survived the creation of another. Below: things lost before that was known.
     _lasts: bool = False
     _is_shown_otherwise: bool = False
     _replaced: list[Look] = field(default_factory=list)
@@ -243,7 +243,7 @@ class Living:
         kind = kind or (Kind.THERE if is_lost else Kind.KEPT)
         creates = after.request.method == "POST" and after.response.status == HTTPStatus.CREATED
         if creates and not is_lost:
-            # Another one is no replacement of those before.
+            # A new thing does not replace those before.
             self.looks += self._replaced
             self._replaced = []
             self._lasts = True
@@ -297,7 +297,7 @@ class Living:
         thing = self.things[-1]
         before, is_new = self.listing, after is thing.life.created
         self.listing = listing = self.writer.until(lambda: self.list_of(thing), lambda one: not self._wrong(one))
-        # A list of many items that does not grow may have a limit of its own.
+        # A long list that does not grow may have a limit of its own.
         self._capped |= is_new and before is not None and _MANY <= len(listing.items) <= len(before.items)
         wrong = self._wrong(listing)
         self._shown = self._shown or any(one.id in listing.ids for one in self.of(State.ALIVE) if one.id)
@@ -356,7 +356,7 @@ class Living:
         if self.lister is None:
             raise ValueError("the collection has no list")
         path = thing.path.rstrip("/").rpartition("/")[0] + ("/" if self.lister.template.endswith("/") else "")
-        # A short list that makes several pages is read page after page.
+        # If a short list has several pages, read page after page.
         listing, is_more = listing_of(self.lister), len(self.of(State.ALIVE)) > _PAGE
         is_short = self.listing is not None and len(self.listing.items) <= _MANY - _PAGE
         limit = listing.limit if listing is not None and is_short and is_more else None

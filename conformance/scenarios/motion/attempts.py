@@ -26,16 +26,16 @@ from conformance.statement.motion_map import Axis, Goto, Speed, Velocity
 from conformance.transport.exchange import NoAnswerError, Outgoing
 from conformance.transport.raw import PartialRequest
 
-# Longest wait for the effect of an attempt at rest, beside the time to settle, s.
+# How long the suite waits for the effect of an attempt at rest, beyond the settle time, s.
 _EFFECT_S: Final = 2.0
-# Parts of a body to send, each with how many bytes Content-Length promises beyond the whole (None: chunked, without
-# the last chunk), and whether the connection ends by a reset.
+# Parts of a body to send: share, bytes that Content-Length promises in excess (None: chunked, without the last chunk),
+# and whether a reset ends the connection.
 _PARTS: Final = ((0.5, 0, True), (1.0, 10, True), (1.0, 10, False), (1.0, None, True))
-# Time that a server has to read the sent part of a request, s.
+# How long a server gets to read the sent part of a request, s.
 _READ_S: Final = 0.03
 
 
-# What makes some attempts, and yields each when it is made.
+# Function that makes attempts, and yields each when it is made.
 Attempts = Callable[[], Iterable[Tried]]
 
 
@@ -95,7 +95,8 @@ def _settle(mapped: MappedDevice) -> None:
     mapped.bring_home()
     velocity = mapped.motion.velocity
     if velocity is not None:
-        # A velocity that is read may come so late; by positions, coming to rest takes a part of that.
+        # A velocity may be this late where it is read directly; where positions show it, coming to rest takes part of
+        # that time.
         mapped.clock.sleep(velocity.settle_s - (STAYS_S if mapped.motion.state.axes else 0.0))
         mapped.come_to_rest()
 
@@ -175,7 +176,7 @@ def _tries_of(sender: _Sender) -> Iterator[Attempts]:
     if sender.mapped.binding.has_credentials:
         yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
     if sender.given.body is not None:
-        if not sender.is_form(away):  # nearly every text is a form
+        if not sender.is_form(away):  # almost any text is a valid form
             yield partial(sender.send_broken, away)
         yield partial(sender.vanish, away)
 

@@ -204,7 +204,7 @@ class SoapBinding:
         try:
             node = self._node(call, body)[2]
         except NoElementError:
-            return False  # no such message can be made
+            return False  # no such message can be made from the schema
         return node is not None and bool(self._messages.found.types.invalid(parse(node.written())))
 
 

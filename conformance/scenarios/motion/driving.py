@@ -11,10 +11,10 @@ from conformance.scenarios.motion.room import MEASURABLE, Span
 from conformance.scenarios.motion.trace import Reading
 from conformance.scenarios.scenario import NotPossibleError
 
-# Share of the limit at which the device drives back, and longest time for that, s.
+# _BACK_SHARE: share of the limit at which the device drives back. _BACK_S: longest time for that, s.
 _BACK_SHARE: Final = 0.4
 _BACK_S: Final = 20.0
-# Time in which a slow drive shows which axes it changes, s.
+# How long a slow drive lasts that shows which axes it changes, s.
 _LEARNED_S: Final = 0.5
 
 
@@ -47,7 +47,7 @@ def with_room(
         return [{name: from_here * speed for name, speed in one.items()} for one in choices]
     away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
     if away and mapped.motion.goto is not None:
-        # A drive that a slow link let run on may have taken another axis beyond its limits, where no move may lead.
+        # A drive prolonged by a slow link may have moved another axis beyond its limits, where no move may end.
         wanted = {**here, **{name: sum(span) / 2 for name, span in away.items()}}
         axes = mapped.motion.state.axes
         mapped.go("room for a drive", {name: axes[name].within(value) for name, value in wanted.items()})
@@ -69,7 +69,7 @@ def _learn(mapped: MappedDevice, name: str) -> None:
     room.unknown.discard(name)
     speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}
     mapped.bring_home()
-    mapped.come_to_rest()  # a device that has nearly arrived may take no velocity yet
+    mapped.come_to_rest()  # a device that has nearly arrived may not accept velocities yet
     command, seen = mapped.drive(speeds), list[Reading]()
     until = command.answered + drives.settle_s + _LEARNED_S
     while command.accepted and (mapped.clock.now() < until or len(seen) < SEVERAL):

@@ -30,15 +30,15 @@ from conformance.statement.motion_map import Goto, MotionMap, Stop, Switch, Velo
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, NotPermittedError, Outgoing
 
-#: How long a device that has arrived is watched, s.
+#: How long a device is watched after it has arrived, s.
 STAYS_S: Final = 0.3
 # Pause between two readings, s.
 _PACE_S: Final = 0.02
 # The deadline of a stop, s.
 _STOP_S: Final = 2.0
-# Time for which, and interval at which, a move is sent again while the device finishes the one before, s.
+# How long, and how often, a move is sent again while the device finishes the one before, s.
 _FINISHES_S, _AGAIN_S = 1.0, 0.05
-# Time in which a device without positions comes to rest, s.
+# How long a device without positions gets to come to rest, s.
 _RESTS_S: Final = 5.0
 
 Position = dict[str, float]
@@ -137,7 +137,7 @@ class MappedDevice:
             values |= positions_at(self.get(call)[1], own, state.axes)
         values = values if len(values) == len(state.axes) else {}
         received = self.clock.now()
-        # What turns goes on beyond a whole turn.
+        # An axis that turns continues beyond a whole turn.
         values = {name: state.axes[name].near(one, self._last.get(name, one)) for name, one in values.items()}
         self._last = values or self._last
         speeds = numbers_at(document, self.motion.speeds)
@@ -256,7 +256,7 @@ class MappedDevice:
             NoAnswerError: there is no response.
         """
         written = {**dict.fromkeys(self.drives.axes, 0.0), **speeds}
-        # What is no number, and is to be refused, is no velocity that is wanted.
+        # A text that must be refused is no commanded velocity.
         wanted = {name: float(one) for name, one in written.items() if isinstance(one, int | float)}
         if integers:
             written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
@@ -355,12 +355,13 @@ class MappedDevice:
         while True:
             seen += self.watch(self.due(command), partial(among, targets))
             if there := among(targets, seen):
-                # A move with a duration lasts for that, also on a short way. Who only passes a target has left it then.
+                # A move with a duration lasts for it, even over a short distance. A device that only passes its target
+                # has left it then.
                 seen += self.watch(max(self.clock.now() + STAYS_S, command.answered + self._lasts_s))
                 if among(there, seen):
                     return seen
             if self.clock.now() > self.due(command):
-                # One reading after its time decides nothing.
+                # A single reading after the end decides nothing.
                 return seen + [self.read() for _ in range(SEVERAL)]
 
     def due(self, command: Command) -> float:
@@ -417,7 +418,7 @@ class MappedDevice:
         if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
             return problem
         try:
-            # A stop that was not accepted is soon sent again.
+            # If a stop was not accepted, send it again soon.
             velocity = self.motion.velocity
             self.come_to_rest(stop=False, within_s=(velocity.settle_s if velocity else 0.0) if problem else None)
         except (NotPossibleError, NotPermittedError) as error:
@@ -447,7 +448,7 @@ class MappedDevice:
         until = self.clock.now() + (rests_s if within_s is None else within_s)
         while True:
             before = self.where()
-            # Positions show a slow motion in a while only, measured velocities in several readings.
+            # Positions show slow motion only over some time; measured velocities show it in several readings.
             seen = self.watch(self.clock.now() + STAYS_S, *(() if self.motion.state.axes else (self.saw_rest,)))
             stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
             if stays and not fastest(seen, self.motion):

@@ -22,22 +22,22 @@ _NEEDS: Final = (Need.REST, Need.MOTION)
 _Part = TypeVar("_Part")
 # Share of the way after which a device is stopped, or gets another target.
 _UNDER_WAY: Final = 0.3
-#: Tries in all of what a slow link or a loaded machine has spoilt.
+#: How often a measurement is tried that a slow link or a loaded machine has spoilt.
 TRIES: Final = 3
-# After a stop the device is watched for as long as the rest of its way would take: at least until so long after it
-# must rest, and at most so long in all, s.
+# After a stop, the device is watched for the time of its remaining way: at least _AT_LEAST_S after it must rest, at
+# most _AT_MOST_S, s.
 _AT_LEAST_S: Final = 1.5
 _AT_MOST_S: Final = 5.0
-# Time that is added to that of a displaced move, s.
+# _LONGER_S: time added to that of a displaced move, s. _COMMANDS: moves in a row.
 _LONGER_S: Final = 0.5
 _COMMANDS: Final = 100
-# A velocity with a longer hold time is not commanded only to be let go, s.
+# A velocity with a longer hold time is always ended by a stop, s.
 _SHORT_HOLD_S: Final = 2.0
-# The first move takes at most this multiple of the time that its finished part suggests.
+# Factor on the time of the first move, computed from its finished part.
 _SURELY: Final = 1.5
-# Tolerances in a way that is long enough to be stopped under way.
+# Length of a way that is long enough for a stop under way, in tolerances.
 _LONG: Final = 12
-# Shares of an axis's range by which forbidden targets lie beyond its limits.
+# How far beyond the limits forbidden targets lie, as shares of an axis's range.
 _BEYOND: Final = (0.05, 0.5)
 
 
@@ -66,7 +66,7 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
     chance = random.Random(f"{seed}/targets")  # noqa: S311 - no secret
     yield mapped.go("where the suite begins", {})
     if effort.name == "quick":
-        # One axis at its least and the next at its greatest, so that two that were taken for each other show.
+        # One axis at its least and the next at its greatest, so that exchanged axes show.
         for side in (0, 1):
             ends = {name: axis.limits[(number + side) % 2] for number, (name, axis) in enumerate(axes.items())}
             yield mapped.go("a limit of each axis" if side else "the other limit of each axis", ends)
@@ -139,7 +139,7 @@ def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
     if not mapped.rests or abs(end - start[name]) < _LONG * mapped.motion.tolerance(name):
         mapped.go("one end", {name: begin})
         start = mapped.where()
-    # The other axes stay where they are.
+    # The other axes stay in place.
     beside = {other: start[other] if axis.angle else axis.within(start[other]) for other, axis in axes.items()}
     command = mapped.goto({**beside, name: end})
     part = abs(end - start[name]) * share
@@ -165,7 +165,7 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
         part = _UNDER_WAY
         for _ in range(TRIES):
             leg = _stopped(mapped, name, part, rests_s)
-            # Each is judged: a stop that comes too late every second time shows in the one that was spoilt.
+            # Judge each try: if every second stop is late, the discarded try may be the late one.
             yield leg
             under_way = leg.was_under_way(name, mapped.motion.tolerance(name))
             if under_way and not leg.commands[1].was_late(leg.readings):
@@ -195,7 +195,7 @@ def _drive_before(mapped: MappedDevice) -> None:
         half = with_room(mapped, [{name: axis.limits[1] / 2}], velocity.hold_s + velocity.settle_s)
         last = mapped.drive(half[0])
         mapped.clock.sleep(last.answered + velocity.hold_s - mapped.clock.now())
-        mapped.come_to_rest(stop=False)  # velocity 0 would be the last one
+        mapped.come_to_rest(stop=False)  # velocity 0 would be the last command
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
@@ -231,7 +231,7 @@ def many_commands(mapped: MappedDevice, effort: Effort) -> Leg:
     """Send many targets in a row, without waiting for any of them."""
     need_positions(mapped)
     name, axis = next(iter(mapped.motion.state.axes.items()))
-    # The last one is far away, so that the device is seen to take it.
+    # The last target is far away, so that the device visibly moves to it.
     far = int(abs(axis.limits[1] - mapped.where()[name]) > abs(axis.limits[0] - mapped.where()[name]))
     ends = [axis.limits[(far + turn) % 2] for turn in reversed(range(effort.cases(_COMMANDS)))]
     return _in_a_row(mapped, f"{len(ends)} targets in a row", [{name: end} for end in ends])

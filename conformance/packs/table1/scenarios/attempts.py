@@ -26,15 +26,15 @@ from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange, Outgoing
 
-#: What a robot at rest shows that has a goal.
+#: Marks a goal in the list of things that a robot at rest must not have.
 GOAL: Final = "an active goal"
 # Speeds that no robot of this contract reaches, even without a declared limit, m/s and rad/s.
 _BEYOND_ANY: Final = 1e3
 _FARTHER: Final = (1e6, 1e308)
 _REACHED: Final = 0.1
-# A slow velocity in a direction without a drive, as a share of its range.
+# Slow velocity in a direction that the robot cannot drive in, as a share of its range.
 _SLOW: Final = 0.1
-# How long the robot must stay where it is after a cancelled goal, s; and how far away a goal is, m.
+# _STAYS_S: how long the robot must stay in place after a cancelled goal, s. _AWAY_M: distance of a goal, m.
 _STAYS_S: Final = 1.3
 _AWAY_M: Final = 1.0
 
@@ -159,7 +159,7 @@ def _beyond(robot: Robot) -> Iterator[Velocity]:
         least, greatest = robot.limits.range_of(component)
         for times in (1.001, 1.5) if robot.limit_declared(component) else ():
             for sign, limit in ((1, greatest), (-1, least)):
-                # A robot without a reverse gear does not drive back slowly either.
+                # A robot without a reverse gear must refuse a slow backward velocity too.
                 yield _only(component, times * (limit or sign * _SLOW * (greatest - least)))
         for size in (_BEYOND_ANY, *_FARTHER):
             yield from (_only(component, size), _only(component, -size))

@@ -29,14 +29,14 @@ from conformance.transport.exchange import Attempt, Exchange, Outgoing, Unanswer
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 
-# How often velocities are put of which the robot shows none.
+# _TRIES: how often velocities are sent again if the robot shows none of them. _CLIENTS: concurrent clients.
 _TRIES: Final = 3
 _CLIENTS: Final = 4
-# How long a goal is read after it was cancelled, s: each fifth time for longer.
+# How long a goal is read after its cancellation, s: _WATCHED_S, and each fifth time _WATCHED_LONGER_S.
 _WATCHED_S: Final = 0.03
 _WATCHED_LONGER_S: Final = 0.1
 _GOAL_STEP_S: Final = 0.02
-# Shares of the limits, ahead and turning: what mixes two clients' velocities is none of them.
+# By client: shares of the limits, ahead and turning. A mixture of two clients' velocities equals neither.
 _SHARES: Final = ((0.5, -0.5), (-0.5, 0.5)) * 2
 
 
@@ -50,7 +50,7 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
         attempts = _put_together(robot, GOAL_PATH, [body] * _CLIENTS)
         puts = tuple(one for one in attempts if isinstance(one, Exchange) and not is_busy(one))
         if all(HTTPStatus.BAD_REQUEST <= one.response.status < HTTPStatus.INTERNAL_SERVER_ERROR for one in puts):
-            continue  # a place that the robot refuses is refused to all
+            continue  # the robot refuses this place to every client
         goal, differs, read = await_goal(robot, body)
         if goal is None and arrived(robot, pose):
             trace.append(ConcurrentGoal(puts, None))
@@ -138,7 +138,7 @@ def concurrent_deliveries(api: RestInterface) -> tuple[tuple[bool, Exchange], ..
         return ()
     paths = [path_of(code, *_COORDINATES) for code in ("3", _NO_CODE)]
     require_valid(api.run.contract, "PUT", paths[0])
-    # What is done with each alone is for others to judge.
+    # Other checks judge each request alone.
     taken, refused = (api.client.send("PUT", path).response for path in paths)
     if not taken.ok or refused.ok:
         return ()

@@ -46,7 +46,7 @@ _STRANGER: Final = _of(COURIER, 140)
 _OTHER_MEDIA: Final = _of(COURIER, 150)
 _SLASH: Final = _of(COURIER, 160)
 _STRANGE: Final = "http://example.com/unknown"
-# The requests after refused ones, over either interface.
+# Deliveries after refused requests, over REST and over SOAP.
 _AFTER_REST: Final = _of(3, 90)
 _AFTER_SOAP: Final = _of(COURIER, 100)
 _AFTER_SOAP_COFFEE: Final = _of(COFFEE, 110)
@@ -165,7 +165,7 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
         return trace
     answer = api.client.send("PUT", _NO_FORMAT.rest_path, headers=(("Accept", "image/png"),), fresh=True)
     put_delivery(api, _LAST.rest_path, fresh=True)
-    # No robot may know the keys from an earlier run.
+    # Random keys, which no robot knows from an earlier run.
     first, second, third = (str(uuid.uuid4()) for _ in range(3))
     keyed = Keyed(_put(api, _TWICE, (first, first)), _put(api, _APART, (second, third)))
     wanted = (
@@ -178,7 +178,7 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
     )
     try:
         seen = [one.delivery for one in observer.collect(wanted)]
-        # A robot that makes a message too many sends it in the place of the last one here.
+        # A robot that published one message too many has pushed the last one out.
         lacking = keyed.accepted_apart - seen.count(_APART)
         seen += (one.delivery for one in (observer.collect(lacking) if lacking > 0 else ()))
     except (NoObserverError, ProbeError) as error:
@@ -194,7 +194,7 @@ def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
         invalid.append(rest.send("PUT", path_of(*values), fresh=True))
     after = [(_AFTER_REST, put_delivery(api, _AFTER_REST.rest_path, fresh=True))]
     by_method = []
-    # A method that the resource allows is the vendor's own, and may do anything (contract.md#http).
+    # A further method that the resource allows belongs to the vendor and may do anything (contract.md#http).
     own = rest.send("OPTIONS", _LAST.rest_path, fresh=True).response.header("Allow") or ""
     methods = [name for name in _OTHER_METHODS if name in SAFE_METHODS or name not in own]
     for number, method in enumerate(api.run.effort.alternatives(methods, 3)):

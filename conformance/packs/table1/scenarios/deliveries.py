@@ -21,10 +21,10 @@ from conformance.verdict.explorer import Explorer
 
 # Orders in a batch: they make at most half as many messages as a robot's list must hold (fifty).
 _ORDERS: Final = 12
-# Batches with lost or added deliveries after which no more are sent: each takes a long wait.
+# _ENOUGH: batches with lost or extra deliveries after which no more are sent, because each takes a long wait.
 _ENOUGH: Final = 3
 _KINDS: Final = ("same", "rest", "soap", "coffee")
-# Limits of doubles and integers, by place, so that values stay different from each other.
+# By kind: extreme doubles and integers, in an order that keeps the values of a delivery distinct.
 _CORNERS: Final = (
     ("twice", (3, 0.5, -0.0, 1.0, 5e-324, -5e-324, 2.2250738585072009e-308)),
     ("rest", (3, -0.0, -5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, -1.7976931348623157e308, 0.1)),
@@ -34,9 +34,9 @@ _CORNERS: Final = (
 _CLIENTS: Final = (("rest", COURIER), ("soap", COURIER), ("rest", COURIER), ("coffee", COFFEE)) * 2
 # Rounds of concurrent clients: a robot's list must hold all their messages.
 _ROUNDS: Final = 3
-# The styles that write a number in another way come first among the styles of a sender.
+# An XML sender's first styles write numbers in another way.
 _STYLES: Final = len(TEXTS)
-# Wait for late messages, s: at any effort, and at quick.
+# How long the suite waits for late messages, s: normally, and at quick.
 _LATER_S: Final = (2.0, 0.45)
 _NEEDS: Final = (Need.REST, Need.PUBLISHERS, Need.MOTION)
 
@@ -64,7 +64,7 @@ def deliveries(
             sender.send(orders)
 
     with partial_trace(sender.trace):
-        # A robot that reads only some of these digits still reads a number: it takes another delivery.
+        # A robot that reads only some of these digits accepts a delivery with another number.
         digits = (Delivery(COURIER, *(1234.5678 + 100 * n + place for place in range(6))) for n in range(_STYLES))
         send([_order("soap", delivery) for delivery in digits])
         send([_order(how, Delivery(*values)) for how, values in _CORNERS])
@@ -119,7 +119,7 @@ def _batches() -> st.SearchStrategy[list[Order]]:
         lexical_deliveries(),
         min_size=_ORDERS,
         max_size=_ORDERS,
-        # The code does not tell them apart: a coffee's is another one than was drawn. Nor does the sign of a zero.
+        # Code and the sign of a zero do not make deliveries different: a coffee has a code of its own.
         unique_by=lambda case: tuple(value + 0.0 for value in case[0][1:]),
     )
     kinds = st.permutations(_KINDS * (_ORDERS // len(_KINDS)))

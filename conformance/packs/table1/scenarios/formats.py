@@ -27,11 +27,11 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# Changes of one kind after which the first reading must be wrong to count.
+# After this many changes of one kind the first reading must be wrong to count.
 _CHANGES: Final = 3
 # Ids that some version of YAML reads as another type if they are not quoted.
 _LIKE_OTHER_TYPES: Final = ("123", "null", "true", "-1.5", "0x1F")
-# Tries: over a slow link, or if the robot arrives soon, a goal may be over when it is read.
+# How often a goal is tried: over a slow link, or if the robot arrives soon, it may end before it is read.
 _TRIES: Final = 3
 
 
@@ -66,11 +66,11 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
     """Read pose and velocity in all formats while the robot drives an arc, and at rest after it."""
     calls = [call for call in reads(api) if call.operation.template in {POSE, VELOCITY, LINEAR} and _others(call)]
     if effort.name == "quick" or not calls:
-        return ()  # the formats are compared at rest in any case
+        return ()  # formats are also compared at rest
     make_room(robot)
     drive = Drive(robot)
     compared: list[FormatsRead] = []
-    # What every first reading so far was out by, of each resource after each kind of change.
+    # By resource and kind of change: the differences that every first reading has had so far.
     suspects: dict[tuple[str, bool], Found] = {}
     for change, wanted in there_and_back(drive, _CHANGES):
         robot.clock.sleep(robot.sample_s if change else 0.0)
@@ -109,10 +109,10 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
         goal, differs, _ = await_goal(robot, body)
         if as_xml is not None and not (goal is None and arrived(robot, pose)):
             trace.append(FormatsRead(GOAL_PATH, call.operation.id, as_xml, differs, put=True))
-        # Where the goals before were out, this one gets the time that commands may take.
+        # If earlier goals showed a difference, wait as long as a command may take.
         robot.clock.sleep(robot.settle_s if suspects else 0.0)
         found, exchange = one_turn(api, call, _others(call))
-        # A format that shows another goal may learn of this one later, but it must show one goal.
+        # A format may learn of another goal later, but must show one whole goal.
         other_goal = {name for name, place in found if place == "goal_id.id"}
         odd = {key: one for key, one in found.items() if key[0] not in other_goal and not key[1].startswith("status.")}
         trace += [FormatsRead.of(call, one.exchange, one) for one in odd.values()]
@@ -153,7 +153,7 @@ def formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
     call = _reader(api, PLAN)
     here = robot.map_pose()
     if effort.name == "quick" or call is None or here is None:
-        return ()  # one plan is looked at in any case
+        return ()  # one plan is compared in any case
     goals = reachable(robot, here, max(1.0, robot.statement.motion.radius_m), 3)
 
     def ask() -> Iterator[Call]:

@@ -34,7 +34,7 @@ _KNOWN: Final = (
 # Ids that a robot confuses if it ignores case or compares only the first characters.
 _ALIKE: Final = ("goal", "Goal", "a" * 64 + "1", "a" * 64 + "2")
 _READINGS: Final = 3
-# One goal in this many is put just after the one before was cancelled, unless their ids are alike.
+# One goal in this many is sent just after the one before was cancelled, unless their ids are similar.
 _AFTER_DELETE: Final = 3
 
 
@@ -47,16 +47,16 @@ def goal_ids(robot: Robot, explore: Explorer) -> tuple[Put, ...]:
     def put(id_: str) -> None:
         last = puts[-1] if puts else None
         if last is not None and ((last.differs and not last.ended) or last.body["goal_id"]["id"] == id_):
-            return  # waiting for the right goal again and again shows no more; an id with another pose is a conflict
+            return  # repeating this for each case shows nothing more; an id with another pose is a conflict
         pose = next(goals)
         if len(puts) > len(_ALIKE) and len(puts) % _AFTER_DELETE == 0:
             robot.delete_goal()
         puts.append(put_new(robot, goal_body(pose, robot.statement.motion.frame, id_), pose))
         if puts[-1].exchange.response.status not in NEW:
-            raise RefutedError  # so that a simpler id is looked for with the same response
+            raise RefutedError  # so that Hypothesis looks for a simpler id with the same response
 
     with partial_trace(lambda: tuple(puts)):
-        # Also with little effort: as octets it is twice as long.
+        # Even at little effort: in UTF-8 the id is twice as long.
         explore(st.just("\u00e9" * _LONGEST), put, cases=1)
         for id_ in _ALIKE:
             explore(st.just(id_), put, cases=1)
@@ -80,7 +80,7 @@ def goal_poses(robot: Robot, explore: Explorer) -> tuple[GoalRead, ...]:
         pose = goals[which]._replace(x=goals[which].x + shift, yaw=yaw)
         body = goal_body(pose, robot.statement.motion.frame, f"pose {next(numbers)}", length=length)
         if is_refused(put_goal(robot, body)):
-            return  # what stands there need not be known to a planner of another tolerance
+            return  # a planner with another tolerance may not know the obstacle there
         goal, differs, read = await_goal(robot, body)
         for _ in range(_READINGS):
             if goal is None and arrived(robot, pose):

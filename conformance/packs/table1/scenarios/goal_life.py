@@ -27,7 +27,7 @@ from conformance.transport.exchange import Exchange
 
 ID: Final = "goal 1/\u00e9\u4e2d?&\"'<>\\ of the suite"
 _CANCELING: Final = 3
-# A look that takes longer lets a velocity end before it is read, s.
+# _LOOK_S: after a slower read, a velocity may end before it is read, s. _STEP_S: pause between two reads, s.
 _LOOK_S: Final = 0.1
 _STEP_S: Final = 0.02
 _TIMES: Final = 3
@@ -57,11 +57,11 @@ class _Player:
         self._no_goal()
         there, back = choose_goals(robot, 1.5, 2)
         frame = robot.statement.motion.frame
-        # With all that may be left out; the second goal leaves it out.
+        # With all optional members; the second goal leaves them out.
         first = goal_body(there, frame, ID)
         first["header"] = {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": frame}
         first["goal_id"]["stamp"] = {"sec": 56, "nanosec": 78}
-        # A velocity from before a goal is not taken up again when the goal is cancelled.
+        # An old velocity must not return when the goal is cancelled.
         robot.put_velocity(slow_turn(robot))
         put = put_new(robot, first, there)
         self.life = replace(self.life, first=put)
@@ -79,7 +79,7 @@ class _Player:
             self._contradict(first, goal_body(there._replace(yaw=there.yaw + _OTHER_RAD), frame, ID), there)
         self._velocity_meanwhile(first, there)
         if robot.goal()[0] is None:
-            put_goal(robot, first)  # a robot may end a goal when it takes a velocity
+            put_goal(robot, first)  # a velocity may have ended the goal, so send it again
         second = goal_body(back, frame)
         second["goal"]["target_pose"]["header"]["stamp"] = {"sec": 0, "nanosec": 0}
         self._displace(second, back)
@@ -143,7 +143,7 @@ class _Player:
             drive.commanded(slow, sent, exchange)
             drive.reach(slow, "rest-resources/velocity-goal")
         linear = robot.put(LINEAR, STILL.linear)
-        if not exchange.response.ok:  # else the robot may have ended the goal for it
+        if not exchange.response.ok:  # the robot may have ended the goal because of the request
             self._keeps(linear, body, there)
         self.life = replace(self.life, velocity=exchange, drive=drive.trace, linear=linear)
 
@@ -166,7 +166,7 @@ class _Player:
         took_s = self.robot.clock.now() - began
         renamed = None
         if second.exchange.response.status not in NEW | REPEATED:
-            # Is it the missing id that is refused, or another goal?
+            # Find out whether the robot refuses the missing id, or any other goal.
             named = put_goal(self.robot, body | {"goal_id": {"id": "another"}})
             renamed = named.response.status in NEW | REPEATED
         now_s = None if odometry is None else odometry.stamp
@@ -203,7 +203,7 @@ def cancel(robot: Robot) -> Cancelled:
     if exchange.response.status == HTTPStatus.NOT_FOUND:
         return Cancelled(exchange, exchange, gone=True, drive=drive.trace, late=late)
     goal, read = robot.goal()
-    # 202 says that it will be done; and status.code has a word for a goal that is being cancelled.
+    # 202 says that the goal will be cancelled; status.code has a value for that.
     accepted = exchange.response.status == HTTPStatus.ACCEPTED
     gone = goal is None or accepted or goal.get("status", {}).get("code") == _CANCELING
     if gone:
@@ -212,7 +212,7 @@ def cancel(robot: Robot) -> Cancelled:
     drive.reach(STILL, "safety/cancel", since=robot.arrived_by(exchange, answered))
     rests = [turn.velocity is None or robot.near(turn.velocity, STILL) for turn in drive.trace.turns]
     if all(rests) or not rests[-1]:
-        # It may yet begin what the goal had commanded, or be about to turn the other way: until it has had its time.
+        # Wait for the settle time: the robot may still begin what the goal had commanded, or turn the other way.
         robot.clock.sleep(answered + robot.settle_s - robot.clock.now())
     return Cancelled(exchange, read, gone, drive.trace, late)
 

@@ -27,22 +27,22 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
-# Wait for a robot that comes nearer, at 0.01 m/s and with obstacles on the way, s.
+# How long the suite waits for a robot that comes nearer, at 0.01 m/s and with obstacles, s.
 _LONGEST_S: Final = 120.0
-# Distance of a goal, m, or twice the tolerance, so that a goal given up on the way does not pass for reached.
+# Distance of a goal, m, or twice the tolerance: a goal given up on the way must not count as reached.
 _AWAY_M: Final = 0.6
-# Way that the robot must have made, where the goal is farther away than this plus the tolerance, m.
+# Distance that the robot must have covered, if the goal is farther away than this plus the tolerance, m.
 _MOVED_M: Final = 0.15
-# Difference between a goal's heading and the way there, rad, or twice the tolerance.
+# _TURN_RAD: difference between a goal's heading and the way there, rad, or twice the tolerance.
 _TURN_RAD: Final = 0.6
 _DETOUR: Final = 1.3
-# Another heading at the goal, rad.
+# _ASIDE_RAD: another heading at the goal, rad. _LOOKED_S: how long the robot is watched, s.
 _ASIDE_RAD: Final = 2.0
 _LOOKED_S: Final = 1.0
 _STEP_S: Final = 0.05
 _DISPLACED: Final = "displaced"
 _REACHED: Final = "reached"
-# Least progress of a position, m, and of a heading, rad.
+# Least progress: _NEARER_M of the position, m, and _TURNED_RAD of the heading, rad.
 _NEARER_M: Final = 0.02
 _TURNED_RAD: Final = 0.05
 
@@ -66,19 +66,19 @@ def _sent(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: i
     if effort.name != "quick":
         there = _turned(robot, here, there, random.Random(f"{seed}/heading"))  # noqa: S311 - no secret
     if subscribers is not None:
-        ask_over_soap(robot, subscribers, there)  # a plan that always starts where this one does is seen afterwards
+        ask_over_soap(robot, subscribers, there)  # to notice later a plan that always starts at this place
     before = _turning_before(robot, effort)
-    # Cancelled: a robot that has deliveries to make drops them, and does not begin with them between two drives.
+    # Cancelled, because a robot with waiting deliveries then drops them and does not start them between two drives.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, "cancelled"))
     robot.delete_goal()
-    # Displaced at once: it is not taken up again when the robot has arrived where it was sent last.
+    # Replace this goal at once; the robot must not return to it after it has arrived.
     put_goal(robot, goal_body(other, robot.statement.motion.frame, _DISPLACED))
     body, put = _put(robot, there)
     trace = GoalReached(put, there)
     if put.response.status not in NEW:
         return trace
     if subscribers is not None:
-        soap_services.ask(subscribers, "GetGoal")  # what is kept from now is seen when the goal has ended
+        soap_services.ask(subscribers, "GetGoal")  # to notice when the goal has ended that SOAP keeps this old goal
     way = _Way(robot, subscribers, Drive(robot), trace)
     with partial_trace(lambda: way.recorded):
         way.drive_to(there, here)
@@ -161,14 +161,14 @@ class _Way:
             drive.look()
             goal, exchange = robot.goal()
             if goal is None and exchange.response.status != HTTPStatus.NOT_FOUND:
-                # One answer that is neither the goal nor that there is none does not end it.
+                # A single response that is neither the goal nor "no goal" does not end the wait.
                 goal, exchange = robot.goal()
             if drive.trace.odometry:
                 here = robot.in_map(drive.trace.odometry[-1].pose)
             now = clock.now()
             if here.distance(there) < nearest - _NEARER_M or abs(wrapped(here.yaw - yaw)) > turned_rad:
                 progress, nearest, yaw = now, min(nearest, here.distance(there)), here.yaw
-            # A robot that delivers may go on with a delivery of another client's as soon as it has arrived.
+            # A robot that makes deliveries may start another client's as soon as it has arrived.
             other = goal is not None and goal["goal_id"]["id"] not in {_DISPLACED, _REACHED}
             if goal is None or other or now > progress + limits.goal_s or now > began + longest_s:
                 break
@@ -181,13 +181,13 @@ class _Way:
         if other:
             robot.delete_goal()
         elif not trace.arrived or start.distance(here) <= moved:
-            # It may yet be coming to rest. Then, as one sample may be wrong, those of a second say where the robot is.
+            # The robot may still be coming to rest. One sample may be wrong, so use those of a second.
             drive.keep(robot.settle_s)
             first = len(drive.trace.odometry)
             drive.keep(_LOOKED_S)
             here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[first:]] or [here])
             trace = _arrived(trace, here)
-        # Likewise where it was at first.
+        # The same for the place at the start.
         begins = (start, *(robot.in_map(one.pose) for one in driven.odometry[:1]))
         self.trace = replace(
             trace,
@@ -208,7 +208,7 @@ class _Way:
             return
         if before is not None:
             self._watch_for(before)
-        # Away from where it was at first: a plan that always starts there is seen now.
+        # Away from the start, so that a plan that always starts there is noticed now.
         arrived = robot.map_pose()
         _, plan, exchange = ask(robot, start)
         if plan is not None and arrived is not None:
@@ -237,7 +237,7 @@ class _Way:
         found = None
         if plan is not None and arrived is not None:
             found = start_of(robot, plan, arrived, asked, lambda: ask_over_soap(robot, subscribers, start)[0])
-        # Another client's goal may have come.
+        # Another client may have sent a goal.
         other = robot.goal()[0] is not None
         self.trace = replace(self.trace, start_over_soap=found, over_soap=None if other else (exchange, shown))
 
@@ -270,8 +270,8 @@ class _Way:
             return
         drive.keep(limits.settle_s)
         turns, seen = drive.sees(before.velocity)
-        # That it does not is no sign that a velocity ends by itself, for the goal has ended this one; and a robot that
-        # has a goal of its own may turn for that.
+        # The velocity need not end by itself here: the goal has ended it, and a robot with a goal of its own may turn
+        # for that.
         if turns and self.robot.goal()[0] is None:
             expected = "a velocity from before the goal that has ended for good"
             drive.saw("safety/watchdog", expected, f"the velocity ({seen})", "taken up after a goal", holds=False)

@@ -27,13 +27,13 @@ from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.effort import Effort
 
-# Changes of one kind after which the first reading must be wrong to count.
+# After this many changes of one kind the first reading must be wrong to count.
 _CHANGES: Final = 3
-# Comparisons of a state that stays as it is.
+# Comparisons of a state that does not change.
 _TIMES: Final = 4
 # Goals, each displacing the one before, whose first response must be wrong to count.
 _GOALS: Final = 3
-# Goals that are first read in one way: more than _GOALS.
+# Consecutive goals that are first read over one interface: more than _GOALS.
 _IN_A_ROW: Final = 4
 
 
@@ -43,12 +43,12 @@ def interfaces_in_motion(robot: Robot, subscribers: SoapService) -> tuple[StateR
     make_room(robot)
     drive = Drive(robot)
     reads: list[StateRead] = []
-    # What every first reading so far was out by, of each state after each kind of change; None: not read yet.
+    # By state and kind of change: the differences that every first reading has had so far; None: not read yet.
     suspects: dict[tuple[str, bool], StateRead | None] = {
         (name, moves): None for name in STATES for moves in (True, False)
     }
     for change, wanted in there_and_back(drive, _CHANGES):
-        # The first time as soon as may be; then when both interfaces must have heard of it.
+        # First without a pause, then after both interfaces must know the change.
         pause_s = robot.sample_s if change else 0.0
         lasted = drive.hold(wanted)
         drive.clock.sleep(pause_s)
@@ -74,16 +74,16 @@ def goals_over_soap(robot: Robot, subscribers: SoapService, effort: Effort) -> t
     """Read the active goal, or its absence, over both interfaces, after each of several goals and without one."""
     reads = _compare_goals(robot, subscribers)
     goals = choose_goals(robot, 1.5, 2)
-    # SOAP's first answers after the last goals that were out.
+    # SOAP's first responses after the last goals, if they were wrong.
     late: list[StateRead] = []
     for index in range(effort.cases(20)):
         pose = in_turn(goals, index)
         body = goal_body(pose, robot.statement.motion.frame, f"equal \u00e9 <&> {index}")
         put_goal(robot, body)
         await_goal(robot, body)
-        # Where SOAP's first answer was out after the goal before, it gets the time that commands may take.
+        # If SOAP's first response was wrong after the goal before, wait as long as a command may take.
         robot.clock.sleep(robot.settle_s if late else 0.0)
-        # Also just after the same goal was put again, which changes nothing.
+        # Also just after the same goal was sent again, which changes nothing.
         again = partial(put_goal, robot, body)
         first, second = (again, _nothing) if index // _IN_A_ROW % 2 else (_nothing, again)
         read = _read_goal(robot, subscribers, first)

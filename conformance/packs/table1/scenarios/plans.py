@@ -40,7 +40,7 @@ def plans_from_robot(robot: Robot, explore: Explorer) -> PlansFromRobot:
         before = robot.map_pose()
         problem, plan, exchange = ask(robot, goal, tolerance=tolerance_m)
         if not known and is_refused(exchange):
-            return  # something stands there
+            return  # an obstacle stands there
         start = None
         if plan is not None and before is not None:
             start = start_of(robot, plan, before, exchange, lambda: ask(robot, goal, tolerance=tolerance_m)[1])

@@ -40,13 +40,13 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
 _AFTER: Final = "requests that were refused before, sent again"
-# Times that a refused request must act: another client of the robot may order once.
+# How often a refused request must have an effect: a single order may be another client's.
 _TWICE: Final = 2
-# A robot that has moved less than this stood still, m and rad.
+# A robot that has moved less than _STOOD_M, m, and _STOOD_RAD, rad, stood still.
 _STOOD_M: Final = 0.01
 _STOOD_RAD: Final = 0.02
 _OTHER_RAD: Final = 1.0
-# Refusals that are sent again: a robot may end its goal at every third one.
+# Refused requests sent again: a faulty robot may end its goal at only every third one.
 _AGAIN: Final = 8
 # A quaternion whose length is off by more is refused (contract.md#poses).
 _NO_UNIT: Final = 2e-3
@@ -133,7 +133,7 @@ def refused_again(
         player.elsewhere()
         observer = player.observer(probe, senders)
         player.rest()
-        # What arrives is read after the drive: it needs a while, and no order may come of what is sent meanwhile.
+        # Deliveries are read after the drive, because reading takes a while and nothing sent here may be one.
         if observer is None:
             player.drive()
         else:
@@ -190,7 +190,7 @@ class _Player:
         chosen = self._chosen()
         rests: tuple[Case, ...] = (self._rest(chosen),) if chosen else ()
         if not all(rest.holds for rest in rests):
-            # Another client may have moved the robot.
+            # Another client may have moved the robot, so try it alone.
             rests = tuple(self._alone(chosen)) or (self._rest(chosen),)
         self.trace = replace(self.trace, rests=rests)
 
@@ -226,7 +226,7 @@ class _Player:
         """Return an observer of deliveries from now on, or None."""
         try:
             for sender in senders:
-                sender.watch(0.0)  # what arrived so far is the batches' own
+                sender.watch(0.0)  # messages so far belong to the batches
             observer = senders[0].observer if senders else observer_of(self.api, probe)
             if not senders:
                 observer.mark()
@@ -297,7 +297,7 @@ class _Player:
         pose, other = choose_goals(robot, 1.5, 2)
         put = put_new(robot, goal_body(pose, frame, "refused again"), pose)
         if put.exchange.response.status not in NEW or put.differs:
-            return  # that a valid goal is followed is for others to judge
+            return  # another check judges that a valid goal is followed
         active = goal_body(pose, frame, "the same pose, another goal")
         renamed = put_new(robot, active, pose)
         self.trace = replace(self.trace, renamed=renamed)
@@ -361,7 +361,7 @@ class _Player:
             if took > robot.settle_s:
                 robot.clock.sleep(took)
                 later = robot.odometry()
-                # A robot that stands still all the same may be hindered.
+                # A robot that still stands may be blocked.
                 return last if later is not None and _moved(end.pose, later.pose) else None
             for one in chosen:
                 one.send()

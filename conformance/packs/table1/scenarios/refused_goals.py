@@ -12,7 +12,8 @@ from conformance.packs.table1.robot.robot import Robot
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Need
 
-# Time in which a robot may search a way and try its recoveries before it ends the goal (contract.md#goals), s.
+# _GIVES_UP_S: time in which a robot may search a way and try its recoveries before it ends the goal
+# (contract.md#goals), s.
 _GIVES_UP_S: Final = 60.0
 _FAR: Final = (Pose(1e6, 1e6, 0.0), Pose(-1e6, 0.0, 1.0), Pose(1e300, -1e300, 0.0))
 _NOT_UNIT: Final = (0.0, 0.5, 0.99, 0.9975, 1.0025, 1.005, 1.009, 1.01, 2.0, 1e200)
@@ -53,7 +54,7 @@ class _Player:
             if unknown != frame:
                 put = self._put_invalid(goal_body(near, unknown), f"the unknown frame {unknown!r}")
                 self.goals = replace(self.goals, unknown_frames=(*self.goals.unknown_frames, put))
-        # All at once: where the robot stops responding on the way, the requirement on them has failed.
+        # All at once: if the robot stops responding meanwhile, their requirement has failed.
         self.goals = replace(self.goals, far=self._put_far(frame))
 
     def _put_invalid(self, body: dict[str, Any], special: str) -> SpecialGoal:

@@ -23,7 +23,7 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.effort import Effort
 
-# No other check sends a delivery with this coordinate.
+# _DEPOT_X: coordinate that no other check sends. _STEP_S: pause between two reads, s.
 _DEPOT_X: Final = 4711.125
 _STEP_S: Final = 0.02
 # Time after which a robot has read both of two successive requests, s.
@@ -74,7 +74,7 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
         answer = call_valid(service, delivery_messages.delivery(depot_x=repr(depot_x)), headers=(block,))
         if answer.code != "MustUnderstand":
             continue
-        # A valid delivery after it shows when the robot is through with both.
+        # A valid delivery afterwards shows when the robot has handled both.
         marker = depot_x + 0.5
         call_valid(service, delivery_messages.delivery(depot_x=repr(marker)))
         through = _until(partial(_listed, robot, marker), robot.patience(_LISTED_S), robot)
@@ -82,7 +82,7 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
     return Misunderstood(lists=True, answers=tuple(answers))
 
 
-# Without permission to move the robot, GetGoal is judged elsewhere, by whatever goal the robot has.
+# Without --allow-motion, GetGoal is judged by whatever goal the robot has.
 @scenario(needs={Need.SUBSCRIBERS})
 def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
     """PUT a goal over REST, record the last GetGoal and the id that it shows, and GetGoal after the goal.
@@ -112,7 +112,7 @@ def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
         reads.append((answer.exchange, shown))
         return shown == GOAL_ID
 
-    # A short goal may have ended before anybody could see it; then REST does not show it either.
+    # A short goal may have ended before it could be read; then REST does not show it either.
     known = _until(shows, robot.patience(robot.settle_s), robot) or robot.goal()[0] is not None
     bring_to_rest(api)
     return GoalBySoap(reads[-1], ask_goal().exchange) if known else GoalBySoap()

@@ -38,11 +38,11 @@ def _play(robot: Robot, drive: Drive, run: Run) -> None:
     drive.keep(0.2 if reached else 0.0)
     back = Velocity(linear_x=fastest(robot, AHEAD, -sign))
     if not any(back):
-        # It has no reverse gear: it stops where it is.
+        # a robot without a reverse gear stops where it is
         back = ahead
     elif reached := reach(drive, back):
         drive.keep(0.2)
-    # By each path that commands a velocity, there and back; at quick, the seed says by which.
+    # Forth and back with each path that commands a velocity; at quick, the seed chooses one.
     ways = [random.Random(f"{run.seed}/stop").choice(_WAYS)] if run.effort.name == "quick" else _WAYS  # noqa: S311
     for by in ways if reached else ():
         if by != ways[0]:

@@ -15,7 +15,7 @@ from conformance.scenarios.scenario import Scenario
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
-# Of the hold time: by so much longer a velocity may be seen.
+# Share of the hold time by which a velocity may hold longer.
 _LONGER: Final = 0.4
 
 

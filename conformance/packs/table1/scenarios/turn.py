@@ -30,26 +30,27 @@ from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
-# Of the hold time: so long after a command it is given again.
+# Share of the hold time after which a command is repeated.
 _AGAIN: Final = 0.25
-# Of the hold time: for so long requests that command nothing are sent, at its beginning and just before its end.
+# Share of the hold time in which requests that command nothing are sent, at its beginning and just before its end.
 _MEANWHILE: Final = 0.08
-# After the last velocity of longer runs, so long: a robot must not show what it showed before a pause, s.
+# Pause after the last velocity of longer runs, s: the robot must not return an older state then.
 _PAUSE_S: Final = 1.1
 # Multiple of the hold time for which a linear part is renewed.
 _RENEWED: Final = 1.4
-# How often it is measured how long a velocity holds beside requests that the robot takes although it had refused them.
+# How often the suite measures how long a velocity holds beside requests that the robot accepted after it had refused
+# them.
 _ATTEMPTS: Final = 3
 # Velocities beyond any limit, or in a direction without a drive.
 _BAD: Final = (Velocity(linear_x=-1e3), Velocity(linear_x=1e308, angular_z=-1e308), Velocity(angular_z=1e4))
-# Time in which a robot that drops its angular velocity shows it, s; tries of what could not be seen in time.
+# _SHOWS_S: time in which a robot that drops its angular velocity shows that, s. _TRIES: tries of a late observation.
 _SHOWS_S: Final = 0.2
 _TRIES: Final = 3
-# The only whole number of rad/s below the limits of most robots.
+# The only whole number of rad/s below most robots' limits.
 _WHOLE: Final = 1.0
 # Share of the limit at which the robot drives along an arc.
 _ASIDE: Final = 0.3
-# One look in this many also reads the state over SOAP, if a response takes less than this, s.
+# _BESIDE: one look in this many also reads the state over SOAP, if a response takes less than _QUICK_S, s.
 _BESIDE: Final = 4
 _QUICK_S: Final = 0.02
 _STATES: Final = ("GetPose", "GetVelocity")
@@ -104,14 +105,14 @@ class _Turning:
     paused: list[tuple[Turn, Turn]] = field(default_factory=list)
     over_soap: list[Exchange] = field(default_factory=list)
     fastest: Velocity = STILL  # the fastest turn to the left that the robot has reached
-    pause_s: float = 0.0  # for so long after a hold time the suite is silent at least
-    seen: int | None = None  # how many readings of the odometry there were before the first velocity that was let go
-    taken: Command | None = None  # a request that the robot has taken although it had refused it before
+    pause_s: float = 0.0  # least silence after a hold time, s
+    seen: int | None = None  # readings of the odometry before the first velocity without a stop
+    taken: Command | None = None  # a request that the robot accepted although it had refused it before
 
     @property
     def recorded(self) -> Driven:
         """Return the record so far."""
-        # What came after the first velocity that was let go is no way of one drive: the pose was read elsewhere.
+        # Poses after the first velocity without a stop belong to no single drive.
         whole, end = self.drive.whole, self.seen
         drive = replace(whole, odometry=whole.odometry[:end], measured=whole.measured[:end])
         recorded = Driven(drive, tuple(self.drives), tuple(self.paused))
@@ -128,7 +129,7 @@ class _Turning:
         drive.look()
         left = robot.only(ABOUT, _WHOLE if fastest(robot, ABOUT) > 1.1 * _WHOLE else 0.0)
         if not all(map(float.is_integer, left)):
-            left = STILL  # whoever turns in a circle drives by no whole number
+            left = STILL  # a robot that turns only in circles drives at no whole number
         if drive.command(left, integers=True):
             drive.reach(left, "rest-resources/velocity-integers", "rest-resources/velocity-converges")
         if left == STILL:
@@ -139,7 +140,7 @@ class _Turning:
             self._fast()
         bent = robot.drivable(Velocity(*(-part for part in left)))
         if robot.actuated(AHEAD) and robot.actuated(ABOUT):
-            # A small circle: either part has to end. The linear part is commanded last, and ends as well.
+            # A small circle: both parts have to end. The linear part is commanded last, and ends too.
             bent, before = along_arc(robot, bent, _ASIDE)
             _arc(robot, drive, bent, before)
             drive.stop(bent)
@@ -300,7 +301,7 @@ def _arc(robot: Robot, drive: Drive, bent: Velocity, before: Velocity) -> None:
         return
     for attempt in range(_TRIES):
         if attempt or robot.usual_s > _QUICK_S:
-            # Whether a PUT of the linear part renews the angular one too is the robot's affair: so again, and in time.
+            # A PUT of the linear part need not renew the angular one, so command both again in time.
             drive.refresh(bent)
         drive.command(back, linear=True)
         drive.keep(min(_SHOWS_S, drive.holds_until - drive.clock.now()))

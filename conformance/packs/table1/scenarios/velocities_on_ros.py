@@ -65,7 +65,7 @@ def _seen(robot: Robot, seeing: Probe, wanted: Velocity) -> tuple[Velocity, ...]
         seen += seeing.velocities()
         if any(robot.near(one, wanted) for one in seen):
             break
-        # What is smoothed on its way may end before it has come all the way.
+        # A robot that accelerates slowly may end a velocity before it has reached it.
         if robot.clock.now() > renew_at:
             robot.put_velocity(wanted)
             renew_at = robot.clock.now() + every_s

@@ -18,7 +18,7 @@ from conformance.verdict.run import Run
 def velocity_walk(robot: Robot, run: Run, soap: SoapServices, explore: Explorer) -> Driven:
     """Command velocities in random order, each after a request that commands nothing: the robot must reach the last."""
     make_room(robot, room_for(robot.limits))
-    # Zero is not a value that can be refused, however it is signed.
+    # A velocity of 0 cannot be refused, whatever its sign.
     zero = Drive(robot)
     zero.command(Velocity(-0.0, -0.0, -0.0, -0.0, -0.0, -0.0))
     preludes = no_commands(robot, soap, f"{run.seed}/velocities")

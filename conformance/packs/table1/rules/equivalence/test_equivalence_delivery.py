@@ -11,9 +11,9 @@ from conformance.packs.table1.scenarios.deliveries import deliveries, deliveries
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.verdict.evidence import Case
 
-# How a delivery was sent that must make two messages, and their interfaces.
+# By how a delivery was sent: the interfaces, if it must make two messages.
 _TWO: Final = {"same": ["rest", "soap"], "twice": ["rest", "rest"]}
-# The robot may have other clients: messages that the suite did not cause are a failure only in so many batches.
+# Batches with messages that the suite did not cause, before they count as a failure: the robot may have other clients.
 _OFTEN: Final = 2
 
 
@@ -46,7 +46,8 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
     """Judge that deliveries over one interface arrive in order; each interface may have its own ROS publisher."""
     for batch, _ in trace.judged():
         for interface in ("rest", "soap"):
-            # A delivery with two messages has no single place in the order, and one sent with others has none.
+            # A delivery with two messages has no single place in the order, nor has one that was sent at the same time
+            # as others.
             ordered = [one for one in _accepted(batch) if one.interface == interface and one.how not in _TWO]
             ordered = [one for one in ordered if one.how != "together"]
             wanted = [trace.key(one.delivery) for one in ordered]

@@ -51,7 +51,7 @@ def _beside(operation: str, shape: Shape, over_soap: Callable[[Any], Any], of: C
             while reads and reads[0].response.received_s < odometry.received:
                 exchange = reads.popleft()
                 value, problem = answered(exchange, shape)
-                # What is not of this shape is judged by those who compare all of it.
+                # A value with a wrong shape is judged where whole states are compared.
                 if not problem and not shape.problem(value):
                     beside.reading(over_soap(value), exchange, exchange.response.received_s)
             yield from beside.odometry(odometry.stamp, of(odometry), odometry.received)

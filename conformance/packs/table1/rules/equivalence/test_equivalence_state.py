@@ -30,16 +30,16 @@ pytestmark = pytest.mark.needs("rest", "subscribers")
 _SAME: Final = Slack(0.0, 0.0)
 # Larger than any tolerance that is requested here, m.
 _END_OFF: Final = 0.3
-# Comparisons at standard effort, which find a state that is wrong once in sixty responses: poses, and velocities, for
-# which at most this multiple is read.
+# Comparisons at standard effort, which find a state that is wrong once in sixty responses: _POSES, and _VELOCITIES, for
+# which at most the multiple below is read.
 _POSES: Final = 200
 _VELOCITIES: Final = 320
 _READ: Final = 4
-# States between two that are read over SOAP just after a refused request, and just after one that acts.
+# _TURNS: states read over SOAP just after a refused request, and just after one that acts.
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
-# Reads of each state over REST before and after; rounds of several clients; share of their responses that must differ.
-# Coarse noise of rare odometry may repeat before and after, but not that often.
+# _ALONE: reads of each state over REST before and after. _ROUNDS: rounds of several clients. Below: share of their
+# responses that must differ; noise may repeat a value, but not that often.
 _ALONE: Final = 4
 _ROUNDS: Final = 10
 _MOST: Final = 0.8
@@ -48,7 +48,7 @@ _REPEATS: Final = 3
 _Odd = dict[str, tuple[Exchange, Any, Any]]
 # Difference between the headings of plans, rad: small ones are among them.
 _STEP: Final = 0.07
-# How far ahead a plan in the odometry's frame leads, m.
+# How far ahead of the robot a plan in the odometry's frame ends, m.
 _AHEAD: Final = 0.3
 
 
@@ -68,7 +68,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
         for name in STATES if turn < effort.cases(50) else ("pose",):
             if (
                 evidence := judge.of(f"equivalence/{name}")
-            ) is None or not evidence.findings:  # it costs three tries each time
+            ) is None or not evidence.findings:  # a failure costs three tries each time
                 found = compare(robot, subscribers, name, first=partial(_event, robot, turn))
                 outcomes = (case for read in found for case in read.cases)
                 record(judge, f"equivalence/{name}", outcomes)
@@ -115,7 +115,7 @@ def _odd_at_one_moment(robot: Robot, subscribers: SoapService, name: str, effort
     for exchange in itertools.chain(*came):
         if isinstance(exchange, Exchange) and not is_busy(exchange):
             value, problem = answered(exchange, shape)
-            # Of a fault nobody knows whose it is; other problems are judged in any response.
+            # The fault may be of either interface; other problems are judged in any response.
             readings += [] if problem or shape.problem(value) else [(exchange, flattened(value))]
     odd: _Odd = {}
     for place, wanted in known.items():
@@ -130,7 +130,7 @@ def _odd_at_one_moment(robot: Robot, subscribers: SoapService, name: str, effort
 def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """Compare each velocity over SOAP with the odometry around it, to find intermittent faults; not at quick."""
     if effort.name == "quick":
-        return  # too few to notice it
+        return  # too few readings to notice a fault
     beside = BesideOdometry[Velocity](robot.limits)
     for _ in range(_READ * effort.cases(_VELOCITIES)):
         odometry = robot.odometry()
@@ -209,7 +209,7 @@ def _compare_plans(
     if not problem and unstamped(before) == unstamped(after):
         problem = disagreement(unstamped(before), unstamped(between), unstamped(after), _SAME)
     elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
-        # A planner may answer the same question in another way each time; then only what was asked for is the same.
+        # A planner may answer the same request differently each time; then only the goal must be the same.
         problem = "the end is another one"
     elif not problem and plan_of(between).frames != plan_of(after).frames:
         problem = f"the frame is {min(plan_of(between).frames)}"

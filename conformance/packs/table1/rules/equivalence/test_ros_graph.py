@@ -21,7 +21,7 @@ pytestmark = pytest.mark.needs("rest")
 _SENSOR_TYPES: Final = frozenset(
     f"sensor_msgs/msg/{name}" for name in ("LaserScan", "Imu", "Image", "PointCloud2", "Range", "NavSatFix")
 )
-# A probe discovers a publisher some time after it has joined, on a busy machine after seconds, s.
+# How long a probe may take to discover a publisher on a busy machine, s.
 _DISCOVERED_S: Final = 10.0
 
 

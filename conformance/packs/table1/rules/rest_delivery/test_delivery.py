@@ -97,7 +97,7 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
         values[place] = text
         exchange = rest.send("PUT", path_of(*values))
         status = exchange.response.status
-        # Without a number there is an empty segment, which a server may shorten by a redirect.
+        # An empty number leaves an empty path segment, which a server may remove by a redirect.
         shortened = not text and status in {301, 302, 307, 308}
         judge.check(
             f"rest-delivery/{name}",

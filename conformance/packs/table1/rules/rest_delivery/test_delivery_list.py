@@ -54,7 +54,7 @@ def test_list_of_many(api: RestInterface, rest: HttpClient, robot: Robot, judge:
     before, problem, _ = _read(rest)
     if problem:
         pytest.skip("the robot's list of deliveries cannot be read")
-    # A robot that takes its time is asked for fewer.
+    # A slow robot gets fewer deliveries.
     many = 5 if effort.slow else _LEAST + 5
     sent = [Delivery(3 + index % 2, 0.5, index + 0.25, -1.0, 1e300, 1e-300, index / 3) for index in range(many)]
     taken = [one for one in sent if put_delivery(api, one.rest_path, fresh=True).response.ok]

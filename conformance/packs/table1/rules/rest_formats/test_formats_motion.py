@@ -42,7 +42,7 @@ def text_quoted(trace: tuple[tuple[str, Exchange], ...]) -> Iterator[Outcome]:
         try:
             shown = by_itself(exchange.response.body)
         except UnreadableError:
-            shown = None  # which is judged where all formats are compared
+            shown = None  # judged where all formats are compared
         goal_id = shown.get("goal_id") if isinstance(shown, dict) else None
         found = goal_id.get("id", id_) if isinstance(goal_id, dict) else id_
         expected = f"the id {id_} in quotation marks, as ros2 topic echo prints it"

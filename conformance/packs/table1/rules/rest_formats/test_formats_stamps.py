@@ -24,7 +24,7 @@ def test_stamps_lie_between(api: RestInterface, judge: Judge) -> None:
         if pose is None or media_type not in pose.operation.formats:
             continue
         found = ""
-        # Once a clock may be set, or an answer be late.
+        # A single time, a clock may be set or a response late.
         for _ in range(_TURNS):
             exchanges = [pose.send(api, ("Accept", name)) for name in (JSON, media_type, JSON)]
             first, other, last = map(_stamp, exchanges)

@@ -10,7 +10,7 @@ from conformance.verdict.evidence import Judge
 # Late in a run: its stamps show more the longer the run has lasted.
 pytestmark = [pytest.mark.phase("acting"), pytest.mark.needs("rest")]
 _STEP_S = 0.1
-# Error that the clock may have; age that odometry may have; resolution of Date, s.
+# _OFF_S: error that the clock may have. _OLD_S: age that odometry may have. _UNIT_S: resolution of Date, s.
 _OFF_S, _OLD_S, _UNIT_S = 5.0, 1.0, 1.0
 
 
@@ -18,7 +18,7 @@ _OFF_S, _OLD_S, _UNIT_S = 5.0, 1.0, 1.0
 def test_clock(robot: Robot, judge: Judge, clock: Clock) -> None:
     """Check that the stamps advance as fast as local time."""
     for _ in poll_for(robot.clock, _STEP_S, SPAN_S + 1):
-        robot.odometry()  # which is kept when the last reading is a while ago
+        robot.odometry()  # the odometry is read again if the last reading is old
         if clock.rate is not None:
             break
     if clock.ahead_s is not None and robot.limits.time_scale == 1:

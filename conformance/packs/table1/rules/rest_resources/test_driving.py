@@ -18,11 +18,11 @@ from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# Of a tolerance: by so much the velocity of a robot at rest may be off; and by so much its pose, m and rad.
+# _OFF: tolerances by which the velocity of a robot at rest may be off. _PLACE_M: by how much its pose, m and rad.
 _OFF: Final = 1.5
 _PLACE_M: Final = 0.05
 _HEADING_RAD: Final = 0.1
-# For so long nothing is sent in a pause at least, s.
+# Least length of a pause without any request, s.
 _PAUSE_S: Final = 0.25
 
 velocity_put = shown("rest-resources/velocity-put", straight, velocity_walk)

@@ -22,7 +22,7 @@ def goal_put(trace: GoalReached) -> Iterator[Outcome]:
 def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
     """Judge that the robot drove, and to the target's position and heading."""
     if trace.there is None or trace.read is None or trace.undecided:
-        return  # refused, slow but on its way, or sent elsewhere by another client: nothing to be said against it
+        return  # refused, slow but on its way, or sent elsewhere by another client: no fault
     far, there = trace.way_m > trace.has_to_m, trace.left_m < trace.reached_m
     heading = "" if trace.reached_rad is None else f", with a heading within {trace.reached_rad:.2f} rad of its heading"
     turned = "" if trace.reached_rad is None else f" and {abs(trace.off_rad):.2f} rad off its heading"

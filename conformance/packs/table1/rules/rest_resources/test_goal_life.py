@@ -11,7 +11,7 @@ from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# How far the stamp of a goal may be from the odometry's, s; as far as the odometry's from Date (contract.md#poses).
+# How far a goal's stamp may be from the odometry's, s: as far as the odometry's from Date (contract.md#poses).
 _NOW_S = 5.0
 
 
@@ -97,7 +97,7 @@ def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that repeating a goal's PUT changes neither the goal nor its stamp."""
     for one in trace.repeated:
         accepted, changed = one.exchange.response.status in REPEATED, one.differs
-        # A robot that shows one stamp in two readings shows another one for another goal.
+        # If a goal's stamp stays the same between readings, it must differ from another goal's.
         stamps = trace.stamps if trace.first is not None and one.body == trace.first.body else ()
         if not changed and len(stamps) > 1 and stamps[0] == stamps[1] != one.shown["goal_id"]["stamp"]:
             changed = f"goal_id.stamp {one.shown['goal_id']['stamp']} for {stamps[0]}"
@@ -175,7 +175,7 @@ def velocity_goal(trace: GoalLife, run: Run) -> Iterator[Outcome]:
         yield Case(answer.response.status in {200, 204, 409}, answer, "200, 204 or 409 while a goal is active")
     if trace.linear is not None:
         expected = "200, 204 or 409 for a linear velocity while a goal is active"
-        # Who turns in circles alone cannot stand still beside the turn that navigation has just commanded.
+        # A robot that only turns in circles cannot add a linear velocity of 0 to the turn of its navigation.
         narrow = said_of(run).motion.min_radius_m is not None and trace.linear.response.status == 422
         yield Case(narrow or trace.linear.response.status in {200, 204, 409}, trace.linear, expected)
     if trace.drive is not None:

@@ -11,17 +11,17 @@ from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-# Wait for a robot whose odometry is slow, or that has just been started, s.
+# How long the suite waits for slow odometry, or for a robot that was just started, s.
 _PATIENCE_S = 5.0
-# Readings at standard effort, which find what is wrong once in sixty; a busy machine misses samples, so at most this
-# multiple is read.
+# _TURNS: readings at standard effort, which find a fault in one of sixty. _READ: at most this multiple, as a busy
+# machine misses samples.
 _TURNS = 250
 _READ = 4
-# Longer than the odometry has to be steady, and twice as long, s.
+# _STEADY_S: odometry must be steady for longer than this. _LONG_S: longest look, s.
 _STEADY_S = 0.4
 _LONG_S = 0.6
 _SAMPLE, _BESIDE = "rest-resources/pose-sample", "rest-resources/velocity-odometry"
-# Readings in a row without odometry after which there is none.
+# Consecutive readings without odometry after which it is missing.
 _UNREAD = 5
 
 
@@ -50,7 +50,7 @@ def test_pose(robot: Robot, judge: Judge, effort: Effort) -> None:
                 break
             robot.clock.sleep(0.02)
     if not stamps:
-        # What came instead has been judged, except for a robot that has no odometry for so long.
+        # Other responses were judged before; here, that a robot has no odometry for so long.
         judge.check("rest-resources/pose-type", False, robot.get(POSE), f"a readable odometry within {_PATIENCE_S:g} s")
         return
     judge.check(
@@ -88,7 +88,7 @@ def test_single_readings(robot: Robot, judge: Judge, effort: Effort) -> None:
 )
 def test_velocity_and_odometry(robot: Robot, judge: Judge, effort: Effort) -> None:
     """Read velocity, linear velocity and odometry: they must agree; the checkers judge each response."""
-    # Two readings agree where the odometry has been steady for a while: so look for that long at least.
+    # Two readings agree only where odometry has been steady, so look for that long at least.
     drive = Drive(robot)
     hold_s = robot.limits.hold_s
     alone = hold_s is not None and hold_s < _LONG_S  # no drive of such a robot is steady for so long

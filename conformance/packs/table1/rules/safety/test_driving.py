@@ -25,17 +25,17 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# Time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests. Usual response times
-# that are added for the network.
+# _ANSWERED_S: time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests. _USUAL:
+# usual response times added for the network.
 _ANSWERED_S: Final = 1.0
 _USUAL: Final = 4
 # Late responses that are the robot's fault.
 _LATE_RESPONSES: Final = 2
-# Of a tolerance: by so much a velocity that holds may be off.
+# Tolerances by which a held velocity may be off.
 _OFF: Final = 1.5
 
 
-# Zero velocity stops the robot before its watchdog would.
+# A velocity of 0 stops the robot before its watchdog does.
 stop = shown("safety/stop", straight, turn, further_axes, velocity_walk)
 limits_hold = shown("safety/limits-hold", straight, turn, further_axes, velocity_walk)
 refused_keeps = shown("safety/refused-keeps", velocity_walk)

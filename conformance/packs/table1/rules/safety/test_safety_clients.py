@@ -12,7 +12,7 @@ from conformance.transport.raw import PartialRequest
 from conformance.verdict.evidence import Judge
 
 pytestmark = pytest.mark.needs("rest")
-# Usual response time that is assumed at least, s: scheduling on a busy machine is no failure.
+# Least usual response time to assume, s: scheduling on a busy machine is no failure.
 _USUAL_S: Final = 1.0
 # Tries: a network may delay one response, but a robot that waits for other requests never responds to the third.
 _TRIES: Final = 3
@@ -47,8 +47,8 @@ def _send(client: HttpClient, path: str, patience_s: float) -> Attempt:
 
 
 def _send_once(client: HttpClient, path: str, patience_s: float) -> Attempt:
-    # A new client, because a hang here says nothing of later requests; a new connection, because one that is open
-    # already might be served by its own thread.
+    # A new client, because a hang here says nothing about later requests. A new connection, because an open one may be
+    # served by its own thread.
     with closing(HttpClient(client.base_url, client.connection)) as other:
         try:
             return other.send("GET", path, fresh=True, timeout_s=patience_s)

@@ -136,7 +136,7 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
 def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     """Send codes other than 3 and 4: the robot must reject them."""
     if publishers.contract.target_namespace != delivery_messages.NAMESPACE:
-        # The requirement on faults is one of every contract; these codes are not.
+        # The requirement on faults belongs to every contract; these fault codes do not.
         return
     codes = ("5", "0", "2", "-4", "1", "7", "44", "2147483647", "-2147483648", "34", "-3", "100")
     for code in codes[: effort.cases(len(codes))]:
@@ -171,5 +171,5 @@ def test_answers_do_not_cross(publishers: SoapService, judge: Judge, effort: Eff
             if isinstance(attempt, Exchange) and not is_busy(attempt):
                 answer = read_exchange(attempt)
                 own = answer.payload == clark(delivery_messages.NAMESPACE, f"{operation}Response")
-                if answer.accepted:  # whose a fault is does not show
+                if answer.accepted:  # it does not show which interface is at fault
                     judge_answer(judge, "soap-delivery/concurrent-answers", own, answer, f"the answer to {operation}")

@@ -23,7 +23,7 @@ _VALUES = {
     "GetPose": ("pose.position.x", "pose.orientation.w", "twist.linear.x"),
     "GetVelocity": ("linear.x", "angular.z"),
 }
-# How long odometry may be late before the robot counts as having none, and how often it is read meanwhile, s.
+# _MOST_STALE_S: how long odometry may be late before it counts as missing. _AGAIN_S: pause between reads meanwhile, s.
 _MOST_STALE_S = 2.0
 _AGAIN_S = 0.2
 
@@ -119,7 +119,7 @@ def test_subscribers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             ("GetGoal", {}),
             ("GetPlan", plan or {"x": 0.0, "y": 0.0}),
         ):
-            # Where odometry is late for a moment, SOAP responds with a fault, as REST responds with 503.
+            # If odometry is late for a moment, SOAP responds with a fault, as REST does with 503.
             for _ in poll_for(WALL_CLOCK, _AGAIN_S, _MOST_STALE_S if operation in _VALUES else 0.0):
                 result, problem, exchange = client.call(operation, **arguments)
                 if not problem.startswith("fault"):

@@ -23,7 +23,7 @@ _ENDED = frozenset({"4", "5"})
 def misunderstood_has_no_effect(trace: Misunderstood) -> Iterator[Outcome]:
     """Judge that a delivery that gets a MustUnderstand fault does not appear in the list of deliveries."""
     if not trace.lists:
-        # That the robot answers nothing but the fault is judged elsewhere.
+        # Another check judges a robot that responds only with faults.
         yield Note("the robot lists no deliveries, so what it does could not be seen")
     if any(listed is None for _, listed in trace.answers):
         yield Note("what the robot does could not be seen: it lists no valid delivery")

@@ -22,9 +22,9 @@ from conformance.verdict.evidence import Judge
 pytestmark = [pytest.mark.phase("resting"), pytest.mark.needs("subscribers")]
 _PLAN = "soap-subscribers/plan"
 _TOLERANCE = 0.25
-# Refusals after which a path must be wrong, and right otherwise, to count as their effect.
+# Refusals after which a plan is wrong, and otherwise right, before the refusals count as the reason.
 _REFUSALS = 3
-# Frames of these names are asked for one after another.
+# _MARKS: names of frames that are requested one after another. _LONG: a long name.
 _MARKS = ("first-frame", "second-frame")
 _LONG = "no_such_frame<&>\u00e9_" * 6
 
@@ -59,7 +59,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         return
     answer: SoapResponse | None = None
     for number, target in enumerate(_targets(soap, here)):
-        # Frame and tolerance may be left out: then they are map and 0.1 (contract, REST).
+        # Frame and tolerance may be left out; the defaults are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
         before = _here(soap, subscribers) or here
         request = delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
@@ -70,7 +70,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         planned += 1
         path, problem = _told(answer)
         if path:
-            # Where it ends, and in which frame, is judged of every plan.
+            # The end and frame of every plan are judged elsewhere.
             off_m = path[0].distance(before)
             problem = f"it starts {off_m:.3f} m from the robot" if off_m > START_OFF + before.distance(after) else ""
         judge.check(_PLAN, not problem, answer.exchange, "a path from the robot to the asked pose", found=problem)
@@ -106,7 +106,7 @@ def _after_refusals(subscribers: SoapService, judge: Judge, request: Node) -> No
 @pytest.mark.requirement("soap-subscribers/plan-none")
 def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> None:
     """Request plans far outside any map and in an unknown frame: the response must be a fault."""
-    # Where the robot is, so that nothing but the frame can be the reason.
+    # Plan to the robot's own place, so that only the frame can be the reason for a refusal.
     here = _here(soap, subscribers) or Pose(0.0, 0.0, 0.0)
     for message, what in (
         (delivery_messages.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
@@ -119,11 +119,11 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
             f"a frame with a name of {len(_LONG)} characters, with markup and beyond ASCII",
         ),
     ):
-        # A response of another request, in the place of this one's, is then no fault.
+        # Another client's fault in place of this response would then be noticed.
         call_valid(subscribers, delivery_messages.request("GetVelocity"))
         answer = call_valid(subscribers, message)
         path, _ = _told(answer)
-        # A robot in an open world may know a way to anywhere; then it has to end there.
+        # A robot in an open world may have a plan to anywhere; then the plan has to end there.
         arrives = bool(path) and path[-1].distance(Pose(1e7, -1e7, 0.0)) < 1
         judge_answer(
             judge, "soap-subscribers/plan-none", answer.fault is not None or arrives, answer, f"a fault for {what}"

@@ -91,7 +91,7 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
         for operation, attempt in zip(asked, came, strict=True):
             if isinstance(attempt, Exchange) and not is_busy(attempt):
                 answer = read_exchange(attempt)
-                if answer.accepted:  # whose a fault is does not show
+                if answer.accepted:  # it does not show which interface is at fault
                     own = answer.payload == clark(NAMESPACE, f"{operation}Response")
                     judge_answer(judge, _OWN, own, answer, f"the answer to {operation}")
                 if answer.succeeded and alone.get(operation):

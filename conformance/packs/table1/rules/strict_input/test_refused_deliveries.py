@@ -33,7 +33,7 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
         yield Case(one.delivery not in seen or accepted, one.exchange, expected, "a message", one.method)
     yield from _without_effect(trace, lambda _: True)
     unknown = [one for one in seen if one not in trace.known]
-    # The robot may have other clients: a single delivery that resembles none of the suite's may be theirs.
+    # A single delivery that resembles none of the suite's may be another client's.
     found = [one for one in unknown if _resembles(one)] or (unknown if len(unknown) > 1 else [])
     accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
     observed = f"{len(found)} messages, among them {found[0]}" if found else ""
