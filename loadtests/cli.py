@@ -88,10 +88,10 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
     earlier = {number: signal.signal(number, forward) for number in ending_signals()}
     try:
         if child.stdin is not None:
-            with suppress(BrokenPipeError):  # it was ended before it read them
+            with suppress(BrokenPipeError):  # the worker ended before it read them
                 child.stdin.write(f"{written}\n{settings.to_json()}")
                 child.stdin.close()
-        # Of two signals at once, a thread of a library may take both: then they do not interrupt a wait without an end.
+        # If two signals come at once, a library's thread may take both, and they would not interrupt an endless wait.
         while child.poll() is None:
             with suppress(subprocess.TimeoutExpired):
                 child.wait(_LOOKS_S)
@@ -103,7 +103,7 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
         click.echo(f"roaas load: the process that measures was ended by {signal.Signals(-code).name}", err=True)
         code = ExitCode.INTERRUPTED if -code in earlier else ExitCode.INCONCLUSIVE
     path = Path(written.read_text(encoding="utf-8")) if written.exists() else None
-    if code == ExitCode.FAILED and path is None:  # Python's own, such as that of a module that cannot be loaded
+    if code == ExitCode.FAILED and path is None:  # Python's own exit code, such as for a module that cannot be loaded
         code = ExitCode.INCONCLUSIVE
     return CommandResult(code, path)
 

@@ -38,7 +38,7 @@ def read_octets(path: Path, most: int = MOST_BYTES, root: Path | None = None, *,
     try:
         if root is not None and not path.resolve().is_relative_to(root.resolve()):
             raise ResultUnreadableError(f"{path}: it is a link to a file outside {root}")
-        # An opener, as a descriptor of its own stays open where it is no file that can be read.
+        # An opener, because a descriptor opened before would leak if the path is no readable file.
         with open(path, "rb", opener=lambda name, _: os.open(name, _READING)) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ResultUnreadableError(f"{path}: it is no regular file")

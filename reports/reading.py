@@ -67,7 +67,7 @@ def _read(path: Path, expected: str) -> dict[str, Any]:
     found = document.get("format")
     if found != expected:
         raise ResultFormatError(f"{path}: at $.format: expected {expected!r}, found {_shown(found)}")
-    # The quick one takes no lone surrogate, which JSON may hold.
+    # msgspec accepts no lone surrogate, which JSON may contain.
     with suppress(UnicodeEncodeError):
         if _quick_validator(expected).is_valid(document):
             return document

@@ -19,15 +19,15 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import REFUSALS, Survey, Surveyor
 from conformance.transport.exchange import Exchange, Outgoing
 
-#: No content has this entity tag.
+#: An entity tag that no content has.
 NO_TAG: Final = '"roaas-nothing-has-this-tag"'
-# Values of an id that are tried; queries of one operation; queries of all at quick.
+# _TRIED: values of an id that are tried. _QUERIES: queries of one operation. _AT_QUICK: of all at quick.
 _TRIED, _QUERIES, _AT_QUICK = 3, 3, 8
 # Refusals before each read at standard effort; at quick two.
 _REFUSALS: Final = 8
 # Reads of each operation: with the timed reads at the end, one wrong response in twenty is found.
 _READS: Final = 20 - TIMED_AGAIN
-# Octets of a content from which parts are requested.
+# _LONG: bytes that content needs before parts of it are requested.
 _LONG: Final = 8
 _PARTS: Final = ((("Range", "bytes=2-5"),), (("Range", "bytes=-4"),), (("Range", "bytes=0-3"), ("If-Range", NO_TAG)))
 # Usual response time below which operations are read more often, ms.

@@ -33,9 +33,9 @@ from conformance.verdict.time_limit import TimeIsOverError
 _MOST: Final = 2000
 # Things that are read at the end: by then even a slow device has created or removed them.
 _MOST_THINGS, _REMEMBERED = 40, 400
-# A device may act this much later, s: a little longer than the checkers wait.
+# A device may carry out a request this long after its response, s: slightly longer than the checkers wait.
 _SETTLES_S: Final = 3.2
-# Things that are deleted at the end.
+# _MOST_DELETED: things that are deleted at the end.
 _MOST_DELETED: Final = 10
 _DONE: Final = frozenset({200, 204})
 _ERRORS: Final = range(400, 500)
@@ -126,7 +126,7 @@ class OtherExchanges(Listener):
             return ""
         sent = Outgoing(request.method, context.target, request.headers, request.body)
         said = validity(contract, sent.method, sent.target, sent.content_type, sent.body)
-        # Whatever a request refers to, it is no reason to fail.
+        # A request that refers to a missing thing is no reason to crash.
         crashed = isinstance(attempt, Exchange) and attempt.response.status in CRASHES
         invents = not crashed and self._api.values is not None and self._api.values.invents(operation, sent)
         return operation.label if said.verdict == VALID and not invents else ""
@@ -174,7 +174,7 @@ def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
         own = {path: one for path, one in sent.items() if things[path][0] and path not in wrong}
         deleted = _deleted(api, own)
         wrong |= _wrong(deleted, _read(api, deleted))
-        # A device may take a while, but not for ever.
+        # A device may carry out a request late, but not never.
         if wrong:
             until = max(when for _, when in wrong.values()) + _SETTLES_S
             time.sleep(max(0.0, until - time.monotonic()))

@@ -22,7 +22,7 @@ CONFLICT: Final = 409
 #: The device demands a condition, or the condition in the request does not hold.
 WANTS_CONDITION: Final = frozenset({412, 428})
 _IF_MATCH: Final = "if-match"
-# So many refused operations are looked at.
+# _AROUND: refused operations that are tried. _QUIET: exceptions that are ignored.
 _AROUND: Final = 2
 _QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)
 

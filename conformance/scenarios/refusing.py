@@ -18,9 +18,9 @@ from conformance.transport.exchange import Exchange
 _TEXT: Final = "text/plain"
 #: A media type that no device has.
 NO_FORMAT: Final = "application/x.roaas-nothing"
-# Distance between the turns of a series of requests.
+# Distance between the numbers from which a series of requests is made.
 _STEP: Final = 10
-# Texts that no client but the suite writes, as `another` makes them.
+# Texts that only the suite writes, as `another` makes them.
 _OURS: Final = re.compile(r"(?:roaas |r)\d+")
 
 

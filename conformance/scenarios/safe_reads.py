@@ -33,13 +33,13 @@ from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 
-# Rounds after the first in which a change must show; resources that are watched.
+# _ROUNDS: rounds after the first in which a change must show. _WATCHED: resources that are watched.
 _ROUNDS, _WATCHED = 3, 12
 # Shortest and longest time that resources are left alone, s.
 _LEAST_S, _MOST_S = 0.3, 5.0
-# The turn of the values that are written first.
+# Number from which the values that are written first are made.
 _TURN: Final = 41
-# Safe requests that are sent one by one, to find the one that acts.
+# Safe requests that are sent singly, to find the one with an effect.
 _SINGLE: Final = 150
 
 
@@ -90,7 +90,7 @@ def safe_reads(api: RestInterface, values: Values) -> tuple[Watched, ...]:
     """Read what clients write before and after all safe requests, and again without them where it has changed."""
     watch = _Watch(Writer(api, values))
     api.run.limit.check()
-    with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+    with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
         found = watch.play()
         if found:
             return tuple(found)
@@ -141,11 +141,11 @@ class _Watch:
         """Return what became of each resource."""
         try:
             self.resources = [one for one in self.resources if self._settled(one)]
-            # What a safe request undoes it may have undone long ago: something is written just before them.
+            # An earlier safe request may already have undone a change, so write something just before them.
             for one in self.resources:
                 self._changed(one)
             found = dict[str, Watched]()
-            # What GET toggles, HEAD may toggle back.
+            # HEAD may undo what GET changed, so each method is tried apart.
             for methods in (("GET",), ("HEAD", "OPTIONS")):
                 began = time.monotonic()
                 self._send(self._safe(methods))
@@ -236,7 +236,7 @@ class _Watch:
                 break
             time.sleep(took)
             if self._wrong(one):
-                break  # it changes without any request as well
+                break  # the resource changes without any request too
             self._send(self._safe(methods))
             if not (wrong := self._wrong(one)):
                 break

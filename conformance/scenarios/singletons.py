@@ -21,7 +21,7 @@ from conformance.scenarios.living import Life
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# Words in the names of members by which a client may lose the device.
+# Words in names of members that could make the device unreachable.
 _CONNECTING: Final = frozenset(
     {
         "address", "addresses", "host", "hostname", "ip", "ipv", "port", "ports", "ssid", "wlan", "baud", "baudrate",
@@ -30,7 +30,7 @@ _CONNECTING: Final = frozenset(
         "server", "broker", "protocol", "firewall", "url", "uri", "endpoint",
     }
 )  # fmt: skip
-# Words in the paths of resources that keep what is written; others may show what the device does.
+# Words in paths of resources that store what is written; others may show what the device does.
 _KEEPING: Final = frozenset(
     {
         "settings",
@@ -46,12 +46,13 @@ _KEEPING: Final = frozenset(
     }
 )
 _MOST_VALUES, _MOST_ITEMS = 5, 10
-# Added to numbers that need not be whole, so that they have a fraction.
+# Added to numbers that may have a fraction.
 _PART: Final = 0.375
-# Members of one resource that are written at quick and at other efforts; resources.
+# Members of one resource that are written: _FEW_MEMBERS at quick, _MEMBERS otherwise. _RESOURCES: resources.
 _FEW_MEMBERS, _MEMBERS, _RESOURCES = 4, 30, 6
 _ACCEPTED: Final = 202
-# Multiple of an exploration's time that one resource may take; other values of an object that are tried.
+# _BUDGETS: multiple of an exploration's time that one resource may take. _TURNS: other values of an object that are
+# tried.
 _BUDGETS, _TURNS = 2, 3
 
 
@@ -65,7 +66,7 @@ def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) 
         if not is_free(write, path) or len(lives) >= _RESOURCES:
             continue
         writer.api.run.limit.check()
-        with writer.api.run.limit.lifted(), suppress(NoAnswerError):  # the survey tells what breaks a connection
+        with writer.api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
             if writes := _written(writer, read, write):
                 lives.append(Life("", read.label, writes[0].sent, writes[0].found, writes=tuple(writes)))
     return lives
@@ -116,7 +117,7 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
             whole = done(values, then)
             is_told = bool(whole and whole[-1].other)
             if len(values) > 1 and (is_told or not whole):
-                # Members may depend on each other.
+                # Members may depend on each other, so a whole body is written too.
                 wrong = _lost(writer, read, write, whole[-1]) if whole else dict.fromkeys(values, True)
                 names = [name for name in values if wrong.get(name)][:few]
                 again = [one for name in names for one in done({name: values[name]}, then)]
@@ -124,7 +125,7 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
             first_time += whole or again
     finally:
         restored = _write(writer, read, write, first, last) if chosen else []
-    # What never reads as written when it is written first may show what the device does.
+    # A member that never reads as written may show what the device does.
     is_keeping = bool(words_of(read.template) & _KEEPING)
     shown = {
         name

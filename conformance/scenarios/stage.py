@@ -36,9 +36,9 @@ STAGES: Final = tuple(Stage)
 class Leaves(StrEnum):
     """The state in which a scenario leaves the device."""
 
-    UNTOUCHED = "untouched"  # it was only read
+    UNTOUCHED = "untouched"  # the scenario only read it
     AT_REST = "at rest"
-    MOVING = "moving"  # or about to move: whatever needs rest has to stop it first
+    MOVING = "moving"  # the device moves or is about to: a scenario that needs rest has to stop it first
 
 
 class Need(StrEnum):

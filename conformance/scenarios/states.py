@@ -17,13 +17,14 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.state_map import StateMap
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# Interval of reads of the state; time that a reached state, and a state after a refusal, is watched, s.
+# _PACE_S: pause between reads of the state, s. _STAYS_S: how long a reached state, or one after a refusal, is watched,
+# s.
 _PACE_S: Final = 0.03
 _STAYS_S: Final = 0.3
 _KEEPS_S: Final = 0.1
 # Tries of an operation that comes too late for a state that changes by itself.
 _TRIES: Final = 3
-# Operations that are sent for each pair of operation and state: some only lead to another state.
+# Most operations to send on the way to each pair of operation and state.
 _WAYS: Final = 4
 
 
@@ -80,7 +81,7 @@ class _Walker:
         self._api, self._map, self._clock = api, states, clock
         self._binding: Binding = binding_of(api)
         self._tried: Counter[tuple[str, str]] = Counter()
-        # Where each operation led from a state, as the map says or as it was seen; "": nowhere.
+        # By state and operation: the state that followed, by the map or as observed; "": none.
         self._led: dict[tuple[str, str], str] = {}
         self.steps: list[Step] = []
         self.first = self.here = self._read()
@@ -103,7 +104,7 @@ class _Walker:
         """Return the operation to send now, "" to wait for a change; None: nothing is left that can be reached."""
         untried = [name for name in self._map.operations if not self._is_done(name, self.here)]
         refused = [name for name in untried if not self._map.operations[name].is_taken_in(self.here)]
-        # What leaves the state comes last.
+        # Operations that leave the state come last.
         stays = [name for name in untried if name not in refused and not self._map.operations[name].to]
         if found := [*refused, *stays, *untried]:
             return found[0]

@@ -19,7 +19,7 @@ from conformance.scenarios.scenario import Recording, Recordings, Scenario
 
 TRACES_NAME = "traces.json.gz"
 _FAST = 1
-# Octets of the traces of a run: a hundred times what a long one writes.
+# Bytes of a run's traces: a hundred times what a long run writes.
 _MOST = 256 * 1024 * 1024
 
 

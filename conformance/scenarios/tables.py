@@ -31,13 +31,13 @@ from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 
 _CSV: Final = "text/csv"
-# A table may round numbers that JSON shows in full.
+# _NEAR: how much a table may round numbers that JSON shows in full.
 _NEAR: Final = {"rel_tol": 0.01, "abs_tol": 0.01}
 _LARGEST: Final = 1 << 20
-# Things with quoted texts that are created; texts of a description that say what separates values.
+# _CREATED: things with quoted texts that are created. _COMMAS: phrases in a description that name the separator.
 _CREATED: Final = 2
 _COMMAS: Final = re.compile(r"RFC\s*4180|\bcommas?\b|`\w+(?:,\s?\w+)+`", re.IGNORECASE)
-# A table may shorten a text, or keep programs from reading it as a formula.
+# First characters of a text that a table may change, so that no program runs it as a formula.
 _FORMULA: Final = ("=", "+", "-", "@", "\t")
 
 
@@ -67,7 +67,7 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
     with _quoted_texts(api, values, operations if reads else {}):
         for read in reads:
             api.run.limit.check()
-            with suppress(NoAnswerError):  # the survey tells what breaks a connection
+            with suppress(NoAnswerError):  # the survey reports a broken connection
                 for compare in (_compared, _chosen):
                     first = compare(api, values, read)
                     again = compare(api, values, read) if first is not None and first.fault else first

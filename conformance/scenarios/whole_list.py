@@ -23,7 +23,7 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 _PAGES: Final = 5
 _LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
-# Servers with an undeclared limit have a multiple of the first, at least the second.
+# A server with an undeclared limit returns a multiple of _ROUND items, at least _FEWEST.
 _ROUND, _FEWEST = 5, 10
 
 
@@ -128,7 +128,7 @@ def read_items(writer: Writer) -> None:
         if method != "GET" or lister is None or len(item.parameter("path")) > 1:
             continue
         writer.api.run.limit.check()
-        with suppress(NoAnswerError):  # the survey tells what breaks a connection
+        with suppress(NoAnswerError):  # the survey reports a broken connection
             page = page_of(writer.send(lister).response, lister)
             ids = [identified(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
             ids = [one for one in ids if one is not None]

@@ -19,13 +19,13 @@ from conformance.documents.representation import flat
 from conformance.observe.clock import Patience
 from conformance.transport.exchange import Exchange, Outgoing
 
-# Time in which a device may write later, and pause between reads, s.
+# _SETTLES_S: how much later than its response a device may write, s. _PAUSE_S: pause between reads, s.
 _SETTLES_S: Final = 3.0
 _PAUSE_S: Final = 0.2
-# A value that differs in the last this many reads is still changing, as a moving valve does.
+# _LAST: a value that differs in this many last reads is still changing, as a moving valve does.
 _LAST: Final = 5
 _ACCEPTED: Final = 202
-# Statuses by which a device demands a condition, or says that the one in the request does not hold.
+# Statuses by which a device demands a condition, or says that the request's condition does not hold.
 _WANTS_CONDITION: Final = frozenset({412, 428})
 _Read = TypeVar("_Read")
 

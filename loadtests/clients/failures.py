@@ -21,7 +21,7 @@ class CallError(Exception):
     """
 
     def __init__(self, kind: str, message: str, refused: int = 0) -> None:
-        # Here already, because Locust's web UI shows it to a network.
+        # Mask it here, because Locust's web UI shows it to the network.
         super().__init__(SECRETS.masked(message))
         self.kind, self.refused = kind, refused
 
@@ -32,7 +32,7 @@ UNREACHABLE = frozenset({"refused", "resolve", "network", "tls"})
 _FAULT_STRING = re.compile(rb"<(?:[\w.-]+:)?(?:faultstring|Text)\b[^>]*>\s*(.*?)\s*</", re.DOTALL)  # SOAP 1.1, 1.2
 _FAULT = re.compile(rb"<(?:[\w.-]+:)?Fault[\s>/]")
 _SHOWN = 160
-# By these a robot refuses a request because of who sends it, or because another client has the lease.
+# Statuses by which a robot refuses the sender of a request, or because another client has the lease.
 _REFUSALS = frozenset({401, 403, 407, 423, 428})
 # Plain integers: every request is compared with them, and members of HTTPStatus compare more slowly.
 _OK = int(HTTPStatus.OK)
@@ -140,7 +140,7 @@ class Declared:
             CallError: the status is not declared as a success, or its body has another media type.
         """
         if (status, content_type) in self._seen and (body or content_type is None):
-            return  # what was good once need not be read again: this is done for every request
+            return  # a form that was valid once need not be parsed again: this runs for every request
         media_types = next((types for one, types in self.responses if one == status), None)
         if media_types is None:
             raise self._undeclared(status, location, body)

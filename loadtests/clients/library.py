@@ -24,11 +24,11 @@ from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.clients.wsdl import loader
 
-# A longer response is no response to any operation, packed or unpacked; more cookies are a flood.
+# _MOST: longest response, compressed or not, bytes. _COOKIES: most cookies.
 _MOST: Final = 16 * 1024 * 1024
 _COOKIES: Final = 100
 _PIECE: Final = 65_536
-#: Begins the message of each error that a longer response raises.
+#: Beginning of each error message for a response that is too long.
 TOO_LONG: Final = f"the response is longer than {_MOST} bytes"
 
 

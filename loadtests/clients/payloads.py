@@ -13,10 +13,9 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, COURIER, EXAM
 from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.wire import Request
 
-#: The ways to a robot that are compared: the two of its web services, and rosbridge beside them.
+#: Interfaces that are compared: the two web services, and rosbridge.
 INTERFACES = REST, SOAP, ROSBRIDGE = "rest", "soap", "rosbridge"
-#: Who sends: bytes made beforehand, or the library that people use. It is called after that for SOAP; over REST it is
-#: requests.
+#: WIRE sends bytes made beforehand. LIBRARY sends by the library that people use: zeep for SOAP, requests for REST.
 CLIENTS = WIRE, LIBRARY = "wire", "zeep"
 VARIANTS = 64
 NAMESPACE = "http://soap.turtlebot.mybot.org/"

@@ -234,7 +234,7 @@ class Robot:
         described = self._described(interface, operation)
         if described is not None:
             return described.requests(self.fixed, VARIANTS)
-        if interface == "rosbridge":  # its own values: it must not take another interface's delivery for its echo
+        if interface == "rosbridge":  # values of its own: one interface must not take another's delivery for its echo
             return [*bridge_requests(variants(operation, seed + 1), self.delivery_topic)]
         endpoint = Endpoint.parse(address)
         return [BUILDERS[interface](endpoint, operation, values, self.token) for values in variants(operation, seed)]

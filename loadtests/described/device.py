@@ -34,13 +34,13 @@ from loadtests.settings.settings import SettingsError
 if TYPE_CHECKING:
     from conformance.scenarios.described_messages import DescribedMessages
 
-#: Options, by their names in Python, that a device with a description alone has.
+#: Options that only a device with a description has, by their Python names.
 DESCRIBED_ONLY = (
     "openapi", "wsdl", "schemas", "overlays", "base_url", "allow_files", "allow", "never", "basic_file", "digest_file",
     "username_token_file", "api_key", "api_key_file", "headers_file", "client_cert_file", "client_key_file",
     "client_key_passphrase_file", "streams", "stamp_field", "clock_field", "scenario", "operators",
 )  # fmt: skip
-#: The credentials in options, by their names in Python.
+#: Options with credentials, by their Python names.
 CREDENTIALS = (
     "token_file", "basic_file", "digest_file", "username_token_file", "api_key", "api_key_file", "headers_file",
 )  # fmt: skip
@@ -161,7 +161,7 @@ class Device:
         connection.permit, connection.endless = permission.refusal, True
         api = RestInterface(run, HttpClient(run.statement.endpoints.rest or "", connection))
         permission.may_call_ports(api.client.base_url)
-        operations_of(run.contract)  # kept from now on
+        operations_of(run.contract)  # the result is cached from now on
         return cls(api, remarks, DescribedMessages.of(api))
 
     def beside(self, wsdl: str, schemas: Path | None = None) -> Self:

@@ -18,11 +18,11 @@ from loadtests.settings.settings import Scenario, SettingsError
 from loadtests.statistics.recorder import MOST_OPERATIONS
 
 _WEIGHTED = re.compile(r"(?P<name>.*?)(?:=(?P<weight>[1-9]\d{0,2}|1000))?", re.DOTALL)
-#: Each operation gets its share of the requests: of more, none would have enough.
+#: MOST: operations of a run; with more, each would get too few requests. _SHOWN: operations that a message names.
 MOST = 16
 _SHOWN = 12
 _LONGEST = 300
-#: What a scenario decides by itself, or what needs requests at set times; by name in Python, with the value by default.
+#: Options that a scenario excludes, by their Python names, with their defaults.
 _OTHERWISE = {
     "operations": (), "rate": None, "stages": (), "arrivals": "constant", "knee": False, "against": None,
     "restart_command": None,

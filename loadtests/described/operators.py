@@ -40,10 +40,10 @@ from loadtests.statistics.histogram import Histogram
 
 _ROUNDS: Final = 6  # of each number of operators
 _SHARE: Final = 0.5  # of the greatest velocity
-_DRIVES_S: Final = 0.3  # beyond the time to reach it
-_READS_S: Final = 0.05  # each of the others reads so often, or as often as a limit on the rate allows
+_DRIVES_S: Final = 0.3  # seconds beyond the time to reach the velocity
+_READS_S: Final = 0.05  # seconds between two reads of each other operator, or longer with a limit on the rate
 _RESTS_S: Final = 5.0  # a device that moves for longer after a stop is not waited for
-_STILL: Final = 0.1  # of the tolerance: so far from its last position a device still moves
+_STILL: Final = 0.1  # tolerances from its last position beyond which a device still moves
 
 
 @dataclass
@@ -149,7 +149,7 @@ def _note(mapped: MappedDevice, stops: Stops, stop: Command, after: Sequence[Rea
     stops.answer_s.append(stop.answered - stop.sent)
     stops.rest_s.append((begin + end) / 2 - stop.sent)
     stops.error_s.append((end - begin) / 2)
-    # Whoever measures may be late as well: what counts is a reading that was asked for after the time was over.
+    # The measuring client may be late too, so a reading counts if it was requested after the time was over.
     stops.late += last is not None and last.sent - stop.answered > rests_s
 
 

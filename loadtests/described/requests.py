@@ -25,7 +25,7 @@ from loadtests.clients.robot import Described, Robot
 from loadtests.described.device import Device
 from loadtests.settings.settings import SettingsError
 
-#: Messages of an acting operation that are tried until the device accepts one.
+#: _TRIED: messages of an operation that changes something, tried until the device accepts one.
 _TRIED = 4
 _STREAM = "its response does not end, as that of a stream"
 _FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)

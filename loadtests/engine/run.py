@@ -241,7 +241,7 @@ def _begin(run: Run) -> Path | None:
     """Write a result that remains if this process is killed; return its path, or None if it cannot be written."""
     unfinished = RunAborted(ExitCode.INCONCLUSIVE, "the run has not ended: it is under way, or it was killed")
     _, document = compose(run.outcome, run.plan, unfinished)
-    with suppress(OSError):  # told in the end
+    with suppress(OSError):  # reported at the end
         return write(Path(run.settings.output.folder), document | {"interrupted": True})
     return None
 
@@ -284,7 +284,7 @@ def carry_out(settings: Settings, begun: Callable[[Path], object] = lambda _: No
     else:
         try:
             run.progress.say(f"written: {(path := write(folder, document))}")
-        except OSError as error:  # what was measured is printed below
+        except OSError as error:  # the measurement is printed below
             code = ExitCode.INCONCLUSIVE
             _complain(run, f"{folder}: cannot write there: {error.strerror or error}")
     if aborted is None:

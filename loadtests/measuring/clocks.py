@@ -21,7 +21,7 @@ from jsonpath import JSONPointer
 
 from loadtests.statistics.streams import Offset
 
-#: Numbers from these on are Unix time in nanoseconds, microseconds and milliseconds: as seconds they lie after 5000.
+#: Unix time from these numbers on is in nanoseconds, microseconds and milliseconds: as seconds it would lie after 5000.
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))
 _FLOAT_S = 1e-6  # what a 64-bit number can tell of today's Unix time, and what Python's `datetime` can
 
@@ -162,7 +162,7 @@ class Clocks:
         del environment
         readings = self._asked.get(msg.node_id)
         if readings is None:
-            return  # too late: the reading has been taken without it
+            return  # too late: the reading is complete without it
         readings.append(Reading.of(msg.data["sent"], msg.data["worker"], received))
         if len(readings) < EXCHANGES:
             self._ask(msg.node_id)

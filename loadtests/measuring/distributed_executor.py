@@ -124,7 +124,7 @@ class DistributedExecutor:
         self.runner.start(plan.connections, spawn_rate=plan.connections)
 
     def _wait(self, reached: Callable[[], bool], what: str) -> None:
-        # Workers of other machines are started by hand; once all are there, nobody can join.
+        # Workers of other machines are started by hand; when all have come, no more may join.
         by_hand = self._expected > self._processes and not self._dealt_out
         deadline = time.monotonic() + (10 * _READY_S if by_hand else _READY_S)
         while not reached():
@@ -186,7 +186,7 @@ class DistributedExecutor:
         del environment
         self._on_report(msg.node_id, msg.data)
         member = self._by_client.get(msg.node_id)
-        if member is not None:  # a worker that was given up and reports all the same is not lost
+        if member is not None:  # a worker that was given up may still report: its report counts
             member.state, member.done, member.lost_at_s, member.share = "finished", True, None, None
 
     def run(self, plan: Plan, ceiling: float | None, watch: Callable[[float], bool]) -> None:
@@ -266,5 +266,5 @@ class DistributedExecutor:
                 child.wait()
 
 
-#: Who carries plans out, one after the other.
+#: Runs plans one after the other.
 Executor = LocalExecutor | DistributedExecutor

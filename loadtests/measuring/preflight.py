@@ -15,7 +15,7 @@ from loadtests.clients.wire import Answer, now_ns
 from loadtests.measuring.equivalence import deliveries_missing, pose_difference, requests_difference, values_difference
 from loadtests.schedule.plan import QUICK_ANSWER_S, SeriesName
 
-# A read that took longer than a quick robot's, but less than so many times as long, may have been slow by chance.
+# A slow first read, up to _BY_CHANCE times a quick robot's time, may be chance: read _READS times.
 _READS, _BY_CHANCE = 3, 10
 
 

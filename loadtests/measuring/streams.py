@@ -213,7 +213,7 @@ def _hear_messages(robot: Robot, stream: Stream, one: Heard, pointer: JSONPointe
     protocol, endpoint = ClientProtocol(parse_uri(where), max_size=_MOST_BYTES), bridge_endpoint(where)
     messages = _Messages(protocol, lambda message: one.take(message, pointer), topic)
     handshake = protocol.connect()
-    if _same_host(robot, stream):  # no other host gets them
+    if _same_host(robot, stream):  # secrets are sent only to the robot's host
         for name, value in robot.fixed.fields("GET", handshake.path):
             handshake.headers[name] = value
     protocol.send_request(handshake)

@@ -28,7 +28,8 @@ def write(folder: Path, result: dict[str, Any]) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     taken: Counter[str] = Counter()
     for series in result["series"]:
-        name = _NO_NAME.sub("_", series["operation"]).strip("_")  # GET /axes/{id} is no name of a file
+        # an operation such as GET /axes/{id} is no valid file name
+        name = _NO_NAME.sub("_", series["operation"]).strip("_")
         stem = f"{name}-{series['interface']}-{series['client']}"
         taken[stem] += 1
         stem += f"-{taken[stem]}" if taken[stem] > 1 else ""

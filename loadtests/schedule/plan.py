@@ -67,13 +67,14 @@ BOTH = "both"
 #: The highest rate for each worker at which the library clients take part: a call costs some 1.5 ms of the
 #: generator's time, and a generator that is busy for more than a fraction of it measures itself.
 LIBRARY_RATE = 250.0
-#: The least length of a block: of a robot that answers within QUICK_ANSWER_S to arrivals on time, and otherwise.
+#: Least length of a block: SHORT_BLOCK_S if the robot responds within QUICK_ANSWER_S and arrivals are on time, else
+#: BLOCK_S.
 SHORT_BLOCK_S, BLOCK_S = 0.02, 0.1
 QUICK_ANSWER_S = 0.01
 _MAX_BLOCKS = 1200  # bounds memory: each block keeps its own histograms
 _ARRIVALS_PER_BLOCK = 4  # of each operation
-_TURNS, _LIBRARY_TURN = 5, 1  # of five rounds the second
-_AA_TURNS = {1: (2, 4), 2: (4,)}  # the third and the fifth; the fifth alone where two robots meet
+_TURNS, _LIBRARY_TURN = 5, 1  # the second of five rounds goes to the library clients
+_AA_TURNS = {1: (2, 4), 2: (4,)}  # the third and fifth of five rounds are A/A controls; with two robots, only the fifth
 _NS = 1_000_000_000
 #: Names a series of the result: (operation, interface, client).
 SeriesName = tuple[str, str, str]
@@ -344,7 +345,7 @@ def step_operation(operations: tuple[str, ...]) -> int:
     return reads[0] if reads else 0
 
 
-#: At most so many turns for each operation are waited for in a block: a rare operation is not called in every block.
+#: In a block, wait for at most so many turns of each operation: a rare operation is not called in every block.
 _MOST_TURNS = 4
 
 

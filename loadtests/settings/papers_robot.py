@@ -70,7 +70,7 @@ def _check_endpoints(endpoints: Endpoints) -> None:
             if address:
                 Endpoint.parse(address)
         for location in descriptions:
-            if location and "://" in location:  # else it is a file
+            if location and "://" in location:  # otherwise it is a file
                 Endpoint.parse(location)
         if endpoints.ca_file:
             tls_context(Path(endpoints.ca_file))

@@ -24,7 +24,7 @@ from loadtests.statistics.figures import named, plain_quantiles, rounded_interva
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Measured, Side
 
-#: The median decides. A p99 that is surely slower counts as well; one without a clear verdict does not.
+#: DECIDING decides. A p99 that is certainly slower counts too; one without a clear verdict does not.
 DECIDING = "p50"
 JUDGED = (DECIDING, "p99")
 _SHOWN = ("mean", "p50", "p90", "p99")
@@ -108,7 +108,7 @@ def against(
     changes = []
     for name in names:
         for quantile in _SHOWN:
-            # The other robot comes first: the ratio is this robot's time over the other's.
+            # The other robot comes first, so that the ratio is this robot's time over the other's.
             fields = compared(measured, Side("against", name), Side("duel", name), quantile)
             change = Change(**named(name), **fields)
             if quantile in JUDGED:

@@ -13,7 +13,7 @@ from loadtests.statistics.figures import Series
 from loadtests.statistics.overload import Overload
 from loadtests.statistics.service_levels import BROKEN, NOT_KNOWN
 
-_ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations: as they were named
+_ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations stay in the order of the options
 _TAIL = "p99"
 _TENTHS_MS = 10
 _AGAINST = {

@@ -32,8 +32,8 @@ LEAST_ROUNDS = 6
 _AT_ONCE = 100  # resamples held in memory together
 _TAIL = 0.025
 _UPPER_TAIL = 0.99
-#: On the logarithmic scale: an interval wider than a factor of 1e13 says no more than one of that width, and its bounds
-#: would become zero and infinite.
+#: Limit on the logarithmic scale: an interval wider than a factor of 1e13 says nothing more, and its bounds would
+#: become 0 and infinite.
 _FARTHEST = 30.0
 
 

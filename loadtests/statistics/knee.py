@@ -25,12 +25,12 @@ from loadtests.statistics.recorder import Recorder
 _MOST_P99_MS = 50.0
 _MOST_ERRORS = 0.01
 _LEAST_ACHIEVED = 0.95
-#: From this share of a core on, the generator may be what limits the rate.
+#: From this share of a core on, the generator may limit the rate.
 BUSY = 0.9
 RESOLUTION = 1.08  # a bracket whose ends differ by no more is narrow enough
 _GROWTH = 2.0
 _NEAR = 1.5  # the next search begins this far from an earlier one's bracket
-#: The end of a bracket needs a second rate, higher by no more than this factor, that missed too.
+#: A second rate, higher by at most this factor, must miss too before a bracket's end counts.
 _CONFIRMED = 1.25
 _MISSES, _MOST_TRIALS = 2, 5  # of one rate: misses in which the generator was on time; trials in all
 
@@ -97,7 +97,7 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
     asked = arrivals_due(plan, plan.length_s, phase="step")
     blocks = list(measured.blocks(name, "step"))
     whole = measured.total(name, "step")
-    # Until its first responses come, even a robot that keeps up has answered nothing.
+    # Before its first response is due, even a robot that keeps up has answered nothing.
     first_s = (blocks[0].cell.response.quantile_ms(0.5) or 0.0) / 1e3 if blocks else 0.0
     seconds = max(plan.length_s - first_s, plan.length_s / 10)
     achieved, offered = recorder.in_time[plan.first_segment] / seconds, asked / plan.length_s

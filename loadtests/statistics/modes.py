@@ -17,7 +17,7 @@ from loadtests.statistics.measured import Measured
 _FEWEST, _POINTS = 100, 2000
 _SIGNIFICANCE = 0.01
 _RESAMPLED = 200
-# Silverman's test sees a mode in a single slow request: the tails are not part of it.
+# _TAIL: share of values at each end that is ignored, because Silverman's test takes a single slow request for a mode.
 _TAIL = 0.01
 _CELLS = 512
 _BINS = 60
@@ -65,13 +65,13 @@ def _p_of_one_mode(logs: Floats) -> float:
         rises = np.diff(gaussian_filter1d(counts, kernel / cell, truncate=6.0)) > 0
         return int(np.count_nonzero(rises[:-1] & ~rises[1:])) <= 1
 
-    # A width of the values merges all modes; half a cell none.
+    # Bounds of the search: a kernel as wide as all values merges the modes, one of half a cell merges none.
     narrow, kernel = cell / 2, width
     while kernel > 1.01 * narrow:
         between = float(np.sqrt(narrow * kernel))
         narrow, kernel = (narrow, between) if is_one(logs, between) else (between, kernel)
     random = np.random.default_rng(0)
-    # What the kernel adds to the spread is taken out again.
+    # Remove the spread that the kernel adds.
     shrunk = 1 / np.sqrt(1 + (kernel / spread) ** 2)
     several = 0
     for _ in range(_RESAMPLED):

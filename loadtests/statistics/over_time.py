@@ -17,10 +17,10 @@ from loadtests.statistics.rounds import lag_correlation, widening
 _NS = 1_000_000_000
 _PHASES = ("duel", "aa")
 WIDTH_S = 1.0
-#: Parts of a run whose medians a slope goes through. With more of them, neighbours would correlate.
+#: A run is cut into so many parts, and a slope is fitted to their medians. Shorter parts would correlate.
 _PARTS = 20
-#: A change over the run of less than this share of the median is not worth a sentence, nor one that comes and goes:
-#: each of so many longer parts has to be slower than the one before (or quicker), as a busy machine makes none.
+#: _WORTH: a smaller change of the median over the run is not reported. _STEADY: each of so many longer parts must be
+#: slower than the one before (or quicker), because a busy machine makes changes that come and go.
 _WORTH, _STEADY = 0.2, 5
 
 

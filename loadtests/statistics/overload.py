@@ -14,9 +14,9 @@ from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import Histogram
 from loadtests.statistics.measured import Block, Measured
 
-#: A robot that answers less than this share of what it is asked is overloaded.
+#: A robot that answers less than this share of the requests is overloaded.
 LEAST_ANSWERED = 0.95
-#: All connections are busy from a block on if in this share of the blocks from there requests waited for one.
+#: All connections count as busy from a block on if requests waited for one in this share of the later blocks.
 _MOSTLY = 0.9
 
 
@@ -87,7 +87,7 @@ def _busy_from_s(blocks: Iterable[Block]) -> float | None:
     return found
 
 
-#: A robot counts as dead where no request has succeeded for seconds, although many were sent.
+#: A robot counts as dead if no request has succeeded for _DEAD_S, although _DEAD_REQUESTS were sent.
 _DEAD_S = 3.0
 _DEAD_REQUESTS = 10
 _LOOK_S = 0.5
@@ -103,7 +103,7 @@ class Liveness:
     def __init__(self, report_s: float) -> None:
         self._silence_s = _DEAD_S + report_s
         self._looked_s = 0.0
-        self._alive = (0.0, 0, 0)  # when something had last succeeded; successes and failures until then
+        self._alive = (0.0, 0, 0)  # time of the last success, and the numbers of successes and failures until then
 
     def is_due(self, elapsed_s: float) -> bool:
         """Return whether the next count is due; counting costs the load generator time."""

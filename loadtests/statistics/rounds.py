@@ -24,9 +24,9 @@ from loadtests.statistics.histogram import SHARES, Floats, Histogram, Ints, edge
 #: as often as not estimated beyond 0.3 or below -0.3, and intervals came out three times as wide as they had to be.
 _FEWEST_ROUNDS = 12
 _LENGTHS = (2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
-#: A correlation below this is gone, as is one that so few independent values show by chance (one standard error).
+#: A smaller correlation counts as none; so does one that few independent values show by chance (one standard error).
 _GONE = 0.1
-#: Beyond this the formula for the variance says nothing any more; ten rounds cannot measure more either.
+#: _MOST: beyond this correlation the formula for the variance fails. _LEAST_FOR_LAG: fewest rounds to estimate one.
 _MOST = 0.8
 _LEAST_FOR_LAG = 6
 
@@ -184,7 +184,7 @@ def _first_of_each(repeats: Ints, length: int) -> Ints:
 
 Interval = tuple[float, float]
 
-#: With fewer repeats the rounds of all are resampled, and the interval is widened by what the repeats differ.
+#: With fewer repeats, the rounds of all repeats are resampled, and the interval is widened by the repeats' difference.
 LEAST_REPEATS = 4
 #: Relative standard deviation of the ratio between runs: of a machine that had processors to spare, and of one that
 #: had none when the run began.

@@ -14,7 +14,8 @@ from loadtests.statistics.measured import Measured
 MOST_CPU = 0.95
 #: How late requests may start, as a share of the median and of the p99 of the service time.
 MOST_LAG = {"p50": 0.10, "p99": 0.20}
-#: A process needs this long to wake up: a shorter lag is not held against the generator.
+#: LEAST_LAG_MS: a process needs this long to wake up, so a shorter lag does not count. LEAST_ACHIEVED: share of the
+#: rate.
 LEAST_LAG_MS = {"p50": 0.05, "p99": 0.3}
 LEAST_ACHIEVED = 0.95
 MOST_ERRORS = 0.01

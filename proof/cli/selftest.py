@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from proof.selftest.against import Table
     from proof.selftest.report import Report
 
-# How many mutants `--short` judges where the pack does not name them.
+# Mutants that `--short` runs if the pack does not name them.
 _SHORT = 15
 
 
@@ -160,7 +160,7 @@ def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Pa
 
 def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
     """Judge hand-written mutants and A/A controls."""
-    # lxml and the like cost what --help need not pay.
+    # Imported late: lxml and others cost time that --help need not pay.
     from proof.mutation.self_test import self_test_of  # noqa: PLC0415
     from proof.selftest.report import Report  # noqa: PLC0415
 
@@ -203,7 +203,7 @@ def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
     if not found:
         raise click.UsageError(f"no mutant has a name like {', '.join(patterns)}; --list shows them")
     if options["short"] and not options["patterns"]:
-        # The slowest first: the others need not wait for it in the end.
+        # The slowest first, so that the others do not wait for it at the end.
         found.sort(key=lambda mutant: short.index(mutant.name))
     return found
 

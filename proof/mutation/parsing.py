@@ -9,7 +9,7 @@ from proof.mutation.messages import Request, Response
 
 _MOST_HEAD = 1024 * 1024
 _REQUEST_LINE = re.compile(rb"[!-~]+ \S+ HTTP/\d\.\d")
-# How a response is framed depends on whether HEAD was asked with (RFC 9112 6.3), and on nothing else of a request.
+# The framing of a response depends on HEAD or not (RFC 9112 6.3), and on nothing else in the request.
 _ASKED = {method: h11.Request(method=method, target="/", headers=[("Host", "robot")]) for method in ("GET", "HEAD")}
 
 
@@ -41,7 +41,7 @@ class RequestParser:
     def feed(self, data: bytes) -> Request | None:
         """Parse more bytes; return the request once it is complete or known not to be HTTP, otherwise None."""
         if not self._pieces:
-            # Empty lines before a request are none of it (RFC 9112 2.2).
+            # Empty lines before a request do not belong to it (RFC 9112 2.2).
             data = data.lstrip(b"\r\n")
         if data:
             self._pieces.append(data)
@@ -58,7 +58,7 @@ class RequestParser:
             return Request(self._side, raw=self.octets)
         if self._request is None:
             line, ended, _ = self.octets.partition(b"\r\n")
-            # A line that is no request is answered at once by most servers: nothing more need come.
+            # Most servers answer a line that is no request at once, so nothing more needs to come.
             if ended and not _REQUEST_LINE.fullmatch(line):
                 return Request(self._side, raw=self.octets)
         return None

@@ -179,7 +179,7 @@ def self_test_of(contract: Contract) -> SelfTest:
     """
     named: str = getattr(contract.plugin, "SELFTEST", "")
     in_ = getattr(contract.plugin, "__package__", None) or ""
-    if in_.startswith("conformance.packs."):  # what proves a pack of the suite is in this room, under the pack's name
+    if in_.startswith("conformance.packs."):  # the proof of a pack of the suite is in this room, under the pack's name
         named = f"proof.{in_.rpartition('.')[2]}.{Path(MODULE).stem}"
     path = contract.directory / MODULE
     if not named and not path.is_file():
@@ -247,6 +247,6 @@ def built(*sources: Path) -> Path:
         )
         if done.returncode:
             raise NotInstalledError(f"go build fails: {done.stderr.decode(errors='replace')[-200:]}")
-        # Another run may have been faster: either result will do.
+        # Another run may have built it first: either result will do.
         Path(folder, "built").replace(binary)
     return binary

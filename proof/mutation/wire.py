@@ -88,7 +88,7 @@ class RobotConnection:
             try:
                 return self._once(self._sock, request)
             except (IncompleteMessageError, OSError):
-                # The robot closed a connection that was kept: that was no response.
+                # The robot closed a kept connection, which is no response to this request.
                 self.close()
         self._sock = socket.create_connection(self._address, timeout=_WAIT_S)
         self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -16,9 +16,9 @@ from typing import Any, Final
 from conformance.commandline.given_files import read_json, read_octets, unzipped
 
 _FORMAT: Final = "roaas-yardstick/1"
-# Probability below which chance is no explanation.
+# A smaller probability rules out chance.
 _NO_CHANCE: Final = 0.05
-# By mutant or good device: in how many runs it was seen, and in how many each requirement failed or warned.
+# By mutant or good device: the number of runs, and by requirement the runs in which it failed or warned.
 Table = dict[str, tuple[int, dict[str, int]]]
 
 

@@ -14,7 +14,7 @@ _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 # Wait after a killed certification before the next try, s: a mutant may be tried several times.
 _AGAIN_S: Final = 0.1
-# Programs that run at the moment.
+# Programs that are running.
 _PROGRAMS: set[subprocess.Popen[bytes]] = set()
 _STARTING = threading.Lock()
 

@@ -27,7 +27,7 @@ from proof.selftest.robots import Robot
 
 # What every run imports: loaded once, and inherited by the processes that are forked from there.
 _PRELOADED = ["proof.selftest.preloaded"]
-# Time in which a robot's stop at the end of a run is tried, s.
+# Time to stop a mutant at the end of a run, s.
 _STOP_S = 1.0
 #: Names the folder of the pack that is loaded there as well.
 PACK_VARIABLE = "ROAAS_SELFTEST_PACK"
@@ -114,7 +114,7 @@ def run_job(job: Job) -> Outcome:
     ours, theirs = context.Pipe(duplex=False)
     started = time.monotonic()
     process = context.Process(target=_run, args=(job, theirs), daemon=True)
-    # Ctrl-C is handled here: the server that this may start, and what it forks, must not receive it.
+    # Block Ctrl-C: the fork server that may start here, and its children, must not receive it.
     heard = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         with safe_path():
@@ -151,7 +151,7 @@ def _run(job: Job, pipe: Pipe) -> None:
                 "verdicts": {item["id"]: item["verdict"] for item in items},
                 "reasons": {item["id"]: item["reason"] for item in items if item["verdict"] != "pass"},
                 "requests": document["requests"],
-                # What was not tested because the run had ended has no case, and met nothing.
+                # A requirement that was not tested because the run ended has no case.
                 "met": frozenset(item["id"] for item in items if "because_of" in item and item["cases"]),
             }
         )
@@ -177,11 +177,11 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
         statement=statement,
         contract=contract,
         claims=statement.claimed(contract),
-        # A device that belongs to somebody is not moved.
+        # A described device may belong to somebody, so it is not moved.
         allow_motion=contract.is_claimed,
         seed=job.seed,
         effort=Effort(job.effort),
-        # Nothing is hurt by a mutant that cannot be stopped.
+        # A mutant that cannot be stopped hurts nobody.
         stop_s=_STOP_S,
     )
     if job.enough:
@@ -195,7 +195,7 @@ class _EnoughKnown(Judge):
     def __init__(self, run: Run, enough: frozenset[str]) -> None:
         super().__init__(run.contract.ledger)
         self._run = run
-        # What fails in a class that is not claimed is no verdict, and nothing is known by it.
+        # A failure in a class that is not claimed is no verdict.
         claimed = set(map(str, run.claims))
         ledger = run.contract.ledger
         self._enough = frozenset(id_ for id_ in enough if id_ in ledger and ledger[id_].binds(claimed))

@@ -108,7 +108,7 @@ def controls_of(contract: Contract, seeds: int, *, short: bool, variants: bool) 
         else:
             there.append(device)
     if variants and there:
-        # The slow one first: the others need not wait for it in the end.
+        # The slow one first, so that the others do not wait for it at the end.
         found.cases += [Case(needs.device_in(variant.name), variant) for variant in variants_of(contract)]
         found.cases += [Case(needs.device_in(front.name), front) for front in FRONTS]
         found.cases += [Case(device) for device in there if device.once]

@@ -19,7 +19,7 @@ from proof.selftest.at_once import safe_path
 Address = tuple[str, int]
 # An Ethernet frame's worth of TCP, octets.
 _SEGMENT = 1460
-# Octets under way in one direction of a connection before the sender has to wait.
+# _WINDOW: bytes under way in one direction before the sender waits. _START_S: time to start, s.
 _WINDOW = 262_144
 _START_S = 20.0
 
@@ -151,7 +151,7 @@ class _Relay:
         self._connections += 1
         seed = f"{self._seed}/{self._connections}"
         there, back = (Direction(self._link, f"{seed}/{way}", self._outage) for way in ("there", "back"))
-        # SYN and its answer; nothing of the client's overtakes them.
+        # SYN and its answer: no data may overtake them.
         await asyncio.sleep(back.arrival(there.arrival(now, 0), 0) - now)
         try:
             from_robot, to_robot = await asyncio.open_connection(*target)
@@ -168,7 +168,7 @@ class _Pump:
 
     def __init__(self, direction: Direction) -> None:
         self._direction = direction
-        # Octets with the time of their arrival; none at the end, None when the connection was broken off.
+        # Bytes with their time of arrival; empty at the end, None when the connection was broken off.
         self._way: asyncio.Queue[tuple[float, bytes | None]] = asyncio.Queue(_WINDOW // _SEGMENT)
 
     async def run(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

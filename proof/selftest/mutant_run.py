@@ -204,7 +204,7 @@ def _try(
     classes = classes_of(contract.ledger, mutant.catches)
     domain_id = robot.domain_id if mutant.probe else None
     seen: dict[str, None] = {}
-    # The checks that judge the requirements alone; then the whole classes; then those with more cases.
+    # First the checks of the requirements alone, then whole classes, then more cases.
     for chosen, requirements in ((effort, mutant.catches), (effort, ()), ("standard", ())):
         become(proxy, mutant)
         more: dict[str, Any] = {"classes": classes, "requirements": requirements, "domain_id": domain_id}
@@ -212,7 +212,7 @@ def _try(
         seen.update(dict.fromkeys(outcome.not_passed()))
         _note(result, outcome, tuple(seen), chosen)
         if proxy.broken:
-            # What such a mutant does is not what it says: nothing that it shows counts.
+            # A broken mutant does something else than it says, so nothing that it shows counts.
             result.survived = mutant.catches
             result.reasons = dict.fromkeys(mutant.catches, f"the mutant itself is broken: {proxy.broken[0]}")
             break

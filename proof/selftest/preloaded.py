@@ -24,7 +24,7 @@ def _import_all(package: str) -> None:
 
 
 _import_all("conformance.rules")
-# If a pack cannot be used, the certification itself ends and says why.
+# The certification itself reports a pack that cannot be used.
 with contextlib.suppress(ContractError):
     _contract = Contract.load(os.environ.get(PACK_VARIABLE, DEFAULT_PACK))
     operations_of(_contract)

@@ -50,7 +50,7 @@ class Addresses:
         """Replace the robot's address with the proxy's in a response, in place, and return the response."""
         for side, robot in self.robot.items():
             here = self.public(side)
-            # A robot may go by the Host field, which is the proxy's, and cannot know that the proxy speaks TLS.
+            # A robot may use the Host header, which names the proxy, and cannot know that the proxy uses TLS.
             asked = self.proxy[side]
             for there in (robot, asked.replace("https:", "http:")) if asked.startswith("https:") else (robot,):
                 response.body = response.body.replace(there.encode(), here.encode())
@@ -156,7 +156,8 @@ class Proxy:
         def forward(request: Request) -> Response:
             if request.side == side and threading.get_ident() == owner:
                 return self._forward(request, robot)
-            # The other interface, or a thread of the change's own: neither may come between this connection's octets.
+            # A connection of its own, for the other interface or another thread: its bytes must not mix with this
+            # connection's.
             with contextlib.closing(RobotConnection(*self._robot[request.side])) as another:
                 return self._forward(request, another)
 
@@ -185,7 +186,7 @@ class Proxy:
                 if last:
                     break
         except (OSError, IncompleteMessageError, HangUpError):
-            # Whoever broke it off, there is nobody left to tell.
+            # The connection is broken, so nobody can be told.
             pass
         finally:
             robot.close()

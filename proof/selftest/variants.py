@@ -88,7 +88,7 @@ def _prefixed(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if request.side == "rest" and request.path.endswith("/openapi.json"):
         if request.method == "HEAD":
-            # The length of the description before the prefix was added.
+            # The length was that of the description before the prefix was added.
             response.drop("Content-Length")
         value = parsed(response.body)
         if isinstance(value, dict):
@@ -125,7 +125,7 @@ class _Ceiling:
         now = time.monotonic()
         with self._lock:
             self._times = [*(one for one in self._times if now - one < 1.0), now]
-            # A tenth more than the ceiling: clients' clocks and scheduling are no fault of theirs.
+            # A tenth above the limit, because clients' clocks and scheduling vary.
             full = len(self._times) > _CEILING * 1.1
         if full:
             return problem(429, "too many requests", ("Retry-After", "1"))(request)

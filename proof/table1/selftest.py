@@ -169,7 +169,7 @@ BODIES = tuple(_with_body(name) for name in ("ackermann", "no-reverse", "holonom
 PLAIN = _independent("plain")
 BAROQUE = _independent("baroque", shows_effects=True)
 LEGACY = _independent("legacy")
-# A velocity holds so short a time that over a slow link the next reading finds it ended.
+# Its velocities hold so briefly that over a slow link the next reading finds them ended.
 DEADMAN = GoodDevice(
     "deadman", _in_python("baroque", options=("--hold-s", "0.3")), _ROBOTS / "baroque" / "deadman.toml", once=True
 )
@@ -267,7 +267,7 @@ SELFTEST = SelfTest(
     ),
     quick="baroque",
     device_for={
-        # Its velocities hold long enough to be read at such a pace.
+        # Its velocities hold long enough for such slow reading.
         "slow": "plain",
         "nginx": "reference",
         "haproxy": "reference",

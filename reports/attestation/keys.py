@@ -123,7 +123,7 @@ def _octets(path: Path) -> bytes:
 
 def _warn_if_shared(path: Path) -> None:
     """Write a warning to stderr if the group or others can read a private key."""
-    with suppress(OSError):  # who reads it tells that
+    with suppress(OSError):  # the code that reads the key reports that
         mode = path.stat().st_mode
         if os.name == "posix" and stat.S_ISREG(mode) and mode & (stat.S_IRGRP | stat.S_IROTH):
             shown = on_a_line(str(path), 1000)

@@ -87,7 +87,7 @@ class DescriptionChanges:
         number, unknown, rest = len(self.breaking), len(self.unknown), len(self.other)
         parts = [f"{number or 'No'} {'change breaks' if number < 2 else 'changes break'} existing clients"]  # noqa: PLR2004 - plural
         if unknown:
-            # Where something may break, nothing is said of "no change".
+            # "no change" is not written where something may break.
             parts = [
                 *(parts if number else ()),
                 f"of {_changes(unknown)} it is not known whether existing clients break",

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 TRACES_NAME: Final = "traces.json.gz"
-# Pictures; points of a line; size of the drawing of one axis, in CSS pixels.
+# _MOST: pictures of a certificate. _POINTS: points of a line. WIDTH, HEIGHT: size of one axis's drawing, CSS pixels.
 _MOST, _POINTS = 30, 160
 WIDTH, HEIGHT = 300, 64
 _MARGIN: Final = 4
-# Share of an axis's range in the whole run: smaller moves are not drawn larger.
+# Smaller moves are not enlarged beyond this share of an axis's range.
 _LEAST: Final = 0.2
 
 
@@ -135,7 +135,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     for name in _shown(readings, move.get("wanted")):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
         seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
-        # A velocity is no position, even where both go by one name.
+        # A velocity is no position, even if both have the same name.
         aims = [] if is_drive and key == "values" else wanted
         lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], aims, _LEAST * ranges[name]))
     return Picture(

@@ -180,5 +180,5 @@ def _described(source: str) -> str:
         return source
     path = Path(source)
     beside = (path if path.is_dir() else path.parent) / _DESCRIPTION
-    # Whatever is there in its place is refused by the reader.
+    # The reader refuses anything in its place that is no regular file.
     return str(beside) if os.path.lexists(beside) else ""

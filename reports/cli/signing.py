@@ -41,7 +41,7 @@ def _pack_of(door: FrontDoor, directory: Path) -> str | None:
     if "api" in result and (directory / DESCRIPTION).is_dir():
         return str(directory / DESCRIPTION)
     name: str | None = result.get("pack", {}).get("name")
-    # A result is data: a name in it leads to no folder.
+    # A result is data: a pack's name in it must not lead to a folder.
     if name is not None and not door.is_installed(name):
         raise click.UsageError(
             f"the robot was judged by the contract pack {excerpt(name, 80)!r}, which is not installed: "

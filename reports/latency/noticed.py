@@ -11,7 +11,7 @@ from reports.latency.numbers import ms, rate
 from reports.pages.untrusted import excerpt
 
 _AT_ONCE_MS, _FLOW_MS = 100.0, 1000.0
-#: Quantiles by how far they look into the tail, with the share of requests within them.
+#: _TAILS: by quantile, the share of requests within it. _BEYOND: the share beyond it.
 _TAILS = {"p99": "99 of 100", "p95": "95 of 100", "p90": "9 of 10"}
 _BEYOND = {"p99": "1 of 100", "p95": "1 of 20", "p90": "1 of 10"}
 _MOST = 6

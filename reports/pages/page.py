@@ -61,7 +61,7 @@ def write_pages(directory: Path, pages: dict[str, str]) -> list[Path]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
         for name, text in pages.items():
-            # A name that nobody can know, opened as a new file: a link of that name would lead elsewhere.
+            # An unpredictable name, opened as a new file: a link with a known name could lead elsewhere.
             draft = directory / f".{name}.{token_hex(4)}.part"
             try:
                 with draft.open("x", encoding="utf-8") as file:

@@ -57,7 +57,7 @@ class Preparation:
                 exchange = self._called(lease.renew, lease.renew_body)
                 self._kept_s = self._clock.now()
                 if not exchange.response.ok:
-                    # It has ended, as after a while in which nothing was sent.
+                    # The lease ends if nothing is sent for a while.
                     self.lease = ""
             if lease and not self.lease:
                 self._acquire()

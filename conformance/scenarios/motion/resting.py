@@ -12,7 +12,7 @@ from conformance.statement.motion_map import MotionMap
 
 #: Shortest time that shows whether a device creeps, s.
 CREEPS_S: Final = 1.0
-# Where the map does not declare how fast a device may seem to move at rest: these shares of its tolerances.
+# By default, how fast a device may seem to move at rest: these shares of its tolerance of speed, and of position.
 _OF_SPEED: Final = 0.1
 _OF_POSITION: Final = 0.2
 

@@ -50,10 +50,10 @@ def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 def _of_clients(mapped: MappedDevice) -> Leg:
     mapped.bring_home()
     start, axes = mapped.where(), mapped.motion.state.axes.items()
-    # So that the last one is the limit itself, and not a little beyond it by rounding.
+    # Computed so that the last one is exactly the limit, without rounding.
     shares = [client / (_CLIENTS - 1) for client in range(_CLIENTS)]
     several = [{name: axis.limits[0] * (1 - share) + axis.limits[1] * share for name, axis in axes} for share in shares]
-    # A target where the device is already would be reached whatever becomes of the others.
+    # A target at the device's own place would be reached in any case.
     wanted = [one for one in several if not mapped.is_near(start, one)]
     commands = _at_once(mapped, mapped.moves, wanted)
     for one in commands:
@@ -81,7 +81,7 @@ def several_drivers(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
 def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
     """Command velocities from several clients at the same moment, one from each, and watch until one is reached."""
     settle_s = mapped.drives.settle_s
-    # Nothing renews it: where the hold time is shorter than the time to settle, nothing can be measured.
+    # Nothing renews the velocity: with a hold time below the settle time, nothing can be measured.
     lasts_s = min(mapped.drives.hold_s or settle_s + MEASURED_S, settle_s + MEASURED_S)
     several = with_room(mapped, several, lasts_s + settle_s)
     commands = _at_once(mapped, mapped.drives, several)

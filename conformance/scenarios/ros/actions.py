@@ -24,9 +24,10 @@ from conformance.transport.exchange import Exchange
 
 _NEEDS: Final = (Need.REST,)
 _PACE_S: Final = 0.06
-# Pause between two feedbacks; time that a goal goes on before it is canceled, s.
+# _GAP_S: pause between two feedbacks. _RUNS_S: how long a goal runs before it is cancelled, s.
 _GAP_S, _RUNS_S = 0.6, 0.3
-# Time that a goal which refuses to be canceled, or runs beside another, goes on, s.
+# _GOES_ON_S: how long a goal runs on that refuses its cancellation, or that runs beside another, s. _FEEDBACKS: their
+# number.
 _GOES_ON_S: Final = 1.5
 _FEEDBACKS: Final = 3
 _PARTS: Final = ("Goal", "Result", "Feedback")
@@ -214,7 +215,7 @@ class _Sender:
         value, exchange = self._send()
         second = self._goal(Course.SECOND, value, exchange, steps[1])
         if not (first.accepted and second.accepted):
-            # A server, or a gateway, may take one goal at a time.
+            # A server or gateway may accept only one goal at a time.
             return []
         cancel = self._cancel(first)
         ended = self._watched(first, WALL_CLOCK.now() + body.within_s + _LATE_S, self._has_ended)

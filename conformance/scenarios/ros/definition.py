@@ -9,7 +9,7 @@ from typing import Any, Final
 
 _ARRAY: Final = re.compile(r"sequence<(?P<items>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<count>\d+)\]")
 _TEXT: Final = re.compile(r"w?string(?:<(\d+)>)?")
-#: The least and greatest value of each type of integer.
+#: By integer type: least and greatest value.
 INTEGERS: Final[dict[str, tuple[int, int]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
@@ -18,7 +18,7 @@ INTEGERS: Final[dict[str, tuple[int, int]]] = {
 FLOATS: Final = frozenset({"float", "double"})
 #: Items of arrays that may be written in base64.
 OCTETS: Final = frozenset({"uint8", "octet"})
-#: The types that a web client's double does not hold.
+#: Integer types that exceed a web client's double.
 LONG: Final = frozenset({"int64", "uint64"})
 
 Types = Mapping[str, Mapping[str, str]]
@@ -87,7 +87,7 @@ class Definition:
     def fields(self, name: str = "") -> Iterator[tuple[str, Shape]]:
         """Yield the fields of a type of the definition; empty: of the root."""
         for field, declared in self.types[name or self.root].items():
-            # A message without fields has one in C++ and Python all the same.
+            # C++ and Python add this field to a message without fields.
             if field != "structure_needs_at_least_one_member":
                 yield field, shape_of(declared)
 

@@ -30,7 +30,7 @@ _Operation = TypeVar("_Operation")
 CROWD: Final = 32
 # Pause between two reads of the gateway, s.
 PACE_S: Final = 0.03
-#: Further time that a busy machine may need to show the last messages, s.
+#: PATIENCE_S: additional time for a busy machine to show the last messages, s. _DISCOVERY_S: to discover the graph, s.
 PATIENCE_S: Final = 10.0
 _DISCOVERY_S: Final = 15.0
 _KEYS: Final[dict[type, str]] = {
@@ -159,7 +159,7 @@ class Gateway:
         """Return the request of an operation; ``value``: of the ROS message that it gets."""
         document = None
         if self.ros.rosbridge:
-            # By its id, what comes is known to be the response to this one.
+            # Its id identifies the response to this message.
             body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
             document = written(value, self.definition(_type_of(body)), body, self.ros)

@@ -25,7 +25,8 @@ from conformance.verdict.effort import Effort
 
 _NEEDS: Final = (Need.REST,)
 _REPEAT_S: Final = 0.1
-# A message on its way, and a gateway that is late: after a message's greatest age so long, and so often again, s.
+# _LATE_S: for a message on its way, and a late gateway: wait this long after a message's greatest age, s. _TRIES: how
+# often.
 _LATE_S: Final = 1.0
 _TRIES: Final = 2
 _ROUNDS: Final = 5
@@ -87,7 +88,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
     for call, body in gateway.of(Reads):
         if body.topic in also or there.get(body.topic, {}).get("publishers"):
             continue
-        # An earlier run may have published.
+        # Messages of an earlier run may still be published.
         until = WALL_CLOCK.now() + (body.max_age_s or 0.0) + _LATE_S
         exchange = gateway.read(call, body)
         while succeeded(exchange, body) and WALL_CLOCK.now() < until:
@@ -99,7 +100,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
     return tuple(found)
 
 
-# Late, as a killed publisher is on the graph until its lease is over, and a gateway may count it.
+# Late, because a killed publisher stays on the graph until its lease ends, and a gateway may count it.
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def publishers_end(gateway: Gateway) -> Publishers:
     """Publish on all topics at once, fall silent, publish again, leave, come back, be killed, and begin anew."""
@@ -138,7 +139,7 @@ class _Topics:
         self._gateway = gateway
         self._reads = dict(gateway.of(Reads))
         self._definitions = {call: gateway.definition(body.type) for call, body in self._reads.items()}
-        # One for each type, so that topics of the same type have other messages.
+        # One for each type, so that topics of the same type get different messages.
         self._makers = {body.type: gateway.maker(self._definitions[call]) for call, body in self._reads.items()}
 
     def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
@@ -152,8 +153,8 @@ class _Topics:
         until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values()) + PATIENCE_S
         found: dict[str, Presence] = {}
         for turn in itertools.count(1):
-            # Round after round, so that no message becomes too old while another one is awaited; several times, as a
-            # gateway that mixes topics returns the right message now and then. One of another topic settles it.
+            # In rounds, so that no message gets too old while another is awaited. Several rounds, because a gateway
+            # that mixes topics is sometimes right; one message of another topic decides.
             for call in self._reads:
                 if call not in found or not found[call].instead or found[call].shown:
                     now = self._presence(call, publisher, values, before[call])
@@ -322,11 +323,11 @@ def many_reads(gateway: Gateway, effort: Effort) -> tuple[Growth, ...]:
         before = _subscriptions(gateway, body.topic)
         exchange = [gateway.read(call, body) for _ in range(count)][-1]
         read.append((body, before, exchange))
-    # A new subscription is found a moment later.
+    # The graph shows a new subscription a moment later.
     WALL_CLOCK.sleep(_LATE_S)
     found = []
     for body, before, exchange in read:
-        # What is closed late is closed all the same.
+        # A subscription that is closed late is closed nevertheless.
         until = WALL_CLOCK.now() + body.within_s
         while (after := _subscriptions(gateway, body.topic)) > before + 1 and WALL_CLOCK.now() < until:
             WALL_CLOCK.sleep(PACE_S)

@@ -28,10 +28,10 @@ _DOUBLES: Final = (
     123456789.12345679, 4.35, 2.0,
 )  # fmt: skip
 _SINGLES: Final = (0.1, 3.4028234663852886e38, 1.401298464324817e-45, -0.0, 1 / 3, -16777215.0, 1e-7, 123456.789, 2.0)
-# What XML cannot write.
+# _LINES: characters that XML cannot write as they are. _ITEMS: lengths of arrays.
 _LINES: Final = ("\u2028", "\n", "\t")
 _ITEMS: Final = (3, 0, 1, 7)
-# Messages within messages in arrays are as many at most.
+# _INNER: most messages in an array inside a message. _SECONDS: greatest time, s.
 _INNER: Final = 2
 _SECONDS: Final = 2**31 - 1
 _NANOSECONDS: Final = 999_999_999
@@ -123,7 +123,7 @@ class Maker:
 
     def _filled(self, name: str, turn: int | None, depth: int, leaf: Any) -> dict[str, Any]:
         if name.startswith("builtin_interfaces/") and name.endswith(("/Time", "/Duration")):
-            # Beyond these, a time is none, and a gateway that reads it as one is not to blame.
+            # A greater number is no ROS time, and a gateway may read it in any way.
             return {"sec": self._random.randint(0, _SECONDS), "nanosec": self._random.randint(0, _NANOSECONDS)}
         found = {}
         for field, shape in self.definition.fields(name):

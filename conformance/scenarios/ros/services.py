@@ -27,20 +27,21 @@ from conformance.verdict.effort import Effort
 #: Why a scenario cannot be played where there is a real robot.
 NO_PLAY: Final = "the suite is not the robot, whose servers it would order: --ros-play"
 _NEEDS: Final = (Need.REST,)
-# Share of the gateway's time that a slow server takes.
+# Share of the gateway's time limit that a slow server takes.
 _SLOW: Final = 0.2
-# Time in which surplus messages arrive, s.
+# How long the suite waits for surplus messages, s.
 _MORE_S: Final = 0.15
-# Time that a response has beyond its declared time, s.
+# How much later than declared a response may come, s.
 _LATE_S: Final = 2.0
-#: Where others are held up, that is tried again: once may be a coincidence.
+#: ROUNDS: tries if other clients are held up, because once may be chance. _BESIDE: reads beside a call.
 ROUNDS: Final = 2
 _BESIDE: Final = 4
-# A request is held up if it takes this long, s, and this multiple of its usual time.
+# A request is held up if it takes _HELD_S, s, and _HELD times its usual time.
 _HELD_S, _HELD = 0.8, 5.0
-# What a call held up ends with it: so much before its response arrives, at most, s.
+# A request that a call holds up ends at most this long before the call's response, s.
 _TOGETHER_S: Final = 0.25
-# Time by which every second of many concurrent calls is overtaken by the next, s.
+# _OVERTAKEN_S: how much earlier every second of many concurrent calls is answered than the one before, s. _CALLS: their
+# number.
 _OVERTAKEN_S: Final = 0.1
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 
@@ -198,7 +199,7 @@ class _Caller:
             silent = self._never_answered()
             yield silent
             if not silent.is_open or self._body.timeout_s:
-                # Else the gateway may still wait for the first call, and be right to.
+                # Without the usual call, the gateway may rightly wait for the first one.
                 yield self._answered(Server.AFTER, *self._usual())
             if not any(is_held(silent, one) for one in silent.beside):
                 break
@@ -291,7 +292,7 @@ class _Caller:
         """Call a server that never responds, and read other resources until the gateway gives the call up."""
         robot, body = self._gateway.robot, self._body
         others = self._others()
-        # Measured once: afterwards, a call may hold all others up for good.
+        # Measured once, because later a call may hold up all others.
         self._usual_s = self._usual_s or [self._read(call, read, 0.0).took for call, read in others]
         request = self._complete("Request", self._requests.usual().value)
         robot.tell("script", name=body.service, script=[{"never": True}])

@@ -22,11 +22,11 @@ from proof.selftest.generated.whens import OF_FORMATS, OF_NUMBERS, OF_TEXTS, TIM
 _NUMBERS = frozenset({"number", "integer"})
 # Effects that last or grow by themselves.
 _LASTING = frozenset({"hang", "slower"})
-# Effects that repeat what came before: the first time there is nothing.
+# Effects that repeat an earlier message: there is none the first time.
 _REPEATING = frozenset({"freeze", "delay", "ignore", "lag", "crossed"})
-# Larger messages are attacks by their size, which no generated fault is about.
+# Larger messages are attacks by their size, and no generated fault concerns size.
 _LARGEST: Final = 100_000
-# Conditions that the clock or other requests decide, which messages alone do not show.
+# _OF_TIME: conditions that depend on the clock or on other requests, not on one message.
 _OF_TIME: Final = frozenset({"now-and-then", "after-pause", "together"})
 Message = tuple[Request, Response]
 

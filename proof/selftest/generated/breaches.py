@@ -15,7 +15,7 @@ from conformance.documents.json_shape import Kept, validator_of
 from conformance.documents.openapi import Operation, is_json
 from proof.mutation.messages import Response
 
-# Statuses that any HTTP server may send, or that a description need not know (RFC 9110 15, OpenAPI 3.1 4.8.16).
+# Statuses that any HTTP server may send without a declaration (RFC 9110 15, OpenAPI 3.1 4.8.16).
 ANY_SERVER = frozenset(
     {206, 304, 401, 403, 405, 406, 407, 408, 411, 412, 413, 414, 415, 416, 417, 421, 426, 428, 429, 431, 501, 503}
 )

@@ -25,14 +25,14 @@ from proof.selftest.generated.slots import Edit, Slot, edit_message, same
 _STATUSES = (200, 202, 204, 299, 400, 404, 409, 418, 422, 500, 502)
 _TYPES = ("text/html", "text/plain", "application/xml", "application/octet-stream")
 _SUCCESS, _ERRORS = range(200, 300), range(400, 500)
-# Bodies beside those of any pack: a number that JSON does not have, and a page of a web server.
+# Wrong bodies for any device: a number that JSON lacks, and an HTML page.
 _MORE = {
     "body-nan": lambda body: re.sub(rb"(?<=[:\[,] )-?\d+(?:\.\d+)?|(?<=[:\[,])-?\d+(?:\.\d+)?", b"NaN", body, count=1),
     "body-html": lambda _: b"<html><body>It works</body></html>",
     "body-invalid-utf8": lambda body: body.replace(b'"', b'"\xe9', 1) if b'"' in body else body,
     "body-null": lambda _: b"null",
 }
-# The kinds of responses that are altered, by the last part of the mutants' names.
+# By the last part of a mutant's name: the responses that it alters.
 _KINDS = {"answer": _SUCCESS, "error": _ERRORS}
 
 
@@ -102,7 +102,7 @@ def _of_fields(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMu
                     alter = _field_alter(operator, place, part, code)
                     tried = alter(Request("rest"), whole)
                     if tried is None or not breaks(operation, tried):
-                        continue  # what the schema leaves open
+                        continue  # the schema leaves this open
                     name = f"{operator.name}@{mode}" if mode else operator.name
                     when = f", {MODES[mode]}" if mode else ""
                     where = f"{'.'.join(place.steps)} of {status}"

@@ -21,12 +21,12 @@ from proof.selftest.generated.described_inputs import NOTHING, Input
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
-# Lists after which a total goes wrong and stays wrong.
+# _RIGHT: lists after which a total becomes wrong and stays so. _DEPTH: of nested members.
 _RIGHT = 10
 _DEPTH = 2
 _Differs = Callable[[Page, Page], bool]
 _SUCCESS, _REFUSED, _NO_TYPE = range(200, 300), range(400, 500), 415
-# What a mutant does after a request to an item: request, response, another item, and the way to the device.
+# What a mutant does with a request to an item. Arguments: request, response, another item, and a way to the device.
 _Act = Callable[[Request, Response, str, Forward], Response | None]
 
 

@@ -11,8 +11,8 @@ from proof.selftest.generated.mutant import Mode, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _BAD_REQUEST = range(200, 300), 400
-# How long a hanging mutant waits, s: longer than a request's deadline. Delay that a slower mutant adds after each
-# request, and the longest, s.
+# _HANGS_S: how long a hanging mutant waits, s: longer than any deadline. _LATER_S: delay added after each request.
+# _LATEST_S: longest delay.
 _HANGS_S, _LATER_S, _LATEST_S = 30.0, 0.002, 0.4
 _TRACEBACK = json.dumps(
     'Traceback (most recent call last):\n  File "/srv/device/app/handlers.py", line 83, in handle\n    '

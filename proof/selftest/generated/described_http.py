@@ -10,7 +10,7 @@ from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _METHOD_NOT_ALLOWED = range(200, 300), 405
-# Difference of a wrong Content-Length, octets.
+# Difference of a wrong Content-Length, bytes.
 _OFF = 7
 
 
@@ -104,7 +104,7 @@ def _failing(_request: Request, answer: Response) -> Response | None:
     return altered
 
 
-# What is done to successful responses, with the clause.
+# By name: the change of successful responses, with the clause that it breaks.
 _ANSWERS: dict[str, tuple[str, Edit]] = {
     "no-type": (
         "sends no Content-Type (RFC 9110 8.3)",

@@ -13,7 +13,7 @@ from conformance.documents.representation import flat
 from proof.mutation.messages import Request
 from proof.selftest.generated.places import Exchange
 
-#: Stands for a value that is not there.
+#: NOTHING: stands for a missing value.
 NOTHING = object()
 _DEPTH = 3
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")

@@ -40,7 +40,7 @@ class _Past:
     keyed: dict[str, tuple[Request, Response]] = field(default_factory=dict)
 
 
-# What a mutant does with a request: returns the client's response, and whether it was altered.
+# What a mutant does with a request. Returns the client's response, and whether it was altered.
 _Act = Callable[[Request, Forward, _Past], tuple[Response, bool]]
 
 
@@ -201,7 +201,7 @@ def _reverting(method: str) -> _Act:
         twice = [one for path, one in past.writes.items() if len(one) > 1 and path != request.path]
         if request.method != method or not twice:
             return response, False
-        # The last ones may be gone.
+        # The last ones may be deleted by now.
         for first, last in twice[-_TRIED:][::-1]:
             if first.body != last.body and forward(_with_current(first, forward)).status in _SUCCESS:
                 return response, True

@@ -25,8 +25,7 @@ def _made(
     return GeneratedMutant(name, f"{exchange.name} {says} {item.label}.", operator, exchange, exchange.classes, make)
 
 
-# What a schema says of values, and how a mutant that does not look at it is called. A format is a remark only (JSON
-# Schema 2020-12, Validation 7.2.1).
+# By name of a mutant: the keywords that it ignores. A format is only a remark (JSON Schema 2020-12, Validation 7.2.1).
 _LOOSE: dict[str, tuple[str, ...]] = {
     "takes-type": ("type",),
     "takes-any-text": ("enum", "const"),
@@ -44,7 +43,7 @@ def lenient(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
         good = sample(item.schema)
         for operator, keys in _LOOSE.items():
             rules = [key for key in keys if key in item.schema]
-            # Every text of a path or query is a text; null is no value there.
+            # In a path or query, everything is text: null has no meaning there.
             textual = "string" in kinds_of(item.schema)
             if rules and not (operator == "takes-type" and item.where != "body" and textual):
                 yield _made(
@@ -58,7 +57,7 @@ def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Cal
     free = {key: value for key, value in item.schema.items() if key not in rules}
 
     def forbidden(value: Any) -> bool:
-        # What the other rules forbid as well is for them; without a type, rules of types that are not there are void.
+        # Values that other keywords forbid too are left to the mutants of those.
         if value is NOTHING or valid(item.schema, value):
             return False
         return valid(free, value) or "type" in rules

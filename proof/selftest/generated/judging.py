@@ -20,11 +20,11 @@ from proof.selftest.robots import Robot
 KILLED: Final = "killed"
 SURVIVED: Final = "survived"
 NOT_REACHED: Final = "not reached"
-# The run took too long or broke off, so that nothing is known.
+# The run took too long or broke off, so nothing is known.
 GIVEN_UP: Final = "given up"
-# The mutant did something else than its text says: an error of the self-test.
+# The mutant did not do what its text says: an error of the self-test.
 BROKEN: Final = "broken"
-# Classes that are claimed, and requirements that are judged alone (all, where there are none).
+# Classes to claim, and requirements to judge alone (empty: all).
 Attempt = tuple[tuple[str, ...], tuple[str, ...]]
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+")
 
@@ -111,7 +111,7 @@ class _Control:
         with self._lock:
             known = self._known.setdefault(effort, {})
             if at_once and not known:
-                # Alone, a requirement sees less than in a whole run: of what every check sends, checkers see all.
+                # A requirement judged alone sees only part of a run; checkers judge the requests of every check.
                 proxy.change = unchanged
                 outcome = run_job(job_for(robot, proxy, effort, self._seed))
                 if outcome.exit_code < 0:
@@ -122,7 +122,7 @@ class _Control:
                 classes = classes_of(self._contract.ledger, new)
                 outcome = run_job(job_for(robot, proxy, effort, self._seed, classes=classes, requirements=new))
                 if outcome.exit_code < 0:
-                    # Nothing is known of the good device, so nothing is shown of the mutant.
+                    # The good device's verdict is unknown, so the mutant's shows nothing.
                     return ()
                 known |= {id_: id_ in outcome.not_passed() for id_ in new}
         return tuple(id_ for id_ in ids if not known[id_])
@@ -139,13 +139,13 @@ def _judge(
 ) -> GeneratedResult:
     result = GeneratedResult(mutant)
     tally = Tally()
-    # Any requirement ends a run on a device that claims no contract: what else it does not keep is of no use.
+    # Any failure ends a run on a device that claims no contract: further failures are not needed.
     claims_none = not contract.is_claimed
     musts = frozenset(id_ for id_, item in contract.ledger.items() if claims_none or item.level is Level.MUST)
     given_up = False
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
     attempts = tuple(_attempts(contract, mutant, claimed))
-    # What quick has not noticed is seldom near: at the next effort everything is judged at once.
+    # A fault that quick misses is seldom found by other single requirements: judge everything at the next effort.
     waiting = [(efforts[0], one) for one in attempts] + [(effort, attempts[-1]) for effort in efforts[1:]]
     while waiting:
         effort, (classes, requirements) = waiting[0]
@@ -163,7 +163,7 @@ def _judge(
         if shown := control.without(outcome.not_passed(), robot, proxy, effort, at_once=claims_none):
             _note(result, outcome, shown)
             return result
-        # The good device does not pass what ended the run, which is known by now: once more, to its end.
+        # The good device also fails the requirement that ended the run: judge once more, to the end.
         ended_by = frozenset(outcome.not_passed()) if claims_none else outcome.fails
         if outcome.exit_code < 0 or not (ended_by & musts) - known:
             waiting.pop(0)
@@ -187,7 +187,7 @@ def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, .
         return
     classes = tuple(class_ for class_ in mutant.classes if class_ in claimed)
     if not classes or classes[0] != mutant.classes[0]:
-        # The class that should see it is not judged: any other may.
+        # The class that should notice is not judged, so any other may.
         classes = (*classes, *(class_ for class_ in claimed if class_ not in classes))
     words = {word.lower() for word in _WORD.findall(mutant.exchange.name)}
     first = tuple(id_ for id_, item in contract.ledger.items() if item.class_ == classes[0])
@@ -196,5 +196,5 @@ def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, .
     for requirements in dict.fromkeys((types, near)):
         if requirements and len(requirements) < len(first):
             yield classes[:1], requirements
-    # What is watched over a whole run is in classes of its own, so that in the end all are judged at once.
+    # Checkers of a whole run are in classes of their own, so in the end all classes are judged together.
     yield from dict.fromkeys((tuple(classes[:number]), ()) for number in (1, len(classes)))

@@ -13,7 +13,7 @@ from proof.selftest.generated.slots import edit_message
 from proof.selftest.generated.whens import ERROR, RARE
 
 Alter = Callable[[Request, Response], Response | None]
-# What follows a mode's name, of what is altered.
+# By mode: words that follow the description of a change.
 MODES = {
     "rarely": f"one time in {RARE}",
     "together": "while another request is under way",

@@ -13,7 +13,7 @@ from proof.selftest.generated.catalogue import every_change, generated_mutants, 
 from proof.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
 from proof.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 
-# The result file's word for a mutant that was killed, as roaas-selftest/1 has it.
+# _WRITTEN: word of roaas-selftest/1 for a killed mutant.
 _WRITTEN = {KILLED: "caught"}
 _KEYS = ("class", "clause", "operation", "when", "operator", "effort")
 _COUNTED = frozenset({KILLED, SURVIVED})

@@ -18,7 +18,7 @@ from proof.selftest.generated.places import Exchange
 
 _KNOWN = frozenset(status.value for status in HTTPStatus)
 _SUCCESS = range(200, 300)
-# Makes a mutant of an operation's whole answers, in a mode.
+# Makes a mutant that changes an operation's whole response, in a mode.
 Whole = Callable[[Exchange, str], Callable[[Tally], Change]]
 _NUMBER = re.compile(rb"-?\d+\.\d+(?:[eE][+-]?\d+)?")
 BODIES: dict[str, Callable[[bytes], bytes]] = {

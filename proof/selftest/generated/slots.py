@@ -14,7 +14,7 @@ from lxml import etree
 from proof.mutation.messages import Request, Response
 from proof.selftest.generated.places import ITEM, Place
 
-# Stands before the name of a member that is to be written twice.
+# _AGAIN: prefix for the name of a member that is written twice.
 _AGAIN = "@again@"
 _NUMERIC = {"number", "integer"}
 

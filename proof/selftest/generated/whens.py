@@ -14,12 +14,12 @@ from lxml import etree
 from proof.mutation.messages import Change, Forward, Request, Response
 from proof.selftest.generated.places import Exchange
 
-# One exchange in so many, and the first status of an error: for the modes of a mutant as well.
+# RARE: one exchange in so many. ERROR: first status of an error. Modes of a mutant use both too.
 RARE: Final = 20
 ERROR: Final = 400
 _FROM: Final = 30
 _PAUSE_S: Final = 1.0
-# The first seconds of each period in which a fault strikes; length of the period, s.
+# _SPELL_S: first seconds of each period in which a fault strikes. _OF_S: length of the period, s.
 _SPELL_S: Final = 2.0
 _OF_S: Final = 10.0
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -59,7 +59,7 @@ def _after(of: Callable[[str, int], bool]) -> When:
     return lambda seen: seen.before is not None and of(*seen.before)
 
 
-#: What follows the name of a composed fault: when it strikes whatever is sent, as a phrase, and the condition.
+#: By the end of a composed fault's name: when it strikes, as a phrase and as a condition on any exchange.
 TIMES: Final[Mapping[str, tuple[str, When]]] = {
     "rarely": (f"one time in {RARE}", lambda seen: seen.number % RARE == 0),
     "first": ("the first time", lambda seen: seen.number == 1),
@@ -127,7 +127,7 @@ def _wants_xml(seen: Seen) -> bool:
     return "xml" in (seen.request.field("Accept") or "") or "xml" in seen.request.media_type
 
 
-#: The same for classes of numbers in the request.
+#: The same for requests with certain numbers.
 OF_NUMBERS: Final[Mapping[str, tuple[str, When]]] = {
     "negative": ("where the request has a negative number", _of_number(lambda number: number < 0)),
     "small": (
@@ -139,7 +139,7 @@ OF_NUMBERS: Final[Mapping[str, tuple[str, When]]] = {
         _of_number(lambda number: number != float(f"{number:.6g}")),
     ),
 }
-#: The same for classes of texts.
+#: The same for requests with certain texts.
 OF_TEXTS: Final[Mapping[str, tuple[str, When]]] = {
     "markup": ("where the request has a text with & or <", _of_text(lambda text: bool(re.search("[&<]", text)))),
     "beyond-ascii": (
@@ -148,7 +148,7 @@ OF_TEXTS: Final[Mapping[str, tuple[str, When]]] = {
     ),
     "long": (f"where the request has a text of more than {_LONG} characters", _of_text(lambda text: len(text) > _LONG)),
 }
-#: The same for the format that a client sends or asks for.
+#: The same for the format that a client sends or requests.
 OF_FORMATS: Final[Mapping[str, tuple[str, When]]] = {"xml": ("for clients that send or want XML", _wants_xml)}
 
 

@@ -88,7 +88,7 @@ def _written(template: str, folder: Path, values: dict[str, str]) -> str:
 
 FRONTS = (
     Front("nginx", "behind nginx", _nginx),
-    # It takes two equal Host lines for one, where RFC 9112 3.2 demands 400.
+    # haproxy merges two equal Host lines, where RFC 9112 3.2 demands 400.
     Front("haproxy", "behind haproxy", _haproxy, frozenset({"web-server/host-missing"})),
     Front("apache", "behind Apache httpd", _apache),
     Front("go-reverse-proxy", "behind Go's httputil.ReverseProxy", _go),
@@ -106,7 +106,7 @@ def behind(front: Front, robot: Robot) -> Iterator[Robot]:
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        # Started by root, a server's workers are nobody, who has to get at its files.
+        # A server started by root runs its workers as nobody, who needs access to the files.
         folder.chmod(0o755)
         ports = Ports(*_two_free_ports(), robot)
         log = folder / "output.log"

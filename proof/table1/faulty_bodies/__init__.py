@@ -11,7 +11,7 @@ from proof.table1.faulty_bodies.readings import READINGS
 from proof.table1.faulty_bodies.velocities import VELOCITIES
 
 FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
-#: Statements of faulty bodies that declare other values than ``baroque.toml``, by the fault's name.
+#: By fault: statement of a faulty body that declares other values than ``baroque.toml``.
 STATEMENTS = {path.stem: path for path in Path(__file__).parent.glob("*.toml")}
-#: Faults that a statement may hide: they need not fail, but must not pass.
+#: Faults that a statement may excuse: such a body need not fail, but must not pass.
 UNSEEN = frozenset({"dead-base"})

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from proof.table1.independent_robots.body import TICK_S, Body
 
-# What a body makes of the velocity that it was asked for (linear, angular).
+# Function from the commanded velocity (linear, angular) to the driven one.
 _Driven = Callable[[float, float], tuple[float, float]]
 
 
@@ -106,9 +106,9 @@ class _AxesIgnored(Body):
         super().__post_init__()
 
 
-_LINEAR, _ANGULAR = 0.25, 1.2  # what is fast for the robot, m/s and rad/s
+_LINEAR, _ANGULAR = 0.25, 1.2  # fast velocities for this robot, m/s and rad/s
 _SLOW, _SLOW_TURN = 0.1, 0.6
-_DEAD, _DEAD_TURN = 0.06, 0.25  # what is too slow for its motors
+_DEAD, _DEAD_TURN = 0.06, 0.25  # velocities that are too slow for its motors
 _STEP = 0.1
 _MOST_BACK, _MOST_TURN = 0.2, 1.3
 

@@ -98,7 +98,7 @@ class Body:
     yields: bool = False
     deliveries: list[Delivery] = field(default_factory=list)
     goal: Goal | None = None
-    further_axes = 0.0  # the greatest velocity that it accepts along axes that it has no motor for, m/s and rad/s
+    further_axes = 0.0  # greatest velocity that it accepts along axes without a motor, m/s and rad/s
 
     def __post_init__(self) -> None:
         self._lock = threading.RLock()

@@ -17,7 +17,7 @@ _mutant = MUTANTS.of_class("safety", "rest")
 
 _PUT, _PUT_LINEAR, _PUTS = rest("PUT", VELOCITY), rest("PUT", LINEAR), rest("PUT", VELOCITY, LINEAR)
 _DELETE, _PUT_GOAL, _POST = rest("DELETE", GOAL), rest("PUT", GOAL), rest("POST", VELOCITY)
-# Silence after which no client counts as reading, and interval of looks, s.
+# _SILENT_S: silence after which no client counts as reading, s. _LOOK_S: pause between looks, s.
 _SILENT_S, _LOOK_S = 0.12, 0.04
 
 
@@ -145,7 +145,7 @@ class _Resuming(Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = super().__call__(request, forward)
         if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
-            # Not before the navigation's own last word, which is zero.
+            # After the navigation's own last command, which is zero.
             later(0.2, sent, request.copy(), forward, "PUT", VELOCITY, self.last)
         return response
 

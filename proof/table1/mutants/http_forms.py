@@ -115,7 +115,7 @@ def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
         if request.side != "rest" or request.raw is None or not compiled.search(request.raw):
             return None
         line = request.raw.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
-        # A robot may know its own names, and answer no other.
+        # A robot may answer only to its own host names.
         host = _HOST.search(request.raw)
         return Request("rest", "GET", line[1], fields=[("Host", host[1].decode("latin-1") if host else "robot")])
 

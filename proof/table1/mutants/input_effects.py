@@ -102,7 +102,7 @@ def _ordered_by(method: str) -> Make:
 def _soap_refusal(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if request.side == "soap" and b"Execute" in request.body and b"Fault" in response.body:
-        # Only SOAP's side is at hand here: a valid message in place of the refused one.
+        # Only the SOAP interface is available here: send a valid message in place of the refused one.
         values = "".join(f"<{name}>1</{name}>" for name in ("depot_x", "depot_y", "destination_x", "destination_y"))
         message = f"<arg0>{values}<message_code>3</message_code><source_x>1</source_x><source_y>1</source_y></arg0>"
         envelope = enveloped(f'<t:ExecuteDeliveryRequest xmlns:t="{TNS}">{message}</t:ExecuteDeliveryRequest>')

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 MAX_BODY = 256 * 1024
 MAX_TARGET = 8000
-# Octets and time, s, for which a refused request is read on before the connection is closed.
+# MAX_UNREAD: bytes of a refused request that are read before closing. _LINGER_S: how long, s.
 MAX_UNREAD = 16 * 1024 * 1024
 _LINGER_S = 2.0
 
@@ -47,7 +47,7 @@ class _Handler(BaseHTTPRequestHandler):
     application: Application
 
     def __getattr__(self, name: str) -> Any:
-        # http.server looks for do_METHOD: every method is this application's affair.
+        # http.server looks for do_METHOD; this application handles every method itself.
         if name.startswith("do_"):
             return self._do
         raise AttributeError(name)
@@ -61,7 +61,7 @@ class _Handler(BaseHTTPRequestHandler):
         length = int(self.headers.get("Content-Length") or 0)
         body = self.rfile.read(length)
         if len(body) < length:
-            return  # the client has gone in the middle of its request: nothing is done
+            return  # the client has left in the middle of its request: do nothing
         answer = self.application.answer(self.command, origin_form(self.path), self.headers, body)
         self._send(answer)
 
