@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import differences, is_devices, is_shared, represented
+from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -62,6 +62,21 @@ class _Sandwich(NamedTuple):
     now: dict[str, Any]
     moving: frozenset[str]
     is_old: bool
+
+
+class _Leaf(NamedTuple):
+    """A member that was sent and is there: its path, its schema, the value, what was there before, and what is now."""
+
+    name: str
+    part: Schema
+    value: Any
+    was: Any
+    now: Any
+
+    @property
+    def top(self) -> str:
+        """The member of the body that it is in."""
+        return self.name.partition(".")[0].rpartition(" ")[2]
 
 
 class _Change(NamedTuple):
@@ -130,6 +145,9 @@ class Writes:
         # What may be chance: by operation and member, the bodies that showed it.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._precise: set[tuple[str, str]] = set()
+        # By template and member: methods whose values were read as they were sent, and patches that changed nothing.
+        self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
+        self._ignored: dict[tuple[str, str], dict[bytes, Case]] = defaultdict(dict)
         # The last body that was accepted, by path: a device may apply it after a request that it refuses.
         self._accepted: dict[str, Any] = {}
 
@@ -205,6 +223,7 @@ class Writes:
                 yield from self._merged(occasion, item, change)
             if not write.is_valid:
                 return
+            yield from _entries(occasion, change)
             yield from self._values(occasion, item, change)
             if request.method == "PUT":
                 yield from self._left_out(occasion, item, change)
@@ -275,13 +294,15 @@ class Writes:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
         shape = _parts(item.shape)
         there = {name: one for name, one in change.now.items() if name not in change.moving}
-        for name, part, value, was, now in _leaves(_parts(change.schema), change.sent, change.before, there):
+        for leaf in _leaves(_parts(change.schema), change.sent, change.before, there):
+            name, part, value, was, now = leaf
             if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
-            key, wrong, top = (change.operation.label, name), "", name.partition(".")[0]
+            key, wrong = (change.operation.label, name), ""
+            yield from self._unchanged(occasion, item, change, leaf)
             if part.get("format") == "double" and _is_rounded(value, now):
                 self._doubts[key].add(str(value).encode())
-                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(top), change.now[top])
+                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(leaf.top), change.now[leaf.top])
                 wrong = f"{shown(now)} as {name}" if is_sure else ""
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
@@ -305,6 +326,25 @@ class Writes:
             expected = f"{shown(value)} as {name}, as {change.label} wrote it"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} value")
 
+    def _unchanged(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
+        """Judge a value that a write left as it was: an empty one by PUT, or two by PATCH that PUT alone changes."""
+        key, last = (item.template, leaf.name), leaf.name.rpartition(".")[2]
+        is_same, method = same(leaf.now, leaf.was), change.write.request.method
+        if same(leaf.now, leaf.value):
+            self._taken[key] |= set() if is_same else {method}
+        elif is_same and change.is_settled(leaf.top, change.sent) and not is_shared(last):
+            expected = f"{shown(leaf.value)} as {leaf.name}, as {change.label} wrote it"
+            cause, found = f"{change.operation.label} {leaf.name} value", f"{shown(leaf.now)} as {leaf.name}, as before"
+            case = occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
+            is_open = "properties" in leaf.part or same(leaf.was, leaf.part.get("default"))
+            if method == "PUT" and leaf.value in (None, [], {}) and not is_open:
+                yield case
+            part: Schema = {"properties": {last: leaf.part}}
+            if method == "PATCH" and any(differences({last: leaf.value}, {last: leaf.now}, part, None, frozenset())):
+                self._ignored[key][change.write.request.body] = case
+        if self._taken[key] == {"PUT"} and len(self._ignored[key]) >= _SEEN:
+            yield from self._ignored.pop(key).values()
+
     def _items(self, name: str, value: list[Any], now: list[Any], part: Schema) -> str:
         """Return what differs in a list: its length, the order of its numbers, or the members of its objects."""
         inner = flat(part["items"]) if isinstance(part.get("items"), dict) else {}
@@ -321,18 +361,15 @@ class Writes:
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether members that a PUT leaves out get their default, or disappear if the description says so."""
-        is_said, needed = GONE.search(change.operation.text), flat(item.shape or {}).get("required", ())
-        for name, part in _parts(change.schema).items():
-            given = flat(part) if isinstance(part, dict) else {}
-            is_open = "default" not in given and (not is_said or name in needed)
-            if name in change.sent or is_open or name not in change.before or given.get("readOnly"):
+        is_said, bodies = GONE.search(change.operation.text), (change.sent, change.before, change.now)
+        for leaf, is_needed in _missing(_parts(change.schema), flat(item.shape or {}), bodies):
+            name, given, default, was, now = leaf
+            is_open = "default" not in given and (not is_said or is_needed)
+            if is_open or given.get("readOnly") or same(was, default):
                 continue
-            if is_devices(name, given, self._collections) or is_shared(name) or name in change.moving:
+            if is_devices(name, given, self._collections) or is_shared(name) or leaf.top in change.moving:
                 continue
-            was, now, default = change.before[name], change.now.get(name), given.get("default")
-            if same(was, default):
-                continue
-            is_kept = same(now, was) and change.is_settled(name, change.sent)
+            is_kept = same(now, was) and change.is_settled(leaf.top, change.sent)
             of = "the default of what" if "default" in given else "which"
             expected = f"{shown(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
             found = f"{shown(now)} as {name}, as before"
@@ -394,6 +431,18 @@ class Writes:
                     yield occasion.case(_PATCH, False, expected, found, cause=cause)  # noqa: FBT003
 
 
+def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
+    """Judge whether a map has all new entries of a body, if it has one of them."""
+    for name, part in _parts(change.schema).items():
+        value, was, now = (one.get(name) for one in (change.sent, change.before, change.now))
+        if isinstance(value, dict) and isinstance(now, dict) and "properties" not in flat(part):
+            new = [one for one in value if one not in (was or {}) and value[one] is not None]
+            lost = [one for one in new if one not in now]
+            wrong = f"no {lost[0]} in {name}" if 0 < len(lost) < len(new) else ""
+            cause, expected = f"{change.operation.label} {name} entries", f"the entries that {change.label} wrote"
+            yield occasion.case(_READ, not wrong, expected, wrong, cause=cause)
+
+
 def _is_rounded(value: Any, now: Any) -> bool:
     """Return whether a double reads as another one that is close to it."""
     if isinstance(value, bool) or isinstance(now, bool) or not (is_number(value) and is_number(now)):
@@ -413,16 +462,46 @@ def _is_moved(value: Any, now: Any) -> bool:
 
 
 def _leaves(
-    parts: Mapping[str, Any], sent: dict[str, Any], before: dict[str, Any], now: dict[str, Any], above: str = ""
-) -> Iterator[tuple[str, Schema, Any, Any, Any]]:
-    """Yield what was sent and is there now, in objects too: its path, its schema, the value, what was there and is."""
+    parts: Mapping[str, Any],
+    sent: dict[str, Any],
+    before: dict[str, Any],
+    now: dict[str, Any],
+    above: str = "",
+    of: str = "",
+) -> Iterator[_Leaf]:
+    """Yield what was sent and is there now, in objects and maps too; of: what all are called, as entries of a map."""
     for name in sent.keys() & now.keys():
         part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
-        if isinstance(value, dict) and isinstance(seen, dict):
-            inner = was if isinstance(was, dict) else {}
-            yield from _leaves(part.get("properties", {}), value, inner, seen, f"{above}{name}.")
+        if value and isinstance(value, dict) and isinstance(seen, dict):
+            inner, entries = (
+                was if isinstance(was, dict) else {},
+                "" if entry_of(part) is None else f"an entry of {name}",
+            )
+            yield from _leaves(members_in(part, value), value, inner, seen, f"{of or above + name}.", entries)
         else:
-            yield f"{above}{name}", part, value, was, seen
+            yield _Leaf(of or f"{above}{name}", part, value, was, seen)
+
+
+def _missing(
+    parts: Mapping[str, Any], shape: Schema, bodies: tuple[Any, ...], above: str = ""
+) -> Iterator[tuple[_Leaf, bool]]:
+    """Yield what was there and is not in a body, in its objects too, and whether each response has it.
+
+    Args:
+        parts: schemas of the members of the body.
+        shape: that of the response.
+        bodies: what was sent, what was there before, and what is there now.
+        above: path of what is read, with a dot.
+    """
+    needed = shape.get("required", ())
+    for name, part in parts.items():
+        given = flat(part) if isinstance(part, dict) else {}
+        _, was, now = inner = tuple(one.get(name) for one in bodies)
+        if name not in bodies[0] and name in bodies[1]:
+            yield _Leaf(f"{above}{name}", given, given.get("default"), was, now), name in needed
+        elif all(isinstance(one, dict) for one in inner):
+            within = flat(shape.get("properties", {}).get(name, {}))
+            yield from _missing(given.get("properties", {}), within, inner, f"{above}{name}.")
 
 
 def _parts(schema: Schema | None) -> Mapping[str, Any]:

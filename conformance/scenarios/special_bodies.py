@@ -12,7 +12,7 @@ from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import alike_and_apart, fits, sample
-from conformance.api.rest.things import another, is_devices
+from conformance.api.rest.things import another, entry_of, is_devices
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.checkers.writes import GONE
@@ -76,11 +76,49 @@ def special_bodies(
     # What is refused comes first: what is there already would show nothing.
     yield from half_valid(change, usual, changed)
     # All together, and what has a time zone alone: the device may have a reason to refuse another one.
-    zoned = [{name: one} for name, one in changed.items() if flat(parts[name]).get("format") == "date-time"]
-    yield from (one for one in (changed, *zoned) if one and fits(schema, one))
+    zoned = [
+        {name: one.replace("+02:00", "-03:30")}
+        for name, one in changed.items()
+        if flat(parts[name]).get("format") == "date-time"
+    ]
+    rich = {name: one for name, one in _rich(parts, there, values.collections).items() if may(name)}
+    empty: dict[str, Any] = {name: [] for name in rich.keys() | changed.keys() if isinstance(there[name], list)}
+    yield from (one for one in (changed, *zoned, rich, empty) if one and fits(schema, one))
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
         yield restored
+
+
+def _rich(parts: dict[str, Any], there: dict[str, Any], collections: frozenset[str]) -> dict[str, Any]:
+    """Return new entries for each map, and two different items for each list of objects."""
+    found: dict[str, Any] = {}
+    for name, one in there.items():
+        given = flat(parts[name])
+        inner = given.get("items") if isinstance(one, list) else entry_of(given)
+        of = flat(inner) if isinstance(inner, dict) else {}
+        if not of or (isinstance(one, list) and "properties" not in of) or is_devices(name, given, collections):
+            continue
+        wrapped: Schema = {"properties": dict.fromkeys(_KEYS[:2], of)}
+        made = telling(wrapped, {key: sample(of, 1, whole=True) for key in _KEYS[:2]}, 1, collections)
+        made[_KEYS[1]] = telling(wrapped, made, 2, collections)[_KEYS[1]]
+        owned = [key for key, part in of.get("properties", {}).items() if is_devices(key, part, collections)]
+        value = list(made.values()) if isinstance(one, list) else made
+        if not owned and made[_KEYS[0]] != made[_KEYS[1]] and fits(given, value):
+            found[name] = value
+    return found
+
+
+def _emptied(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]:
+    """Return empty lists and maps, null, and objects without their optional members, as far as they are allowed."""
+    found: dict[str, Any] = {}
+    for name, one in body.items():
+        given = flat(parts.get(name, {}))
+        inner = {key: one[key] for key in one if key in given.get("required", ())} if isinstance(one, dict) else one
+        candidates: tuple[Any, ...] = (None, [], {}, inner)
+        empty = next((new for new in candidates if fits(given, new)), one)
+        if empty != one and not is_devices(name, given, frozenset()):
+            found[name] = empty
+    return found
 
 
 def _replacing(
@@ -93,7 +131,13 @@ def _replacing(
 ) -> Iterator[dict[str, Any]]:
     """Yield bodies of PUT with other values of all members, with the required members alone, and as it was before."""
     if fits(schema, {**base, **changed}):
-        yield {**base, **changed}
+        parts = parts_of(schema)
+        whole = {**base, **changed}
+        rich = {**whole, **_rich(parts, whole, values.collections)}
+        less = {**rich, **{name: one for name, one in _emptied(parts, rich).items() if may(name)}}
+        yield from (
+            one for place, one in enumerate((whole, rich, less)) if not place or (one != whole and fits(schema, one))
+        )
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
         other = telling(schema, least, 2, values.collections)
         least |= {name: one for name, one in other.items() if may(name)}
@@ -172,9 +216,9 @@ def _nulls(
     changed = telling({"properties": parts}, {name: usable[name] for name in usable if name not in own}, 1, frozenset())
     for name in [one for one in changed if isinstance(changed[one], list) and changed[one] != usable[one]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
-    for name, given in ((one, flat(parts[one]).get("additionalProperties")) for one in usable if one not in own):
+    for name, given in ((one, entry_of(flat(parts[one]))) for one in usable if one not in own):
         # One entry of a map goes beside another one that is new, and then all go.
-        entry = sample(given) if isinstance(given, dict) and "properties" not in flat(parts[name]) else None
+        entry = sample(given) if given is not None else None
         if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):
             yield {name: dict.fromkeys(_KEYS[:2], entry)}
             yield {name: {_KEYS[0]: None, _KEYS[2]: entry}}

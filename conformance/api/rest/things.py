@@ -142,7 +142,7 @@ def differences(
     Members that the device sets or hides by their name or mark, that the response does not have, and that are
     normalized (case, space, rounding) are left out.
     """
-    parts = flat(schema).get("properties", {})
+    parts = members_in(schema, sent)
     shared = _parts(answer or {}, sent)
     for name, value in sent.items():
         part, other = parts.get(name), seen.get(name)
@@ -154,6 +154,18 @@ def differences(
             yield from (f"{one} in {name}" for one in differences(value, other, part, shared.get(name), collections))
         elif not _alike(value, other, flat(part)):
             yield f"{shown(other)} as {name} instead of {shown(value)}"
+
+
+def members_in(schema: Schema, names: Collection[str]) -> dict[str, Any]:
+    """Return the schemas of an object's members; of a map, those of the entries with these names."""
+    entry = entry_of(flat(schema))
+    return flat(schema).get("properties", {}) if entry is None else dict.fromkeys(names, entry)
+
+
+def entry_of(schema: Schema) -> Schema | None:
+    """Return the schema of the entries of a map; None of what has members of its own, or entries of any kind."""
+    entry = schema.get("additionalProperties")
+    return entry if isinstance(entry, dict) and "properties" not in schema else None
 
 
 def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def _op(kind, path, value=None, **more):
     return {"op": kind, "path": path, **({"value": value} if kind in {"add", "replace", "test"} else {}), **more}
 
 
-_LONG = 2**53 + 1
+_LONG, _ZONE = 2**53 + 1, {"a": 5, "b": 6}
 _EAST = "2026-02-01T12:34:56+02:00"
 _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
@@ -210,6 +210,14 @@ BROKEN = {
     "an integer as a double": ([_get(), _put(**{**_WHOLE, "count": _LONG}), _get(count=_LONG - 1)], READ),
     "numbers in another order": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[1, 3, 3])], READ),
     "equal numbers once": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[3, 1])], READ),
+    "an empty list by PUT is ignored": ([_get(words=["a"]), _put(**_WHOLE, words=[], told={"words": ["a"]}), _get(words=["a"])], READ),
+    "a patch leaves what is in an object, which PUT changes": (
+        [
+            *(_get("/merge"), _put("/merge", **{**_WHOLE, "zone": _ZONE}), _get("/merge", zone=_ZONE)),
+            *(_patch("/merge", {"zone": {"a": 7}}, zone=_ZONE), _get("/merge", zone=_ZONE)),
+            *(_patch("/merge", {"zone": {"a": 8}}, zone=_ZONE), _get("/merge", zone=_ZONE)),
+        ], READ,
+    ),
     "an object of a list is lost": (
         [_get(), _put(**_WHOLE, stops=[{"x": 1}, {"x": 2}]), _get(stops=[{"x": 1}])], READ,
     ),
@@ -297,6 +305,10 @@ RIGHT = {
     "a JSON patch that acts later": [
         *(_get("/steps"), _patch("/steps", [_op("replace", "/count", 9)], count=9), *[_get("/steps")] * 2),
         _get("/steps", count=9),
+    ],
+    "a patch of what shows the device": [
+        *(_get("/merge"), _patch("/merge", {"zone": {"a": 7}}), _get("/merge")),
+        *(_patch("/merge", {"zone": {"a": 8}}), _get("/merge")),
     ],
     "clamped": [
         _get(), _put(**{**_WHOLE, "gain": 50.5}), _get(gain=10), _put(**{**_WHOLE, "gain": 60.5}), _get(gain=10),
