@@ -135,6 +135,12 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
             break
 
 
+def pages_below(api: RestInterface, values: Values, listing: Listing, path: str) -> Iterator[Paged]:
+    """Yield what is seen of a list below a thing in parts."""
+    reader = Reader(api, values, listing, path=path)
+    return _Parts(reader).all(reader.until)
+
+
 def vary_lists(api: RestInterface, values: Values) -> None:
     """Send each list values of its filters and sorts, with and without a limit; and read it as it is, at the end."""
     for listing in lists_of(api):
@@ -163,6 +169,7 @@ class Reader:
         listing: the list.
         always: values of query parameters, by name, that each request has.
         by: as in Page.
+        path: of a list below a thing.
     """
 
     api: RestInterface
@@ -170,6 +177,7 @@ class Reader:
     listing: Listing
     always: dict[str, Any] = field(default_factory=dict)
     by: str = ""
+    path: str = ""
 
     @property
     def until(self) -> float:
@@ -189,16 +197,19 @@ class Reader:
             inputs = inputs.having("query", name, value)
         # A device may answer on a new connection, or with a coding, in another way.
         is_odd, request = len(query or {}) % 2 == 1, written(self.listing.operation, inputs)
+        target = self.path + "".join(request.target.partition("?")[1:]) if self.path else request.target
         headers = (*request.headers, *([("Accept-Encoding", "gzip")] if is_odd else []))
-        found, limit = self.api.send(replace(request, headers=headers), fresh=is_odd), self.listing.limit
+        found, limit = self.api.send(replace(request, target=target, headers=headers), fresh=is_odd), self.listing.limit
         page, most = (
             page_of(found.response, self.listing.operation),
             inputs.query.get(limit.name) if limit is not None else None,
         )
         if limit is not None and page is not None and isinstance(most, int) and 0 < most < len(page.items):
             # A device that raises the limit shows as many items for the raised one.
-            raised = inputs.having("query", limit.name, len(page.items))
-            self.api.send(written(self.listing.operation, raised))
+            raised = written(self.listing.operation, inputs.having("query", limit.name, len(page.items)))
+            self.api.send(
+                replace(raised, target=self.path + raised.target[raised.target.index("?") :]) if self.path else raised
+            )
         return found
 
     def refused(self) -> None:

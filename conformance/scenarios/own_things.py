@@ -24,10 +24,11 @@ from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.contents import keeps_octets
 from conformance.checkers.memory import ending_with
 from conformance.documents.json_schema import Schema
-from conformance.documents.json_text import read_json
+from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
+from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
 from conformance.scenarios.refusing import NO_FORMAT
@@ -41,6 +42,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError, NotPermitted
 from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
+#: Way by which a list below another thing is read.
+ANOTHER: Final = "another thing"
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 # Members of a resource that are written one by one.
 _MEMBERS: Final = 6
@@ -333,24 +336,48 @@ class _Thing:
                 self._ended(put, read, operations.get(("DELETE", template)), request, whole)
 
     def listed_below(self, operations: Mapping[tuple[str, str], Operation]) -> None:
-        """Create in each list below it, the last one with texts beyond ASCII, then both at once, and read the list."""
-        own = self.read.template.rstrip("/")
+        """Create items in each list below it, and look for them there, in parts, and below another thing."""
+        own, values = self.read.template.rstrip("/"), self.surveyor.values
         for (method, template), create in operations.items():
             read, below = operations.get(("GET", template)), template.removeprefix(own)
+            listing = listing_of(read) if read is not None else None
             if method != "POST" or read is None or not template.startswith(f"{own}/") or "{" in below:
                 continue
-            usual = usual_inputs(create, self.surveyor.values)[0]
-            bodies = [usual.body, _with_texts(create, usual.body)] if listing_of(read) is not None else []
-            steps = [(create, replace(usual, body=body)) for body in bodies if body is not None]
-            steps += [(read, usual_inputs(read, self.surveyor.values)[0])] if steps else []
-            sent = list[Outgoing]()
-            for operation, inputs in steps:
-                request = written(operation, inputs)
-                target = self.target.rstrip("/") + below + "".join(request.target.partition("?")[1:])
-                sent.append(replace(request, target=target))
-                if operation is read and len(sent) > 2:  # noqa: PLR2004 - two creations at once
-                    send_together([[(self.api.client, one) for one in sent[:-1]]])
-                self.surveyor.send(operation, Variation(Kind.AGAIN, "", "", inputs), sent[-1])
+            usual = usual_inputs(create, values)[0]
+            bodies = [usual.body, _with_texts(create, usual.body)] if listing is not None else []
+            made = [self._at(create, replace(usual, body=body), below) for body in bodies if body is not None]
+            if not made or listing is None:
+                continue
+            known = (str(one) for one in values.known_ids(self.read, self.read.parameter("path")[-1]))
+            others = (f"{self.target.rstrip('/').rpartition('/')[0]}/{quote(one, safe='')}{below}" for one in known)
+            other = next((one for one in others if one != self.target.rstrip("/") + below), "")
+            before = self._items(listing, other)
+            for outgoing, inputs in made:
+                self.surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs), outgoing)
+            # At once: as often as makes several pages.
+            send_together([[(self.api.client, one) for one, _ in (made[0], *made)]])
+            inputs = usual_inputs(read, values)[0]
+            outgoing, _ = self._at(read, inputs, below)
+            found = self.surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), outgoing).exchange
+            page = page_of(found.response, read) if found is not None else None
+            after = self._items(listing, other) if before is not None and page is not None else None
+            if after is not None and before is not None and page is not None:
+                both = [one for one in after[1] if one in page.items and one not in before[1]]
+                expected, fault = f"no item that was created at {outgoing.target}", f"{shown(both[0])}" if both else ""
+                self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
+            self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
+
+    def _at(self, operation: Operation, inputs: Inputs, below: str) -> tuple[Outgoing, Inputs]:
+        """Return a request to what is below it, with the inputs that it has."""
+        request = written(operation, inputs)
+        target = self.target.rstrip("/") + below + "".join(request.target.partition("?")[1:])
+        return replace(request, target=target), inputs
+
+    def _items(self, listing: Listing, path: str) -> tuple[Exchange, tuple[Any, ...]] | None:
+        """Read a list below another thing; None without one."""
+        found = self.api.send(Outgoing("GET", path)) if path else None
+        page = page_of(found.response, listing.operation) if found is not None else None
+        return (found, tuple(page.items)) if found is not None and page is not None else None
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
         """Read a file, parts of it, and the file again."""

@@ -21,6 +21,7 @@ from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inpu
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
+from conformance.scenarios.lists import Paged
 from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -135,12 +136,14 @@ class Survey:
         repeats: response times of one request that was sent again and again, ms.
         repeated: the last of these exchanges, or None.
         elsewhere: for operations whose usual request was answered 404, a GET of a path beside it that is not described.
+        paged: lists below a thing, in parts.
     """
 
     probes: tuple[Probe, ...] = ()
     repeats: tuple[float, ...] = ()
     repeated: Exchange | None = None
     elsewhere: Mapping[str, Exchange] = field(default_factory=dict)
+    paged: tuple[Paged, ...] = ()
 
     def of(self, operation: str, *kinds: Kind) -> list[Probe]:
         """Return the probes of one operation, of these kinds or of all."""
@@ -185,6 +188,7 @@ class Surveyor:
     usual: dict[str, Inputs] = field(default_factory=dict)
     given_up: set[str] = field(default_factory=set)
     elsewhere: dict[str, Exchange] = field(default_factory=dict)
+    paged: list[Paged] = field(default_factory=list)
 
     @cached_property
     def _reaching(self) -> Reaching:
@@ -193,7 +197,7 @@ class Surveyor:
     @property
     def trace(self) -> Survey:
         """What was recorded so far."""
-        return Survey(tuple(self.probes), elsewhere=self.elsewhere)
+        return Survey(tuple(self.probes), elsewhere=self.elsewhere, paged=tuple(self.paged))
 
     def send(
         self, operation: Operation, variation: Variation, request: Outgoing | None = None, *, fresh: bool | None = None
@@ -277,15 +281,8 @@ class Surveyor:
             self.api.run.judge.fault(operation.label, SlowPatternError(said.slow))
         own = said if said.operation == operation else Validity(UNCLEAR)
         invents = self.values.invents(operation, request)
-        return Probe(
-            operation.label,
-            variation.kind,
-            variation.says,
-            variation.place,
-            validity=own.verdict,
-            why=own.why,
-            invents=invents,
-        )
+        given = operation.label, variation.kind, variation.says, variation.place
+        return Probe(*given, validity=own.verdict, why=own.why, invents=invents)
 
     def _recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
         """Send a request whose exchange becomes a probe, so that no checker judges it as well.

@@ -8,9 +8,10 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.scenarios.lists import Paged, pages_of_lists, vary_lists
 from conformance.scenarios.neighbours import neighbours
-from conformance.scenarios.own_things import own_things
+from conformance.scenarios.own_things import ANOTHER, own_things
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
+from conformance.scenarios.survey import Survey
 from conformance.verdict.evidence import Case
 
 
@@ -41,3 +42,15 @@ def list_pages(trace: tuple[Paged, ...]) -> Iterable[Outcome]:
     """Judge whether the parts of a list are the list, each item once."""
     for one in trace:
         yield Case(not one.fault, one.found, one.expected, one.fault, cause=f"{one.operation} {one.way}")
+
+
+@rule("description/list-pages", on=(own_things,))
+def list_pages_below(trace: Survey) -> Iterable[Outcome]:
+    """Judge the same of lists below a thing."""
+    return list_pages.judge(tuple(one for one in trace.paged if one.way != ANOTHER))
+
+
+@rule("description/own-identifier", on=(own_things,))
+def own_items(trace: Survey) -> Iterable[Outcome]:
+    """Judge whether what was created below a thing is not below another one."""
+    return list_pages.judge(tuple(one for one in trace.paged if one.way == ANOTHER))

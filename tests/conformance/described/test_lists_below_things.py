@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import re
 
 import pytest
 from aiohttp import web
@@ -24,6 +25,10 @@ _NOTE = {
 }
 _TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}
 _ID = {"parameters": [{"in": "path", "name": "shelfId", "required": True, "schema": {"type": "integer"}}]}
+_PARTS = [
+    {"in": "query", "name": name, "schema": {"type": "integer", "minimum": least, "maximum": 99}}
+    for name, least in (("limit", 1), ("offset", 0))
+]
 
 
 def _made(body, schema):
@@ -66,7 +71,12 @@ def _device(fault):  # noqa: C901 - a device
     async def noted(request):
         if of(request) is None:
             return error(404, "no such shelf")
-        shown = [dict(one) for one in notes.get(of(request)["id"], [])]
+        limit, offset = (request.query.get(name, least) for name, least in (("limit", "20"), ("offset", "0")))
+        if not all(re.fullmatch(r"0|[1-9][0-9]?", one) for one in (limit, offset)) or limit == "0":
+            return error(400, "a number, please")
+        kept = [one for some in notes.values() for one in some] if fault == "all" else notes.get(of(request)["id"], [])
+        begin = int(offset) + (fault == "gap" and offset > "1")
+        shown = [dict(one) for one in kept[begin : begin + int(limit)]]
         for one in shown:
             if fault == "time":
                 one["at"] = one["at"].removesuffix("Z")
@@ -91,7 +101,11 @@ def _device(fault):  # noqa: C901 - a device
     paths = {
         "/shelves": {**reading(shelf_list), "post": _made(_NEW, _SHELF)},
         "/shelves/{shelfId}": {**_ID, **reading(_SHELF)},
-        "/shelves/{shelfId}/notes": {**_ID, **reading(note_list), "post": _made(_TEXT, _NOTE)},
+        "/shelves/{shelfId}/notes": {
+            **_ID,
+            "get": {**reading(note_list)["get"], "parameters": _PARTS},
+            "post": _made(_TEXT, _NOTE),
+        },
     }
     routes = {
         "/shelves": {"GET": listed, "POST": create},
@@ -109,6 +123,8 @@ def _device(fault):  # noqa: C901 - a device
         ("time", ["description/formats"]),
         ("text", ["description/written-is-read"]),
         ("number", ["description/created-is-there"]),
+        ("all", ["description/own-identifier"]),
+        ("gap", ["description/list-pages"]),
     ],
 )
 def test_what_is_created_below_a_thing_is_read_in_its_list(fault, blamed, tmp_path):
