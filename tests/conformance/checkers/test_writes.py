@@ -210,7 +210,9 @@ BROKEN = {
     "an integer as a double": ([_get(), _put(**{**_WHOLE, "count": _LONG}), _get(count=_LONG - 1)], READ),
     "numbers in another order": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[1, 3, 3])], READ),
     "equal numbers once": ([_get(), _put(**_WHOLE, path=[3, 1, 3]), _get(path=[3, 1])], READ),
-    "an empty list by PUT is ignored": ([_get(words=["a"]), _put(**_WHOLE, words=[], told={"words": ["a"]}), _get(words=["a"])], READ),
+    "an empty list by PUT is ignored": (
+        [_get(words=["a"]), _put(**_WHOLE, words=[], told={"words": ["a"]}), _get(words=["a"])], READ,
+    ),
     "a patch leaves what is in an object, which PUT changes": (
         [
             *(_get("/merge"), _put("/merge", **{**_WHOLE, "zone": _ZONE}), _get("/merge", zone=_ZONE)),
