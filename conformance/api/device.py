@@ -76,11 +76,11 @@ class Device:
         return ()
 
     def listeners(self, api: Rest) -> Iterable[Listener]:  # noqa: ARG002 - for packs
-        """Return what listens to every exchange of the run."""
+        """Return the listeners of the pack, which get every exchange of the run."""
         return ()
 
     def checkers(self, api: Rest | None, services: Iterable[Soap]) -> Iterable[Checker]:  # noqa: ARG002 - for packs
-        """Return what judges every exchange of the run by the pack's contract."""
+        """Return the checkers of the pack's contract, which judge every exchange of the run."""
         return ()
 
     def halt(self, api: Rest) -> None:

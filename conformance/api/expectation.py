@@ -87,5 +87,5 @@ def expect(judge: Judge, requirement: str, attempt: Attempt | None) -> Expectati
 
 
 def is_one_of(status: int, allowed: tuple[int | str, ...]) -> bool:
-    """Return whether a status is one of some statuses (404) and classes of statuses ("4xx")."""
+    """Return whether a status is in a list of statuses (404) and classes of statuses ("4xx")."""
     return status in allowed or f"{status // 100}xx" in allowed

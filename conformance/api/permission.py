@@ -1,4 +1,4 @@
-"""Which requests a run may send to a device: everything with --allow-motion, without it only what cannot act.
+"""Requests that a run may send to a device: all with --allow-motion, otherwise only those that cannot move it.
 
 This is the only place of that rule. ``Connection.permit`` holds it, and every request passes it, raw bytes included.
 """

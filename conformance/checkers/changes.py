@@ -1,4 +1,4 @@
-"""States of things, by all reads of a run: what is done or cancelled stays so, and a refused DELETE deletes nothing.
+"""States of things over all reads of a run: a finished thing stays finished, and a refused DELETE deletes nothing.
 
 `checkers.writes` judges what PUT and PATCH change.
 """
@@ -105,7 +105,7 @@ class Changes:
         self._known: dict[str, _State] = {}
 
     def forget(self) -> None:
-        """Forget what a request of unknown effect may have changed."""
+        """Forget all states that a request of unknown effect may have changed."""
         self._there.clear()
         self._known.clear()
         self._claims.clear()
@@ -146,7 +146,7 @@ class Changes:
             self._known.clear()
 
     def _told(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
-        """Judge the response to an operation of a thing: what is final is not ended once more."""
+        """Judge the response to an operation on a thing: a finished thing cannot be ended again."""
         before = self._known.pop(path, None)
         now = _state_in(occasion, name) if state_of(operation) == name else ""
         was = before.value if before is not None and not before.told else ""
@@ -223,7 +223,7 @@ class Changes:
         self._known[path] = _State(now, occasion.response.received_s)
 
     def _fallen(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
-        """Judge the members of a thing that never decrease, as the description says."""
+        """Judge the members of a thing that never decrease, by the description."""
         names, answer = self._growing.get(template, frozenset()), occasion.response
         value = read_json(answer.body).value if names and is_json(answer.media_type) else None
         now = {name: one for name, one in represented(value, names).items() if name in names and is_number(one)}

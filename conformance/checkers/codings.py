@@ -1,4 +1,4 @@
-"""Content codings (RFC 9110 8.4, 12.5.3): gzip data is whole, has the content as it is without, and is allowed."""
+"""Content codings (RFC 9110 8.4, 12.5.3): gzip data is complete, equals the plain content, and was allowed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NOT_SHARED: Final = re.compile(r"no-store|no-cache|private", re.IGNORECASE)
 
 @dataclass
 class _Resource:
-    """What was read without a coding: the last response, how many there were, and coded ones that wait for more."""
+    """Responses for one resource: the last plain one, their number, and compressed ones that wait to be compared."""
 
     last: Response | None = None
     count: int = 0
@@ -81,7 +81,7 @@ class Codings:
 
 
 def _allowed(occasion: Occasion) -> Iterator[Case]:
-    """Judge a response by Accept-Encoding; without it, any coding may be sent."""
+    """Judge a response's coding by Accept-Encoding; without that header, any coding is allowed."""
     asked = ", ".join(value for name, value in occasion.request.headers if name.lower() == "accept-encoding")
     coding, weights = occasion.response.content.coding, _weights(asked)
     if asked and weights is not None:

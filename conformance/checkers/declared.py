@@ -147,7 +147,7 @@ def _shape(occasion: Occasion, operation: Operation, schema: Schema) -> Iterator
 
 @lru_cache(maxsize=256)
 def _fault(shape: Shape, media_type: str, body: bytes) -> str:
-    """Return what is wrong with a body; once, because a device answers most requests as it did before."""
+    """Return the fault of a body, or an empty text. Results are cached, because most responses repeat."""
     try:
         problem = shape.problem(read(media_type, body, shape.schema))
     except UnreadableError as error:
@@ -156,7 +156,7 @@ def _fault(shape: Shape, media_type: str, body: bytes) -> str:
 
 
 class WriteOnly:
-    """Judges whether a response shows what the description marks as written only (OpenAPI 3.0, 4.7.24.2)."""
+    """Judges whether a response contains members that the description marks as writeOnly (OpenAPI 3.0, 4.7.24.2)."""
 
     def __init__(self) -> None:
         self._seen: dict[str, int] = defaultdict(int)

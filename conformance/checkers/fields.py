@@ -80,7 +80,7 @@ def formats(occasion: Occasion) -> Iterator[Case]:
 
 
 def last_modified(occasion: Occasion) -> Iterator[Case]:
-    """Judge that nothing was changed later than the response was made (RFC 9110 8.8.2.1)."""
+    """Judge that Last-Modified is not later than the response's Date (RFC 9110 8.8.2.1)."""
     said, now = (occasion.response.header(name) or "" for name in ("last-modified", "date"))
     if all(_IMF_FIXDATE.fullmatch(one.strip()) and _is_date(one) for one in (said, now)):
         late = parsedate_to_datetime(said) - parsedate_to_datetime(now)

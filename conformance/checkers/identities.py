@@ -146,7 +146,7 @@ class Uniques:
 
     @staticmethod
     def _listed(occasion: Occasion, operation: Operation, bodies: list[dict[str, Any]]) -> Iterator[Case]:
-        """Judge whether two things, which a list shows as two creations made them, have two identifiers."""
+        """Judge whether two created things that a list contains have different identifiers."""
         own = dict[str, dict[str, Any]]()
         for item in listed(read_json(occasion.response.body).value) or []:
             names = [name for name in item if plain_name(name) in _IDS] if isinstance(item, dict) else []

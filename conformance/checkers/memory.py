@@ -68,7 +68,7 @@ _STAYS: Final = re.compile(
 
 @dataclass
 class _Thing:
-    """One thing, with what this run did to it.
+    """A thing on the device, with the run's requests to it.
 
     Attributes:
         path: as it was written; of a device that knows case, another spelling is another thing.
@@ -155,7 +155,7 @@ class Memory:
         self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
 
     def forget(self, *, deletes: bool = True) -> None:
-        """Forget what a request of unknown effect may have changed: all things, if it ``deletes``."""
+        """Forget states that a request of unknown effect may have changed: all of them, if it ``deletes``."""
         self._things = {} if deletes else {key: one for key, one in self._things.items() if not one.gone}
         for thing in self._things.values():
             thing.written.clear()
@@ -236,7 +236,7 @@ class Memory:
         self._things[path.casefold()] = thing
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
-        """Return the things that end together with a thing, as the description of its DELETE says."""
+        """Return the things that end together with a thing, by the description of its DELETE."""
         found = [one.path for one in self._things.values() if _is_below(one.path, path) and not one.gone]
         said = ending_with(delete)
         return [one for one in found if one in self._made and said & set(map(singular, one[len(path) :].split("/")))]
@@ -293,7 +293,7 @@ class Memory:
                 yield occasion.case(id_, holds, expected, f"{name}: {value}", cause=f"{label} {name}")
 
     def _defaults(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
-        """Judge whether a created thing has the declared default of what its creation left out; once may be chance."""
+        """Judge whether omitted members of a created thing have their defaults; a single failure may be chance."""
         body, sent = operation.bodies.get(occasion.request.media_type), _sent_of(occasion)
         answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         if body is None or not occasion.request.body or not occasion.is_valid:
@@ -361,7 +361,7 @@ class Memory:
             yield from self._compared(occasion, item, thing, age_s)
 
     def _deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
-        """Judge a read of what was deleted."""
+        """Judge a read of a deleted thing."""
         response = occasion.response
         thing.absent |= response.status in _ABSENT
         if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
@@ -400,7 +400,7 @@ class Memory:
                 )
 
     def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
-        """Note for how long something has lasted; yield what should have lasted as well."""
+        """Record how long a value has stayed the same; yield waiting cases that must have lasted as long."""
         ages = self._lasted[kept]
         ages[value] = max(ages[value], age_s)
         waiting = self._pending.pop(kept, [])
@@ -454,7 +454,7 @@ def _read_only(item: Operation) -> frozenset[str]:
 
 
 def _sent_of(occasion: Occasion) -> dict[str, Any]:
-    """Return the members of a JSON object in a request, with or without a description of them."""
+    """Return the members of a request's JSON object, with or without a description."""
     request = occasion.request
     is_short = len(request.body) <= _MOST_OCTETS and is_json(request.media_type)
     value = read_json(request.body).value if is_short else None
@@ -462,13 +462,13 @@ def _sent_of(occasion: Occasion) -> dict[str, Any]:
 
 
 def ending_with(delete: Operation) -> frozenset[str]:
-    """Return the words for things that end with another one, from the clauses that do not say what stays."""
+    """Return the words for things that end with another thing, without clauses on things that stay."""
     clauses = [one for one in re.split(r"[.;]\s", delete.text) if not _STAYS.search(one)]
     return frozenset(singular(word) for one in clauses for word in words_of(one))
 
 
 def _is_for_ever(item: Operation, create: Operation) -> bool:
-    """Return whether no later thing gets a deleted identifier: it is a UUID, or the description says so."""
+    """Return whether a deleted identifier is never used again: it is a UUID, or the description says so."""
     parameter, parts = item.parameter("path")[-1], flat(item.shape or {}).get("properties", {})
     named = [flat(one) for name, one in parts.items() if plain_name(name) in {plain_name(parameter.name), "id"}]
     given = flat(parameter.schema)

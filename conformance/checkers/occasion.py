@@ -1,4 +1,4 @@
-"""What an exchange is good for: computed once, from its bytes and the description, for all checkers of REST."""
+"""What an exchange can be judged for: computed once, from its bytes and the description, for all REST checkers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Occasion:
 
     @property
     def is_valid(self) -> bool:
-        """Whether the contract allows the request, so that nothing in it is a reason to refuse it."""
+        """Return whether the contract allows the request, so that its content is no reason to refuse it."""
         return self.validity.verdict == VALID
 
     def case(

@@ -24,7 +24,7 @@ _MOST: Final = 4000
 
 
 class _Shown(NamedTuple):
-    """What HEAD has to repeat of a response to GET."""
+    """The parts of a response to GET that HEAD must repeat."""
 
     status: int
     tag: str
@@ -120,7 +120,7 @@ class Resources:
             yield head.case("http/head-length", length == str(shown.length), expected, found, cause=f"{label} length")
 
     def _method(self, occasion: Occasion) -> Iterator[Case]:
-        """Judge a method that the description does not have for a path, where something is there."""
+        """Judge a method that the description does not declare for an existing path."""
         path, method, status = (
             occasion.context.target.split("?", 1)[0],
             occasion.request.method,
@@ -145,7 +145,7 @@ class Resources:
             self._suspects.append((path, occasion))
 
     def _declared(self, occasion: Occasion, path: str) -> Iterator[Case]:
-        """Note what a response of a declared operation shows of a path, and judge the cases that waited for it."""
+        """Record what a declared operation's response shows about a path, and judge the cases that waited for that."""
         status = occasion.response.status
         if status in _GONE or (occasion.request.method == "DELETE" and occasion.response.ok):
             gone = [one for one in self._there if one == path or one.startswith(f"{path.rstrip('/')}/")]

@@ -31,7 +31,7 @@ _DOCUMENTS: Final = (
 
 
 class RestCheckers:
-    """Judges each exchange with a REST interface, whoever sent it.
+    """Judges every exchange with a REST interface, whichever check sent it.
 
     Args:
         contract: by which it is judged.
@@ -52,7 +52,7 @@ class RestCheckers:
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
-        """Forget what a request of unknown effect may have changed."""
+        """Forget states that a request of unknown effect may have changed."""
         self._memory.forget(deletes=deletes)
         self._writes.forget()
         self._changes.forget()

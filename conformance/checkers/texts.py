@@ -1,4 +1,4 @@
-"""Texts beyond ASCII that were written: a read after the write shows them, and not what another encoding makes."""
+"""Texts beyond ASCII: a read after the write returns them, and not their bytes in another encoding."""
 
 import re
 import unicodedata
@@ -33,7 +33,7 @@ class _Write(NamedTuple):
 
 
 class Texts:
-    """Judges the first read after a write. What still shows the old text is not judged: a device may store it later."""
+    """Judges the first read after a write. A read with the old text is not judged, because a device may store later."""
 
     def __init__(self) -> None:
         self._shown: dict[str, dict[str, Any]] = {}
@@ -96,10 +96,10 @@ def _within(value: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]
 
 
 def _plain(text: str) -> str:
-    """Return a text as it is compared: in one normal form, without regard to case and white space."""
+    """Return a text for comparison: in one normal form, without case and white space."""
     return _SPACE.sub(" ", unicodedata.normalize("NFKC", text)).strip().casefold()
 
 
 def _ascii(text: str) -> str:
-    """Return what is left of a text where a device takes letters of ASCII alone."""
+    """Return a text as a device keeps it that accepts only ASCII letters."""
     return _plain(unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode())

@@ -80,7 +80,7 @@ class _Count:
     other: list[tuple[Occasion, int]] = field(default_factory=list)
 
     def learn(self, total: int, part: _Part) -> None:
-        """Note what a total counts at the end of a list; of a list that may be cut, only an equal count is noted."""
+        """Record what a total counts, at the end of a list; if the list may be cut, only if both are equal."""
         agrees = total == part.least
         if self.agrees is None and (part.sure or agrees):
             self.agrees = agrees
@@ -97,7 +97,7 @@ class _Count:
         return is_quiet and (self.times >= _OFTEN or now_s - since_s >= SETTLES_S)
 
     def agreed(self, page: Page, changed_s: float) -> Iterator[tuple[Occasion, int]]:
-        """Note the whole list that it agrees with; yield the parts that told another total, if the list is the same."""
+        """Record the list that a total agrees with; yield earlier parts that had another total meanwhile."""
         before, self.last = self.last, frozenset(page.identities)
         if self.last == before:
             told = [one for one in self.other if one[0].response.received_s - changed_s >= SETTLES_S]
@@ -107,7 +107,7 @@ class _Count:
 
 
 class Totals:
-    """Judges totals over a run, each by what it counted when it was first seen with a whole list."""
+    """Judges totals over a run, each by what it counted when the whole list was first read."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
@@ -119,7 +119,7 @@ class Totals:
         self._changed_s = when_s
 
     def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-        """Yield the cases of one response; none if the parameters do not say which part of the list it shows."""
+        """Yield the cases of one response; none if the parameters do not tell which part of the list it contains."""
         label, shown = listing.operation.label, len(page.items)
         self._longest[label] = max(self._longest[label], shown)
         elsewhere = {one.name for one in (listing.page, listing.cursor) if one is not None}
@@ -188,7 +188,7 @@ class Totals:
 
 
 def says_filtered(listing: Listing) -> set[str]:
-    """Return the totals that count the filtered items, as the description says."""
+    """Return the totals that count filtered items, by the description."""
     return {name for name, text in listing.says.items() if plain_name(name) in TOTALS and _FILTERED.search(text)}
 
 

@@ -86,7 +86,7 @@ class Transitions:
                 yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
 
     def _read(self, occasion: Occasion, template: str, path: str) -> None:
-        """Note what a thing reads."""
+        """Record the members of a thing as read."""
         answer, name = occasion.response, self._states.get(template, "")
         is_usable = bool(name) and answer.ok and is_json(answer.media_type) and len(answer.body) < _OCTETS
         now = represented(read_json(answer.body).value, {plain_name(name)}) if is_usable else {}

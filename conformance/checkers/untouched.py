@@ -1,4 +1,4 @@
-"""What changes between two reads though only a request was refused, or a read had a condition (RFC 9110 9.2.1, 15.5).
+"""Changes between two reads although only a refused or conditional request came between (RFC 9110 9.2.1, 15.5).
 
 Between two equal reads, only one operation was refused, or the resource was read by other header fields. What changes
 then each time, and never between two reads alone, has been changed by that.
@@ -40,20 +40,20 @@ _CONDITIONAL: Final = "GET with If-None-Match"
 
 
 def keeps_all(contract: Contract) -> bool:
-    """Return whether the description says of all requests that a refused one changes nothing."""
+    """Return whether the description promises for all requests that a refused one changes nothing."""
     info = contract.openapi.get("info", {}) if contract.openapi_path else {}
     return bool(_SAID.search(str(info.get("description", ""))))
 
 
 class _Seen(NamedTuple):
-    """The members of a resource as they were read, and what came since: labels of what should change nothing."""
+    """Members of a resource at the last read, and the labels of requests since then that must not change them."""
 
     members: dict[str, Any]
     since: frozenset[str] = frozenset()
 
 
 class Untouched:
-    """Judges each plain GET by the one before it, if nothing between them may have changed anything.
+    """Judges each plain GET by the one before, if no request between them may have changed anything.
 
     Args:
         contract: the description's.

@@ -1,4 +1,4 @@
-"""Effect of a write, by method and media type: compare the read after it with the one before.
+"""Effect of a write, by method and media type: compare the read after it with the read before.
 
 PUT replaces: what it leaves out has its default. A merge patch changes members and removes by null (RFC 7396). A JSON
 patch does all its operations, or none (RFC 6902). What is refused changes nothing. Only a read, one write and a read
@@ -56,7 +56,7 @@ class _State(NamedTuple):
 
 
 class _Sandwich(NamedTuple):
-    """Members before and after a write, those of them that change by themselves, and whether it was long ago."""
+    """Members before and after a write, those that change by themselves, and whether the write was long ago."""
 
     before: dict[str, Any]
     now: dict[str, Any]
@@ -80,7 +80,7 @@ class _Leaf(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """A write between two reads, as it is judged by the second one."""
+    """A write between two reads, judged at the second one."""
 
     write: Occasion
     operation: Operation
@@ -277,7 +277,7 @@ class Writes:
                 yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
 
     def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
-        """Judge whether the request has not written what is the device's."""
+        """Judge whether a request has changed members that only the device may set."""
         for name, value in change.sent.items():
             parts = (_parts(change.schema).get(name), _parts(item.shape).get(name))
             if name in change.now and any(isinstance(one, dict) and flat(one).get("readOnly") for one in parts):
@@ -346,7 +346,7 @@ class Writes:
             yield from self._ignored.pop(key).values()
 
     def _items(self, name: str, value: list[Any], now: list[Any], part: Schema) -> str:
-        """Return what differs in a list: its length, the order of its numbers, or the members of its objects."""
+        """Return what differs in a list: its length, the order of its numbers, or members of its objects."""
         inner = flat(part["items"]) if isinstance(part.get("items"), dict) else {}
         if all(isinstance(one, dict) for one in (*value, *now)):
             if len(value) != len(now):
@@ -415,7 +415,7 @@ class Writes:
         return f"{shown(now[both[0]])} as {both[0]} in {name}" if both else ""
 
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
-        """Judge whether a patch keeps what it does not name: two bodies that reset other members are no chance."""
+        """Judge whether a patch keeps the members that it does not name; it takes two bodies to rule out chance."""
         parts, label = _parts(change.schema), change.operation.label
         for name in change.before.keys() & parts.keys() - change.sent.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])

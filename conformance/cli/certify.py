@@ -214,7 +214,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
 
 
 def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, options: CertifyOptions) -> CommandResult:
-    """Do what the options ask for one robot: write a first statement, print the plan, or certify.
+    """Carry out the options for one robot: write a first statement, print the plan, or certify.
 
     Args:
         door: signs the result.
@@ -264,7 +264,7 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
 
 
 def _write_baseline(path: Path, outcome: Certification, contract: Contract, old: Path | None) -> None:
-    """Write what fails to a baseline file, and print what the user has to do with it."""
+    """Write the failures to a baseline file, and print what the user has to add."""
     from conformance.verdict.baseline import baseline_text, load_baseline  # noqa: PLC0415 - only for this option
 
     found = [

@@ -45,7 +45,7 @@ _OPTIONS = (
 
 
 class NotShownError(Exception):
-    """Raised when no reading shows that the robot follows commands; the message says what was tried."""
+    """Raised when no reading shows that the robot follows commands; the message names the tries."""
 
 
 def drive_options(command: _Command) -> _Command:
@@ -56,7 +56,7 @@ def drive_options(command: _Command) -> _Command:
 
 
 def checked(options: CertifyOptions, *, named: bool) -> CertifyOptions:
-    """Return the options of a run; one with --drive judges motion alone, at quick effort, unless they say otherwise.
+    """Return the options of a run; with --drive it judges motion alone, at quick effort, unless options say otherwise.
 
     Args:
         options: as they are given.
@@ -87,7 +87,7 @@ def checked(options: CertifyOptions, *, named: bool) -> CertifyOptions:
 
 
 def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | None) -> Judged:
-    """Show the planned drive, ask for consent, drive the robot a little, and return what is judged with the found map.
+    """Show the planned drive, ask for consent, drive the robot a little, and return the target with the found map.
 
     Raises:
         StatementError: the statement has a map, or the description says too little.

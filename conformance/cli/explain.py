@@ -1,4 +1,4 @@
-"""``roaas explain``: what a requirement demands, why, its sources, how it is judged, and how to meet it."""
+"""``roaas explain``: a requirement's rule, reason, sources and checks, and how to meet it."""
 
 from __future__ import annotations
 

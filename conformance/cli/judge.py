@@ -38,7 +38,7 @@ _BROKEN = frozenset({_FAIL, "warn"})
     help="Folder of the contract pack, if the result's pack is not installed; its code is run.",
 )
 def judge(result: Path, requirement: str | None, statement_file: Path | None, pack: str | None) -> CommandResult:
-    """Judge again what a run sent and saw, by this version's rules. Nothing is sent.
+    """Judge a run's recorded exchanges and traces again, by this version's rules. Nothing is sent.
 
     RESULT is a result.json, or its folder, with the history of the run; also that of a run that was killed.
     REQUIREMENT is an id such as http/date; by default all of the classes that the run was for. Only what the history
@@ -94,7 +94,7 @@ def _summary(judged: "Judged", chosen: tuple["Verdict", ...]) -> str:
 def _judged(
     document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, *, claimed: bool
 ) -> "Judged":
-    """Judge what is in the folder, or what of it the run claimed alone.
+    """Judge the records in a folder, or only those for the classes that the run claimed.
 
     Raises:
         click.UsageError: the contract is not at hand, or the history or the traces cannot be read.

@@ -208,7 +208,7 @@ def _judge_again(
 
 
 def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, Contract]:
-    """Return a statement and the contract of the description that its [api] names, as it is now.
+    """Return a statement, and the contract of its [api] description in its present form.
 
     Raises:
         StatementError, ContractError, DescriptionError: one of them cannot be used.

@@ -23,7 +23,7 @@ def selected(
     exclude: Iterable[str] = (),
     among: frozenset[str] | None = None,
 ) -> frozenset[str] | None:
-    """Return the ids that are selected; None if no choice was made.
+    """Return the ids of the selected requirements; None if nothing was selected.
 
     Args:
         ledger: the requirements by id.

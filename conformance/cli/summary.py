@@ -108,7 +108,7 @@ def warning(document: Mapping[str, Any], which: str = "") -> str:
 
 
 def _print_unjudged(document: Mapping[str, Any]) -> None:
-    """Print stale entries of the baseline, and what an error in the suite or ``--minutes`` left unjudged."""
+    """Print stale entries of the baseline, and what was not judged because of a suite error or ``--minutes``."""
     for id_ in document.get("stale", ()):
         click.echo(f"\nThe baseline expects {id_} to fail, and it passes: delete the entry.")
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
@@ -122,7 +122,7 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
 
 
 def _print_unshown(rows: list[dict[str, Any]]) -> None:
-    """Print the operations that were sent requests and never answered 2xx, and what they would need."""
+    """Print the operations that never responded 2xx to a request, and what they would need."""
     unshown = [row for row in rows if row["requests"] and not any(code.startswith("2") for code in row["statuses"])]
     if not unshown:
         return
@@ -160,7 +160,7 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
 
 
 def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Path) -> None:
-    """Print a finding and the requirements that are not tested because of it."""
+    """Print a finding, and the requirements that could not be tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}")
     click.echo(wrapped(requirement["text"], "  "))

@@ -1,1 +1,1 @@
-"""What all commands share: exit codes, result files, atomic writes, safe terminal output."""
+"""Shared parts of all commands: exit codes, result files, atomic writes, safe terminal output."""

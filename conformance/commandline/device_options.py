@@ -75,7 +75,7 @@ def advice(*texts: str) -> str:
 
 
 def description_options(command: _Command) -> _Command:
-    """Add the options on a device's description and on what may be called."""
+    """Add the options for a device's description and for the operations that may be called."""
     return _with(command, _DESCRIPTION)
 
 

@@ -1,4 +1,4 @@
-"""What may end a process before its work is done: a signal, or the end of the process that started it.
+"""End a process in order on a signal, or when the process that started it has ended.
 
 Each of them raises KeyboardInterrupt in the main thread, so that what stops a robot and writes a result after Ctrl-C
 does so after all of them.
@@ -77,12 +77,12 @@ def as_parent(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def ended_by(number: int) -> str:
-    """Return what ended the process, for a sentence."""
+    """Return the name of the signal or event that ended the process, for a sentence."""
     return "the end of its parent process" if _parent_ended.is_set() else signal.Signals(number).name
 
 
 class Started:
-    """A moment, and what the time is since then by a clock that is never set.
+    """A moment, and the time since then by a clock that is never set.
 
     Attributes:
         at: the moment in UTC.
@@ -93,5 +93,5 @@ class Started:
 
     @property
     def ended(self) -> dt.datetime:
-        """What the time is now, if the clock was right at the start."""
+        """Return the present time, if the clock was right at the start."""
         return self.at + dt.timedelta(seconds=time.monotonic() - self._began)

@@ -1,4 +1,4 @@
-"""What keeps a fault of the suite, a full disk or a closed terminal from looking like a verdict."""
+"""Keep a fault of the suite, a full disk or a closed terminal from looking like a verdict."""
 
 import io
 import os
@@ -85,7 +85,7 @@ def inert_lines(text: str) -> str:
 
 
 def is_of_memory(error: BaseException) -> bool:
-    """Return whether an exception says that a process gets no more memory or threads."""
+    """Return whether an exception means that the process gets no more memory or threads."""
     return isinstance(error, MemoryError) or any(said in str(error).lower() for said in _NO_MEMORY)
 
 

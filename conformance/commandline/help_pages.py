@@ -1,4 +1,4 @@
-"""The help of a command with many options: in groups, rare ones under --help-all; and what to try first."""
+"""Help of a command with many options: in groups, rare options only under --help-all, and a first example."""
 
 import re
 import shutil
@@ -54,7 +54,7 @@ def options_of(group: Group, *, rare: bool = False) -> Callable[[_Command], _Com
 
 
 class GroupedCommand(click.Command):
-    """A click command whose help has groups of options, and that shows what to try where it gets no argument.
+    """A click command whose help has groups of options, and which prints an example if called without arguments.
 
     Args:
         start: what to print in place of an error if there is no argument and no roaas.toml; empty: run the command.
@@ -71,7 +71,7 @@ class GroupedCommand(click.Command):
             self.params.append(everything)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the arguments; without any, print what to try and exit."""
+        """Parse the arguments; without any, print an example and exit."""
         if self._start and not args and not ctx.resilient_parsing and not USUAL_STATEMENT.is_file():
             click.echo(f"{self._start}\n\nAll options: {ctx.command_path} --help", err=True)
             ctx.exit(2)
@@ -127,7 +127,7 @@ def inert(text: str) -> str:
 
 
 def columns() -> int | None:
-    """Return how wide text is, 60 to 200 columns; None if stdout is no terminal, so that lines stay whole."""
+    """Return the terminal's width, 60 to 200 columns; None if stdout is no terminal: then lines are not wrapped."""
     if not sys.stdout.isatty():
         return None
     return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)

@@ -29,7 +29,7 @@ class FolderError(Exception):
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Make a folder for results and keep other runs out of it, before anything is sent.
+    """Make a folder for results, and lock it against other runs before anything is sent.
 
     A run that is killed leaves its lock, which the next run takes over. On Windows there is no lock.
 

@@ -32,7 +32,7 @@ class FrontDoor(Protocol):
         """Return a signer with a private key for results by a pack; raise a usage error if the key cannot be read."""
 
     def prepare(self) -> None:
-        """Load what render() needs, while the run waits for the device anyway."""
+        """Load the modules that render() needs, while the run waits for the device anyway."""
 
     def render(self, written: Path, notary: Any) -> list[Path]:
         """Write the pages of a result file, sign it if there is a signer, and return their paths."""

@@ -88,7 +88,7 @@ class _Form(NamedTuple):
 
 
 class Secrets:
-    """The secrets of a process, each with the variable that stands for it in what is written."""
+    """The secrets of a process, each with the variable that replaces it in all output."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -289,7 +289,7 @@ def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
 
 
 def _decoded(unit: re.Match[str]) -> str:
-    """Return what an escape stands for."""
+    """Return the character that an escape stands for."""
     kind, digits = unit.lastgroup, unit[unit.lastgroup] if unit.lastgroup else ""
     if kind is None:
         return ""
@@ -318,7 +318,7 @@ def _outer(inner: list[tuple[int, int, str]], unit: re.Pattern[str], text: str) 
 
 
 def _without_cookie(name: Any, value: Any) -> Any:
-    """Return the value of a header, or values, without what a Set-Cookie gives."""
+    """Return a header's value, or values, without the secrets in a Set-Cookie."""
     if not (isinstance(name, str) and name.lower() == "set-cookie"):
         return value
     if isinstance(value, list):

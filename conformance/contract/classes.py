@@ -39,7 +39,7 @@ class Origin(StrEnum):
 
 
 class Topic(StrEnum):
-    """What a requirement is about, for readers: pages, terminal and docs list the topics in this order."""
+    """Topic of a requirement for readers: pages, terminal and docs list the topics in this order."""
 
     HURT = "hurt"  # whether somebody can be hurt, or something moves that should not
     SERVICE = "service"  # whether the device does what the contract says of its resources and operations
@@ -69,7 +69,7 @@ class CauseKind(StrEnum):
 
 
 class Prerequisite(StrEnum):
-    """What a run must have, besides the interface, to judge a requirement."""
+    """Things that a run needs, besides the interface, to judge a requirement."""
 
     MOTION = "motion"  # permission to move the device
     OBSERVER = "observer"  # a ROS probe, or another way to observe the effects of a request

@@ -1,4 +1,4 @@
-"""A contract pack made from an API's own description: rules for every web API, and the description's own rules."""
+"""Make a contract pack from an API's description: rules for every web API, and the description's own."""
 
 from __future__ import annotations
 

@@ -121,7 +121,7 @@ def _yaml(text: str) -> Any:
 
 
 class _Reader:
-    """Builds values from YAML events one by one, so that they are counted while they are read."""
+    """Builds values from YAML events one by one, counting them as they are read."""
 
     def __init__(self, text: str) -> None:
         self._loader = _Loader(text)

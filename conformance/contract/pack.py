@@ -70,7 +70,7 @@ class Contract:
     manifest: _Manifest | None = field(default=None, repr=False, compare=False)
 
     def __hash__(self) -> int:
-        """Return a hash that costs little: what is cached by contract is looked up several times for each request."""
+        """Return a cheap hash, because caches are looked up by contract several times for each request."""
         return hash(self.directory)
 
     @classmethod

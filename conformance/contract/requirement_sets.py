@@ -95,7 +95,7 @@ def current(contract: Contract, ledger: Mapping[str, Requirement]) -> Requiremen
 
 
 def frozen(requirement: Requirement) -> Frozen:
-    """Return a requirement as it is stored in a set."""
+    """Return a requirement in its form in a frozen set: level and digest of the text."""
     return Frozen(requirement.level, _digest(requirement.text))
 
 

@@ -1,4 +1,4 @@
-"""The reader of TOML files that people write. Values are typed, and every error message says what to change.
+"""Read TOML files that people write. Values are typed, and each error message says what to change.
 
 The type of a file is a frozen ``msgspec.Struct`` that forbids unknown fields. msgspec validates; as its messages
 speak of JSON paths, this module writes its own: file, table, key, offending value, and what is allowed.

@@ -136,7 +136,7 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
 
 
 def _without(value: Any, broken: frozenset[str]) -> Any:
-    """Return a value without the references that lead nowhere, so that the rest can be used."""
+    """Return a value without broken references, so that the rest can be used."""
     if isinstance(value, list):
         return [_without(item, broken) for item in value if not _refers(item, broken)]
     if not isinstance(value, dict):
@@ -181,7 +181,7 @@ def _parsed(source: str, load: Load) -> Schema:
 
 
 def _markup(octets: bytes) -> str:
-    """Return what a document that begins with `<` is: a page with its title, or XML."""
+    """Return what a document is that begins with `<`: an HTML page with its title, or XML."""
     beginning = octets[:_TITLE_WITHIN].decode("utf-8", "replace")
     title = _TITLE.search(beginning)
     if title:
@@ -218,7 +218,7 @@ class _Bundle:
     refused: list[str] = field(default_factory=list)
 
     def with_files(self, document: Schema) -> Schema:
-        """Return the document with the files that it refers to below FILES, and references to there."""
+        """Return the document with all files it refers to merged below FILES, and with references to there."""
         plain = json.loads(json.dumps(document))
         self.anchors[self.source] = make_plain(plain, self.source)
         plain.pop("jsonSchemaDialect", None)  # a schema of any dialect is judged as JSON Schema 2020-12, OpenAPI's own

@@ -40,7 +40,7 @@ def invalid(original: Schema) -> list[str]:
 
 
 def misplaced(original: Schema) -> list[tuple[str, str]]:
-    """Return the members of a description that are of another type than its version says: their places, and how."""
+    """Return members of a description that have another type than its version demands: places and explanations."""
     version = str(original.get("openapi") or original.get("swagger") or "")[:3]
     errors = map(_deepest, islice(validator(version).iter_errors(without_foreign_words(original)), _MOST_FAULTS))
     return [(f"{_pointer(error.instance_path)}/", error.message[:160]) for error in errors]
@@ -213,7 +213,7 @@ def unfitting_examples(document: Schema) -> list[str]:
 
 
 def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schema, tuple[str, ...], Any]]:
-    """Yield the examples and defaults of an operation: place, schema, marks of what may be left out, and value."""
+    """Yield the examples and defaults of an operation: place, schema, marks of optional members, and value."""
     declared = operation.get("parameters", [])
     for one in [*shared, *(declared if isinstance(declared, list) else [])]:
         if isinstance(one, dict) and isinstance(one.get("schema"), dict):

@@ -234,7 +234,7 @@ CHANGES: Final[dict[str, Callable[[Any], Any]]] = {"modern": modern, "opened": o
 
 
 def types_of(schema: Schema) -> tuple[str, ...]:
-    """Return the JSON types in a schema's ``type``; empty without it."""
+    """Return the JSON types in a schema's ``type``; empty if it has none."""
     schema = whole(schema)
     given = schema.get("type", ())
     if isinstance(given, str):

@@ -85,7 +85,7 @@ def _naming() -> Any:
 
 
 class _Following(threading.local):
-    """How many references are still followed to name what is wrong with a value."""
+    """Number of references that may still be followed to describe a violation."""
 
     left = 0
 
@@ -111,7 +111,7 @@ def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> 
 
 
 def _multiple(_: Any, step: float, instance: Any, __: Schema) -> Iterator[ValidationError]:
-    """Judge by decimal digits, as jsonschema-rs does: 0.07 is a multiple of 0.01, though no double says so."""
+    """Judge multipleOf by decimal digits, as jsonschema-rs does: 0.07 is a multiple of 0.01."""
     from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
 
     if is_number(instance) and Fraction(str(instance)) % Fraction(str(step)):
@@ -205,7 +205,7 @@ def _are_plain(found: Iterator[str]) -> bool:
 
 
 class _Referred:
-    """The keyword that stands for a lazy reference in jsonschema-rs: its schema is compiled when a value gets there."""
+    """The keyword in jsonschema-rs for a lazy reference: its schema is compiled when a value reaches it."""
 
     def __init__(self, holds: Callable[[str, Any], bool], _: Schema, uri: str, __: list[Any]) -> None:
         self._holds, self._uri = holds, uri
@@ -280,7 +280,7 @@ def _compiled_of(schema: Schema) -> Schema:
 
 
 class Kept(Generic[T]):
-    """What schemas are compiled to, by the schema object, as long as these do not have too many nodes together."""
+    """Compiled schemas by schema object, dropped when they have too many nodes together."""
 
     def __init__(self, compiled: Callable[[Schema], T]) -> None:
         self._compiled = compiled
@@ -288,7 +288,7 @@ class Kept(Generic[T]):
         self._nodes = 0
 
     def of(self, schema: Schema) -> T:
-        """Return what a schema is compiled to."""
+        """Return the compiled form of a schema."""
         found = self._kept.get(id(schema))
         if found is None or found[0] is not schema:
             nodes = _nodes_in(_compiled_of(schema))

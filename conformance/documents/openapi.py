@@ -1,4 +1,4 @@
-"""Operations of a contract from its OpenAPI description: find the one for a path and a method."""
+"""Operations of a contract's OpenAPI description, and which of them serves a path and method."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Operation:
 
     @property
     def safe(self) -> bool:
-        """Whether it only reads: its method is safe (RFC 9110 9.2.1), or it says so."""
+        """Return whether the operation only reads: its method is safe (RFC 9110 9.2.1), or the description says so."""
         return self.method in SAFE or self.reads
 
     def declared(self, status: int) -> dict[str, Schema] | None:
@@ -244,7 +244,7 @@ def _operation(
 
 
 def _answer(schema: Any, *, closed: bool) -> Schema:
-    """Return the schema of a response body: as it is if ``closed``, but without members that only requests have."""
+    """Return the schema of a response body: unchanged if ``closed``, else without members of requests only."""
     answer: Schema = without_marked(modern(schema), "writeOnly") if closed else opened(modern(schema))
     return answer
 
@@ -368,7 +368,7 @@ def is_normal(path: str) -> bool:
 
 
 def inside_prefix(contract: Contract, path: str) -> bool:
-    """Return whether a path begins like one of the contract's paths; another server may serve other paths."""
+    """Return whether a path begins like the contract's paths; other paths may belong to another server."""
     return path.lstrip("/").split("/", 1)[0] in {
         item.template.lstrip("/").split("/", 1)[0] for item in resources_of(contract)
     }

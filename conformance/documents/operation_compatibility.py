@@ -30,7 +30,7 @@ class Documents:
     sides: dict[tuple[bool, bool], tuple[Side, Side]] = field(default_factory=dict)
 
     def schema_changes(self, old: Any, new: Any, *, request: bool, media_type: str = "") -> Iterator[Found]:
-        """Yield the changes between a schema of the old document and one of the new."""
+        """Yield the changes from a schema of the old document to one of the new."""
         key = request, "xml" in media_type
         if key not in self.sides:
             self.sides[key] = (
@@ -59,7 +59,7 @@ class Described:
     operation: Schema
 
     def followed(self, value: Any) -> Any:
-        """Return what a value is, or refers to."""
+        """Return a value, or the target if it is a reference."""
         for _ in range(8):
             if not (isinstance(value, dict) and isinstance(value.get("$ref"), str)):
                 break
@@ -83,7 +83,7 @@ class Described:
 
 
 def operation_changes(both: Documents, old: Described, new: Described, *, by_client: bool = True) -> Iterator[Found]:
-    """Yield what changed between two operations, and whether it breaks a client.
+    """Yield the changes between two versions of an operation, and whether each breaks a client.
 
     Args:
         both: the two documents.
@@ -212,7 +212,7 @@ class _Comparison:
                 yield needed, f"{what}, header {name} is new"
 
     def _contents(self, what: str, old: Schema, new: Schema, *, request: bool) -> Iterator[Found]:
-        """Yield what changed in the media types of a body, and in the schema of each."""
+        """Yield the changes in the media types of a body, and in the schema of each."""
         found: dict[Found, None] = {}
         for name, content in old.items():
             # A client that sends a described media type must be understood; a client that reads accepts less than a
@@ -292,7 +292,7 @@ _Alternative = dict[tuple[str, ...], frozenset[str]]
 
 
 def security_changes(old: tuple[Schema, Schema], new: tuple[Schema, Schema]) -> Iterator[tuple[bool, str]]:
-    """Yield what changed in the credentials that an operation needs, and whether it breaks a client.
+    """Yield the changes in the credentials that an operation needs, and whether each breaks a client.
 
     Args:
         old: the document and the operation.

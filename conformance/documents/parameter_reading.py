@@ -1,4 +1,4 @@
-"""Read parameters and fields of forms back from what goes over the wire, by their styles, and judge them.
+"""Read parameters and form fields back from their bytes on the wire, by their styles, and judge them.
 
 A request that a generator means as invalid may be valid as it is written: each value is a text there. OpenAPI leaves
 some ways of writing open (3.1, 4.8.12.2 and appendix C), so a verdict has three values.
@@ -76,7 +76,7 @@ def _decoded(text: str, decode: Callable[..., str]) -> str:
 
 
 def judged(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str] = str) -> str:
-    """Return whether a parameter's texts are a valid value of it.
+    """Return whether texts of a parameter are a valid value.
 
     Args:
         parameter: the parameter; of an exploded array of a query or form, each text is an item, of all others one.
@@ -165,7 +165,7 @@ def _has_read_only(schema: Schema, value: Any) -> bool:
 
 
 def _is_discriminated(schema: Schema, value: Any) -> bool:
-    """Return whether a value names one of its alternatives, if it has to (OpenAPI 3.1, 4.8.25)."""
+    """Return whether a value names its alternative, if the discriminator demands that (OpenAPI 3.1, 4.8.25)."""
     if "discriminator" not in str(schema):
         return True
     name, known = discriminator_of(schema)
@@ -315,7 +315,7 @@ def pairs_of(text: str) -> list[tuple[str, str]]:
 
 
 def query_verdicts(parameters: Sequence[Parameter], query: str) -> list[tuple[str, str, bool]]:
-    """Return verdict, reason and whether something is missing for each query parameter, and for what is unknown."""
+    """Return verdict, reason and whether it is missing, for each query parameter and for unknown ones."""
     try:
         pairs = pairs_of(query)
     except ValueError:

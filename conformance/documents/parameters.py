@@ -71,7 +71,7 @@ def read_encoding(content: dict[str, Any]) -> dict[str, Encoding]:
 
 
 def by_media_type(given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return what is below ``content`` by its media type, in lower case and without parameters."""
+    """Return the entries of ``content`` by media type, in lower case and without parameters."""
     return {name.split(";", 1)[0].strip().lower(): content for name, content in given.get("content", {}).items()}
 
 
@@ -106,5 +106,5 @@ def examples_of(given: dict[str, Any]) -> tuple[Any, ...]:
 
 
 def plain_name(name: str) -> str:
-    """Return a name without case and separators, so that ``job_id`` and ``jobId`` are one."""
+    """Return a normalised name, without case and separators: ``job_id`` and ``jobId`` are equal."""
     return _NO_LETTER.sub("", name.lower())

@@ -48,7 +48,7 @@ for line in sys.stdin:
 
 
 class PatternError(ValueError):
-    """Raised for a pattern that is no regular expression of ECMA-262; the message says why."""
+    """Raised for a pattern that is no regular expression of ECMA-262; the message explains why."""
 
 
 class SlowPatternError(PatternError):
@@ -100,7 +100,7 @@ def _native(pattern: str) -> Any:
 
 @lru_cache(maxsize=4096)
 def _compiled(pattern: str) -> tuple[regress.Regex, str, str]:
-    r"""Return a pattern compiled, as it is written for that, and the flags.
+    r"""Return a compiled pattern, its text for the engine, and its flags.
 
     JSON Schema asks for the flag u. Authors who do not know of it write ``\-`` outside of classes, which it forbids.
     """

@@ -26,7 +26,7 @@ _NIL = "{http://www.w3.org/2001/XMLSchema-instance}nil"
 
 
 class UnreadableError(Exception):
-    """Raised for a body that does not have the format of its media type; the message says why."""
+    """Raised for a body that is not in the format of its media type; the message explains why."""
 
 
 def read(media_type: str, body: bytes, schema: Schema) -> Any:

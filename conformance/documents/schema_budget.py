@@ -1,4 +1,4 @@
-"""Find what no validator can judge by, because it unrolls to more parts than any memory holds.
+"""Find schemas that no validator can use, because they unroll to more parts than memory holds.
 
 Ten references of each schema to the next, over ten schemas, are a file of a few kilobytes, and ten billion parts.
 """

@@ -38,7 +38,7 @@ _WIDE: Final = ("unevaluatedProperties", "unevaluatedItems")
 
 @dataclass(frozen=True)
 class Finding:
-    """What changed in a schema.
+    """A change in a schema.
 
     Attributes:
         breaks: whether it breaks a client; None if it is not known.
@@ -52,7 +52,7 @@ class Finding:
 
 
 def schema_changes(old: tuple[Any, Side], new: tuple[Any, Side], *, request: bool) -> list[Finding]:
-    """Return what changed, and whether it breaks a client.
+    """Return the changes between two schemas, and whether each breaks a client.
 
     A client of the older schema fails if what it sends is no longer taken, or if it reads what it did not expect.
 
@@ -361,7 +361,7 @@ def _values(old: Schema, new: Schema, *, request: bool) -> str:
 
 
 def below(name: str, text: str) -> str:
-    """Return what changed in a member: its name before that of its own member."""
+    """Return a member's change: its name before that of the changed inner member."""
     if text.startswith(", member "):
         return f", member {name}.{text.removeprefix(', member ')}"
     return f", member {name}{text}"

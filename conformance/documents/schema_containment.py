@@ -184,7 +184,7 @@ _FORMATS: Final = (
 
 
 class Witnesses:
-    """Values made of what two schemas mention.
+    """Makes values from the keywords of two schemas, to find one that only one of them allows.
 
     Args:
         schemas: two schemas with their ``$defs``.

@@ -81,7 +81,7 @@ def _outer(value: dict[str, Any], name: str, pointer: str) -> list[tuple[Holder,
 
 
 def make_plain(document: Any, location: str) -> dict[str, str]:  # noqa: C901 - one loop over schemas
-    """Change a document so that its schemas are objects, and refer to each other by JSON pointers alone.
+    """Rewrite a document so that schemas are objects, and refer to each other only by JSON pointers.
 
     ``true`` becomes ``{}``, ``false`` becomes ``{"not": {}}``. References by ``$id``, ``$anchor`` and
     ``$dynamicAnchor`` become references by pointer. A ``$dynamicRef`` that may mean several schemas is dropped: any
@@ -140,7 +140,7 @@ def _base_of(pointer: str, bases: dict[str, str]) -> str:
 
 
 def _by_pointer(reference: str, base: str, roots: dict[str, str], anchors: dict[tuple[str, str], str]) -> str:
-    """Return a reference to a schema of the same document as a JSON pointer; another one as it is."""
+    """Return a reference within the document as a JSON pointer, and any other reference unchanged."""
     uri, fragment = base, reference[1:]
     if not reference.startswith("#"):
         uri, _, fragment = joined(base, reference).partition("#")
@@ -186,7 +186,7 @@ def foreign_words(document: Schema) -> list[str]:
 
 
 def without_foreign_words(document: Schema) -> Schema:
-    """Return a document without these words, so that its other faults can be looked for."""
+    """Return a document without these keywords, so that its other faults can be found."""
     found = list(_found(document))
     if not found:
         return document
@@ -251,7 +251,7 @@ def _is_2020(dialect: Any) -> bool:
 
 
 def _new(word: str, value: Any) -> str:
-    """Return a word that OpenAPI 3.1 has and 3.0 has not, as it is told; empty if it is another."""
+    """Return the message on a keyword that OpenAPI 3.1 has and 3.0 lacks; empty for any other."""
     if word == "type" and (value == "null" or isinstance(value, list)):
         return json.dumps({word: value})
     if word in _BOUNDS and not isinstance(value, bool):
@@ -260,7 +260,7 @@ def _new(word: str, value: Any) -> str:
 
 
 def _old(word: str, value: Any) -> str:
-    """Return a word that OpenAPI 3.0 has and 3.1 has not, as it is told; empty if it is another."""
+    """Return the message on a keyword that OpenAPI 3.0 has and 3.1 lacks; empty for any other."""
     if word in _BOUNDS and isinstance(value, bool):
         return json.dumps({word: value})
     return "items as an array" if word == "items" and isinstance(value, list) else ""

@@ -63,7 +63,7 @@ class Side:
         return self._prepared(modern(given), frozenset())
 
     def target(self, schema: Any) -> Any:
-        """Return what a prepared schema refers to; itself, if it has words beside a reference or none."""
+        """Return the schema that a prepared schema refers to; itself, if it is no plain reference."""
         trail = set()
         while isinstance(schema, dict) and schema.keys() == {"$ref"} and schema["$ref"] not in trail:
             trail.add(schema["$ref"])
@@ -158,7 +158,7 @@ class Side:
             return next(_named(self.document, name), {})
 
     def _definition(self, reference: str, unsent: frozenset[str], *, base: bool) -> str:
-        """Return the reference to a prepared target. With ``base``, a child refers to what it inherits from."""
+        """Return the reference to a prepared target. With ``base``, a child refers to the schema it inherits from."""
         key = (reference, unsent, base)
         if key not in self._names:
             name = self._names[key] = f"#/$defs/{self.name}{len(self._names)}"
@@ -287,7 +287,7 @@ def plain(schema: Any, side: Side, depth: int = 0) -> Any:
 
 
 def _merged(one: Any, other: Any) -> Any:
-    """Return a schema that demands what both do; None if they cannot be merged into one."""
+    """Return a schema that demands what both do; None if they cannot be merged."""
     if one in (True, {}) or other in (True, {}):
         return other if one in (True, {}) else one
     if one is False or other is False:

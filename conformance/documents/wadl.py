@@ -53,7 +53,7 @@ def _of_resource(
 
 
 def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
-    """Return a method element, or the one that its ``href="#id"`` refers to."""
+    """Return a method element, or the element that its ``href="#id"`` names."""
     name = method.get("href", "").lstrip("#")
     return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)
 

@@ -168,7 +168,7 @@ def multipart_body(value: dict[str, Any], encoding: Mapping[str, Encoding] | Non
 
 
 def _plain(value: Any) -> str:
-    """Return an item as text; what is no scalar becomes JSON, and null becomes empty."""
+    """Return an item as text: JSON for objects and lists, empty for null."""
     if value is None:
         return ""
     return json_text(value) if isinstance(value, dict | list) else text_of(value)

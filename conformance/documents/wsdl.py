@@ -37,7 +37,7 @@ _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
 
 
 class WsdlError(ValueError):
-    """Raised for a WSDL that describes no service that can be called; the message says what is missing."""
+    """Raised for a WSDL without a service that can be called; the message names what is missing."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class Wsdl:
 
     @property
     def soap_address(self) -> str:
-        """The first soap:address as it is written, however broken the rest is; empty without one."""
+        """Return the first soap:address as written, even if the rest is broken; empty if there is none."""
         written = ((one.get("location") or "").strip() for one in self.all("//s:address"))
         return next(filter(None, written), "")
 
@@ -212,7 +212,7 @@ class Wsdl:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """What is wrong with the WSDL itself: documents that are missing, references without a target."""
+        """Return the faults of the WSDL itself: missing documents, references without a target."""
         return () if self.foreign else self._judged[0]
 
     @property
@@ -230,7 +230,7 @@ class Wsdl:
 
 
 class _Reader:
-    """Reads definitions elements; ``wrappers`` are the schemas made for rpc, ``faults`` what refers to nothing."""
+    """Reads definitions elements; ``wrappers`` are schemas made for rpc, ``faults`` are references without a target."""
 
     def __init__(self, wsdl: Wsdl) -> None:
         self._all = wsdl.all
@@ -248,7 +248,7 @@ class _Reader:
         return self._by_name[path].get(qname(reference, reference.get(attribute)) or "")
 
     def _named(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
-        """Return what a QName in an attribute refers to, and note where that is nothing."""
+        """Return the element that a QName in an attribute names; record a fault if there is none."""
         found = self.find(path, reference, attribute)
         if found is None:
             written = reference.get(attribute) or ""
@@ -532,7 +532,7 @@ def _required(mark: etree._Element) -> bool:
 
 
 def addressing_action(operation: etree._Element, port_type: etree._Element, soap_action: str) -> str:
-    """Return the action of a request: as its input says, that of SOAP, or the default (its Metadata, 4.4)."""
+    """Return a request's action: the one of its input, that of SOAP, or the default (WS-Addressing Metadata, 4.4)."""
     given = operation.find(clark(WSDL, "input"))
     if given is None:
         return ""

@@ -131,7 +131,7 @@ def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
 
 
 def _schema_references(found: Collected) -> Iterator[str]:
-    """Yield the locations that the last schema refers to, and note what it imports."""
+    """Yield the locations to which the last schema refers, and record its imports."""
     schema = found.schemas[-1]
     for element in schema.root.iterchildren(
         *(clark(XSD, name) for name in ("import", "include", "redefine", "override"))

@@ -1,4 +1,4 @@
-"""A contract pack made from a WSDL: its operations, and the documents that describe them."""
+"""Make a contract pack from a WSDL: its operations, and the documents that describe them."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from lxml import etree
 
 
 class NotXmlError(ValueError):
-    """Raised for bytes that are not an acceptable XML document; the message says why."""
+    """Raised for bytes that are no acceptable XML document; the message explains why."""
 
 
 def parse(document: bytes, *, doctype: bool = False, comments: bool = True) -> etree._Element:

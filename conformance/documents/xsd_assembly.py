@@ -1,4 +1,4 @@
-"""Schema documents written into a folder so that libxml2 and xmlschema compile them.
+"""Write schema documents into a folder in a form that libxml2 and xmlschema compile.
 
 libxml2 loads one document per imported namespace, so each namespace gets one that includes all its documents.
 What schemas refer to and no document declares allows anything, and is marked, so that no message is made of it.
@@ -146,7 +146,7 @@ def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
 
 
 def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
-    """Return the documents that others redefine, with what those include: nothing else may include them."""
+    """Return the documents that others redefine, with those they include: no other document may include them."""
     by_place = {one.location: one for one in documents}
     waiting = [target for one in documents for target in one.targets(*_REDEFINE)]
     found: set[str] = set()
@@ -273,7 +273,7 @@ class Component(NamedTuple):
 
 
 def allow_anything(spaces: Sequence[str], roots: Sequence[etree._Element], unknown: set[str]) -> None:
-    """Let the complex types that are derived from unknown ones allow anything: what they add to is not known.
+    """Let complex types derived from unknown ones allow anything, because their base is not known.
 
     Args:
         spaces: the target namespace of each document.

@@ -156,7 +156,7 @@ class ChecksPlugin:
                 self._need(Interface(name), self.ids_of(item))
 
     def _is_recorded(self, item: pytest.Item) -> bool:
-        """Return whether a check judges what was recorded already, and sends nothing."""
+        """Return whether a check judges records only, and sends nothing."""
         mark = item.get_closest_marker("scenario")
         return mark is not None and mark.args[0].name in self._recordings.played
 

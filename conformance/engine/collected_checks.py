@@ -61,7 +61,7 @@ class _Checks:
 
 
 def _described(item: pytest.Item) -> Check:
-    """Return a collected check; of a rule, the one with this scenario alone."""
+    """Return a collected check; for a rule, only its combination with this scenario."""
     name = f"{item.path.stem}::{item.name.partition('[')[0]}"
     mark = item.get_closest_marker("rule")
     if mark is None:

@@ -11,7 +11,7 @@ from conformance.transport.client import Connection
 
 
 def compared(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
-    """Return what changed between the descriptions at two URLs or in two files.
+    """Return the changes between the descriptions at two URLs or in two files.
 
     With ``allow_files``, they may refer to files outside their folders.
 

@@ -64,7 +64,7 @@ def _angles(value: Mapping[str, Any]) -> dict[str, float]:
 
 
 class Looks:
-    """What was read of a device, by operation: the time in the middle of each reading, and its numbers."""
+    """Readings of a device by operation: the middle of each reading's time, and its numbers."""
 
     def __init__(self) -> None:
         self._seen: dict[str, list[tuple[float, Numbers]]] = {}

@@ -147,7 +147,7 @@ def _credentials(document: dict[str, Any]) -> Iterator[str]:
 
 
 def _groups(operations: Sequence[Operation], rules: CallRules) -> Iterator[str]:
-    """Yield the lines of ``allow``: patterns that are given, then all operations by group, most of them comments."""
+    """Yield the lines of ``allow``: given patterns, then all operations by group, most as comments."""
     for pattern in rules.allow:
         yield f"{basic_string(pattern)},"
     first = Counter(_segments(item)[:1] for item in operations)

@@ -1,4 +1,4 @@
-"""Record the signals that end a run, so that no interrupted run looks complete, and none leaves the robot moving.
+"""Record signals that end a run, so that an interrupted run never looks complete and the robot is stopped.
 
 Python raises KeyboardInterrupt wherever the main thread happens to be. In a finalizer or a callback whose exceptions
 are ignored, the exception is lost; the recorded flag is not. It is checked before each check and at the end.

@@ -1,4 +1,4 @@
-"""``roaas judge``: judge what a run left, its history and its traces, by the present rules, without the device."""
+"""``roaas judge``: judge a run's history and traces by the present rules, without the device."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -113,7 +113,7 @@ def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
 
 
 def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Listener]:
-    """Yield what judges the exchanges of a run, whichever check sent them."""
+    """Yield the listeners that judge a run's exchanges, whichever check sent them."""
     run, services = robot.run, list(_services(robot, target))
     checkers: list[Checker] = []
     rest = target.get("rest")
@@ -142,7 +142,7 @@ def _services(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Soap
 
 
 def _judge_traces(robot: RobotUnderTest, rules: list[tuple[Rule, Scenario]], traces: Recordings) -> tuple[str, ...]:
-    """Judge the traces of scenarios by the contract's rules; return the requirements whose map is not there."""
+    """Judge the traces of scenarios by the contract's rules; return the requirements whose map is missing."""
     run, lacking = robot.run, dict[str, None]()
     maps = {"motion": run.statement.motion_map, "ros": run.statement.ros_map, "state_map": run.statement.state_map}
     known: dict[str, Any] = {"run": run, "statement": run.statement, "effort": run.effort} | maps

@@ -62,7 +62,7 @@ class _Found:
 
 
 class LostDevice:
-    """What is done when a device does not respond any more.
+    """Waits for a device that no longer responds, and finds the request that did it.
 
     Args:
         run: the data of the run.
@@ -240,7 +240,7 @@ class LostDevice:
         judge.ended_by = finding
 
     def _told(self, sent: Sequence[Request], found: _Found) -> str:
-        """Return what is known of the requests that did it, in sentences."""
+        """Return, in sentences, what is known about the requests that the device did not survive."""
         before = [_named(request) for request in reversed(sent[:-1])][:_NAMED]
         newest = f" The requests before it, newest first: {', '.join(before)}" if before else ""
         if found.alone:
@@ -254,7 +254,7 @@ class LostDevice:
 
 
 def _suspects(recent: Sequence[Sending]) -> tuple[list[Request], NoAnswer | None]:
-    """Return the requests up to the one after which the device was lost, and why that one got no response.
+    """Return the requests up to the one after which the device was lost, and why that got no response.
 
     That is the first of the unanswered ones at the end; if all of them were refused, the answered one before them.
     """

@@ -1,4 +1,4 @@
-"""What a motion map would send and the description forbids: the fault of the map, and never of the device."""
+"""Find requests of a motion map that the description forbids: a fault of the map, never of the device."""
 
 from __future__ import annotations
 

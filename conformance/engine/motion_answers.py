@@ -67,7 +67,7 @@ def _answer(verdicts: Sequence[Verdict]) -> str:
 
 
 def _fault(verdicts: Sequence[Verdict], picture: str) -> tuple[str, str]:
-    """Return what the first finding expected and saw, and the picture that it names."""
+    """Return the first finding's expected and observed texts, and its picture."""
     findings = [one for item in verdicts if item.value in _BROKEN for one in item.evidence.findings.values()]
     if not findings:
         return "", picture

@@ -29,7 +29,7 @@ _SHOWN_CHALLENGE: Final = 200
 
 
 def is_refused(exchange: Exchange) -> bool:
-    """Return whether a device refused a request because of who sends it."""
+    """Return whether a device refused a request because of its sender."""
     answer = exchange.response
     is_fault = answer.status >= _ERRORS and "xml" in answer.media_type and bool(_FAULT.search(answer.body))
     return answer.status in REFUSALS or is_fault
@@ -134,7 +134,7 @@ class RefusalListener(Listener):
             self._looks = False
 
     def withdraw(self) -> None:
-        """Withdraw the findings that the refusals made: what they show is not the device's fault.
+        """Withdraw findings caused by the refusals, which show no fault of the device.
 
         Where nothing was accepted, those stay that need no credentials: crashes, and faults of the description itself.
         """
@@ -151,7 +151,7 @@ class RefusalListener(Listener):
 
     @property
     def text(self) -> str:
-        """How the device refused the run's credentials, and what to do; empty if it accepted them."""
+        """Return how the device refused the run's credentials, and what to do; empty if it accepted them."""
         # 403 and 423 may concern one request only, as from a firewall; 401 and 407 never do.
         is_clear = bool(self.refused.keys() & {401, 407}) or self.refused.total() > self.other
         if not is_clear or (self.accepted and not self.expired) or (self.open and not self.has_credentials):

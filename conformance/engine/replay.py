@@ -178,7 +178,7 @@ def longest_s(chosen: Iterable[tuple[str, Mapping[str, Any]]]) -> float:
 
 
 class _Stop:
-    """Stops the result's robot as its contract says; a guard process does so if this one is killed."""
+    """Stops the result's robot by its contract; a guard process does so if this process is killed."""
 
     def __init__(
         self, result: Mapping[str, Any], connection: Connection, rest: str | None, contract: Contract | None

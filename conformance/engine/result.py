@@ -130,13 +130,13 @@ def _digest(value: Any) -> str:
 
 
 def _faults(run: Run) -> dict[str, Any]:
-    """Return what an error in the suite kept from being judged, under its key; empty if there was none."""
+    """Return what an error in the suite kept from being judged, under its key in result.json; empty if none."""
     faults = [{"text": text, "requirements": ids} for text, ids in run.judge.faults.items()]
     return {"suite_errors": faults} if faults else {}
 
 
 def left_out(robot: RobotUnderTest) -> dict[str, Any]:
-    """Return what ``--minutes`` left out, under its key; empty if nothing."""
+    """Return what ``--minutes`` left out, under its key in result.json; empty if nothing."""
     run, limit = robot.run, robot.run.limit
     if not limit.is_struck:
         return {}
@@ -165,14 +165,14 @@ def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:
 
 
 def _shown(value: Any) -> Any:
-    """Return what a statement declares without the folders of its files."""
+    """Return a statement's values without the folders of its files."""
     if isinstance(value, dict):
         return {key: _shown(inner) for key, inner in value.items()}
     return without_folders(value) if isinstance(value, str) else value
 
 
 def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
-    """Return what was called of an API that is judged by its own description, under its key."""
+    """Return the calls of a described API's operations, under their key in result.json."""
     if robot.log is None or robot.rest is None:
         return {}
     findings = [cause.finding for cause in causes]

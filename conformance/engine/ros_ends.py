@@ -1,4 +1,4 @@
-"""The part of result.json on a ROS map: what was compared for each operation, and the first difference."""
+"""The part of result.json on a ROS map: the comparison of each operation, and the first difference."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RosEnds:
             self._compared.update(self._calls(exchange.request))
 
     def _calls(self, request: Request) -> list[str]:
-        """Return the map's operations that a request concerns; of several with one template, the one that it names."""
+        """Return the map's operations that a request belongs to; of several with one template, the named one."""
         path = request.target.partition("?")[0]
         labels = [*self._concerned(request), f"{request.method} {path}"]
         found: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Make a request smaller, to find the part of it that makes a device crash or hang."""
+"""Make a request smaller, to find the part that makes a device crash or hang."""
 
 import json
 from collections.abc import Iterator

@@ -57,7 +57,7 @@ class _Target(msgspec.Struct):
 
 
 class _Result(msgspec.Struct):
-    """What a replay reads of a result."""
+    """The parts of a result that a replay reads."""
 
     requirements: list[_Requirement]
     web_server: _WebServer | None = None

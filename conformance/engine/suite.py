@@ -79,7 +79,7 @@ def file_digest(path: Path) -> str:
 
 
 def known(pack: str | None = None) -> dict[str, Any]:
-    """Return what a verifier needs to check this suite's certificates: digests, requirement sets, ledger, profiles."""
+    """Return the facts with which a verifier checks this suite's certificates: digests, sets, ledger, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
     sets = {
         one.name: one
@@ -95,7 +95,7 @@ def known(pack: str | None = None) -> dict[str, Any]:
 
 
 def _known(item: Requirement, contract: Contract, sets: Mapping[str, RequirementSet]) -> dict[str, Any]:
-    """Return what a certificate must say of one requirement: the fields of `reports.attestation.outcomes.Entry`."""
+    """Return the facts on a requirement for a certificate: the fields of `reports.attestation.outcomes.Entry`."""
     ids = {item.id, *item.aliases}
     return {
         "level": item.level,

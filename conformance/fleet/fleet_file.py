@@ -132,7 +132,7 @@ def _refuse_common(path: Path, members: tuple[Member, ...]) -> None:
 
 
 def refuse_same_identity(path: Path, members: tuple[Member, ...]) -> None:
-    """Refuse robots with the same name and vendor, whose certificates could not be told apart.
+    """Refuse robots with the same name and vendor, because their certificates would look alike.
 
     Raises:
         FleetError: two robots have the same name and vendor.

@@ -1,1 +1,1 @@
-"""Record a run event by event: requests, responses, observations, and what the suite was doing."""
+"""Record a run event by event: requests, responses, observations, and the check that was running."""

@@ -69,7 +69,7 @@ class Came(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", tag="sent"):
-    """One attempt to send a request over a connection, and what came back.
+    """One attempt to send a request over a connection, and the response or its absence.
 
     Attributes:
         id: number of the event, from 1.
@@ -235,7 +235,7 @@ _PIECE: Final = 1 << 20
 
 
 class HistoryError(ValueError):
-    """Raised for a file that is no history; the message says why."""
+    """Raised for a file that is no history; the message explains why."""
 
 
 def read_history(path: Path) -> Iterator[Event]:

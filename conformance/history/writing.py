@@ -1,4 +1,4 @@
-"""Write a history while the run goes on: append-only, compressed, and whole up to the last moment if it is killed.
+"""Write a history during the run: append-only, compressed, and complete up to the last moment if killed.
 
 A thread of its own encodes, masks and writes, so that recording costs a request next to nothing. What was sent in the
 last moments before the process is killed is lost; everything before can be read, as each piece ends at a boundary of
@@ -65,12 +65,12 @@ class HistoryWriter(Recorder):
         self._queue.put(Withdrawn(number))
 
     def begin(self, span: str) -> None:
-        """Note what the suite does from now on."""
+        """Record which check or scenario runs from now on."""
         self._span = span
         self._queue.put(Span(self._since(time.monotonic()), span))
 
     def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
-        """Add what an eye saw."""
+        """Add an observation of an eye, such as a ROS probe."""
         # JSON has no infinity or NaN.
         told = (str(one) if isinstance(one, float) and not math.isfinite(one) else one for one in values)
         self._queue.put(Seen(self._since(at_s), eye, tuple(told)))
@@ -80,7 +80,7 @@ class HistoryWriter(Recorder):
         self._queue.put(Eye(self._since(time.monotonic()), eye, state))
 
     def close(self) -> None:
-        """Write what is left, and the end. Afterwards ``problem`` is final."""
+        """Write the remaining events and the end. Afterwards ``problem`` is final."""
         self._queue.put(None)
         self._closing.set()
         self._thread.join(_LAST_S)

@@ -39,7 +39,7 @@ class Response(NamedTuple):
 def response_to(
     velocity: float, before: Sequence[Sample], during: Sequence[Sample], after: Sequence[Sample]
 ) -> Response | None:
-    """Return how a number responds to a velocity; None: not at all, or not so that it could be used.
+    """Return how a number responds to a velocity; None if it does not, or not usably.
 
     Args:
         velocity: what was commanded, other than 0.
@@ -70,7 +70,7 @@ def response_to(
 
 
 def agreed(responses: Sequence[Response | None]) -> Response | None:
-    """Return what the drives there and back at one velocity show of a number; None if they disagree."""
+    """Return a number's response, if drives forth and back at one velocity agree; else None."""
     found = [one for one in responses if one is not None]
     if len(found) < len(responses) or not found or len({one.is_position for one in found}) > 1:
         return None

@@ -66,7 +66,7 @@ class Noise(NamedTuple):
 
     @classmethod
     def of(cls, values: Sequence[float], declared: float = 0.0) -> "Noise":
-        """Return that of some samples; ``declared``: what the standard deviation is at least."""
+        """Return the noise of some samples; ``declared`` is the least standard deviation."""
         if not values:
             return cls(0.0, declared)
         centre = median(values)

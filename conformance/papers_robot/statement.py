@@ -29,7 +29,7 @@ class Ros(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RobotStatement(Statement, frozen=True):
-    """A statement on the paper's robot, as far as it does not say how the robot is judged."""
+    """A statement on the paper's robot, without the parts on how the robot is judged."""
 
     ros: Ros = Ros()
 

@@ -48,7 +48,7 @@ def _watched(
     other_exchanges: OtherExchanges | None,
     kept_exchanges: KeptExchanges | None,
 ) -> None:
-    """Register the checkers, so that every exchange of the run is judged, the first ones too.
+    """Register the checkers before the first request, so that they judge every exchange of the run.
 
     No other code registers any.
     """

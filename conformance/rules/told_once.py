@@ -1,4 +1,4 @@
-"""Report what several operations have in common as one finding, with the list of the operations."""
+"""Report a fault that several operations share as one finding, with the list of operations."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def told_once(
 
 
 def held_back(probes: Iterable[Probe]) -> Iterator[NotSeen]:
-    """Yield the operations whose state allowed none of these requests, so that nothing was shown."""
+    """Yield operations whose state allowed none of these requests, so that nothing could be judged."""
     statuses: dict[str, set[int]] = {}
     for probe in probes:
         statuses.setdefault(probe.operation, set()).add(probe.status)

@@ -1,4 +1,4 @@
-"""Remember the values by which a run named what it may have moved: a stop of one drive must name each of them."""
+"""Remember the ids of everything that a run may have moved, because a stop must name each of them."""
 
 import re
 from collections import defaultdict
@@ -93,7 +93,7 @@ class Driven(Listener):
                 del known[next((one for one, is_taken in known.items() if not is_taken), next(iter(known)))]
 
     def _named(self, method: str, url: str, body: bytes) -> Iterator[tuple[str, Any]]:
-        """Yield name and value of what a request names, if a stop has that name; nothing for a stop itself."""
+        """Yield name and value of each id in a request that a stop also takes; nothing for a stop itself."""
         if not self._names or method in SAFE_METHODS or not url.startswith(self._base_url):
             return
         path, _, query = url[len(self._base_url) :].partition("?")
@@ -130,12 +130,12 @@ class Driven(Listener):
 
 
 def _path_names(template: str) -> list[tuple[str, str]]:
-    """Return for each parameter in a path its plain name, and what stands before it: /arms/{id} is /arms/{arm}."""
+    """Return for each path parameter its normalised name and the segment before it: /arms/{id} is /arms/{arm}."""
     return [(plain_name(found[1]), template[: found.start()]) for found in PARAMETER.finditer(template)]
 
 
 def _places(stop: Operation) -> Iterator[tuple[tuple[str, ...], Any, tuple[str, str]]]:
-    """Yield name, schema and place of each value by which a stop names what it stops."""
+    """Yield name, schema and place of each value with which a stop names the part to stop."""
     before = dict(_path_names(stop.template))
     for item in stop.parameters:
         if item.where == "path" or (item.where == "query" and item.required):

@@ -195,7 +195,7 @@ _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")
 
 
 def are_data(formats: Sequence[str]) -> bool:
-    """Return whether several of these formats hold data, so that one value can be written in each of them."""
+    """Return whether several of these formats are structured data, so that one value can be written in each."""
     return sum(bool(_DATA.search(name)) for name in formats) > 1
 
 

@@ -83,7 +83,7 @@ class Guard:
         return process.stdin.fileno() if process is not None and process.stdin is not None else None
 
     def release(self, *, stopped: bool = True) -> None:
-        """End the process; if the device was not stopped, the process goes on trying for a while."""
+        """End the process; if the device was not stopped, the process keeps trying for a while."""
         with self._lock:
             process, self._process, self._told = self._process, None, []
         if process is None or process.stdin is None:
@@ -103,7 +103,7 @@ class Guard:
         return drafts
 
     def _tell(self, stops: list[dict[str, Any]]) -> None:
-        """Write the stops to the process, and start it if needed; if that fails, the run goes on without it."""
+        """Send the stops to the guard process, started if needed; if that fails, the run continues without a guard."""
         message = {
             "stops": stops,
             "login": self._renewal(),
@@ -169,7 +169,7 @@ def _told_of(draft: Draft) -> dict[str, Any]:
 
 
 def _digest_user(draft: Draft) -> tuple[str, list[str]] | None:
-    """Return with what the process answers the challenges to a request, if it may: user:password, and our modules."""
+    """Return user:password and our modules, with which the process answers digest challenges, if it may."""
     connection = draft.client.connection
     users = (one.secret for one in connection.credentials.items if one.kind is Kind.DIGEST)
     user = next(users, None) if connection.may_authorize(draft.client.base_url) else None

@@ -1,4 +1,4 @@
-"""What a run learns of a device from each response."""
+"""Properties of a device that a run learns from its responses, such as slow operations."""
 
 from collections.abc import Iterator
 

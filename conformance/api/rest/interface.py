@@ -18,7 +18,7 @@ from conformance.verdict.run import Run
 
 @dataclass
 class RestInterface:
-    """What generic REST checks need.
+    """A device's REST interface as generic checks use it: description, client, values and permissions.
 
     Attributes:
         run: the data of the run.
@@ -79,7 +79,7 @@ class RestInterface:
 
     @cached_property
     def call_rules(self) -> CallRules:
-        """What may be called."""
+        """Return the rules on which operations may be called."""
         return CallRules.of(self.run)
 
     def send(self, request: Outgoing, *, fresh: bool = False, timeout_s: float | None = None) -> Exchange:

@@ -1,4 +1,4 @@
-"""Requests for one operation that the description forbids: each breaks one rule of it."""
+"""Requests for one operation that its description forbids: each breaks one rule."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _COMMON: Final = frozenset({_OTHER_TYPE, _NOT_ASCII})
 
 
 def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
-    """Yield requests that the description forbids: each breaks one rule of it, in any reading of what is sent."""
+    """Yield requests that the description forbids: each breaks one rule, however its text is read."""
     yield from _invalid_parameters(operation, usual)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
         found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))

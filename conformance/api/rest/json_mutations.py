@@ -51,7 +51,7 @@ class Place:
 
     @property
     def field(self) -> str:
-        """The name of the member, or of the one around an array's item."""
+        """Return the member's name; for an item of an array, the array's name."""
         return next((str(part) for part in reversed(self.path) if isinstance(part, str)), "")
 
     @property

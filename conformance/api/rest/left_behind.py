@@ -1,4 +1,4 @@
-"""In which state a run left a described device: what it created, changed, deleted and started last."""
+"""The state in which a run left a described device: things that it created, changed, deleted and started last."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LeftBehind:
         self._last: dict[str, int] = {}
 
     def follow(self, operation: Operation, exchange: Exchange) -> None:
-        """Note what an exchange with an operation changes on the device."""
+        """Record what an exchange with an operation changes on the device."""
         request, answer = exchange.request, exchange.response
         path = request.url.removeprefix(self._base_url).partition("?")[0]
         if operation.method == "GET":
@@ -70,7 +70,7 @@ class LeftBehind:
             self._read[path] = exchange.response.body
 
     def made(self, operation: Operation, path: str, exchange: Exchange) -> str:
-        """Return the path of what a request created; empty if it created nothing with a path."""
+        """Return the path of the thing that a request created; empty if it created none, or one without a path."""
         answer = exchange.response
         location = answer.header("location") or ""
         if operation.method == "PUT":
@@ -89,7 +89,7 @@ class LeftBehind:
         return "" if id_ is None else f"{path.rstrip('/')}/{id_}{'/' if path.endswith('/') else ''}"
 
     def document(self) -> dict[str, Any]:
-        """Return what was left behind, for result.json, with lines for readers; empty if nothing was."""
+        """Return the things left behind, for result.json, with lines for readers; empty if there are none."""
         created: dict[str, list[str]] = defaultdict(list)
         for label, id_ in self._created.values():
             created[label].append(id_)

@@ -1,4 +1,4 @@
-"""Lists: which query parameters of an operation limit, filter, sort and page its list, and what a response shows."""
+"""Lists: which query parameters limit, filter, sort and page a list, and what a response contains of it."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Listing:
 
     @cached_property
     def sortings(self) -> dict[str, Sorting]:
-        """What each declared value of the parameter that sorts means."""
+        """Return what each declared value of the sort parameter means."""
         return {} if self.sort is None else {text: one for text, one in self._sortings(self.sort) if one is not None}
 
     def _sortings(self, sort: Parameter) -> Iterator[tuple[str, Sorting | None]]:
@@ -160,7 +160,7 @@ class Listing:
         return texts if valid else None
 
     def most(self, sent: Mapping[str, str]) -> int:
-        """Return how many items the parameters allow: the value sent or its default; 0 if neither says so."""
+        """Return how many items the parameters allow: the sent limit or its default; 0 if there is neither."""
         if self.limit is None:
             return 0
         if self.limit.name in sent:
@@ -190,7 +190,7 @@ class Page:
 
     @cached_property
     def identities(self) -> tuple[str, ...]:
-        """What identifies each item, or its whole content."""
+        """Return for each item its identifier, or its whole content if it has none."""
         return tuple(json.dumps(members_of(one).get(self.by)) if self.by else identity_of(one) for one in self.items)
 
 
@@ -208,7 +208,7 @@ def members_of(item: Any) -> dict[str, Any]:
 
 
 def identity_of(item: Any) -> str:
-    """Return what identifies an item, as text; its whole content where no member does."""
+    """Return an item's identifier as text; its whole content if it has none."""
     own = members_of(item)
     found = next((own[name] for name in _IDENTIFYING if isinstance(own.get(name), str | int)), None)
     return json.dumps(item if found is None else found, sort_keys=True)

@@ -31,7 +31,7 @@ class MotionGuard:
         self._valid: Counter[str] = Counter()
 
     def admit(self, item: Outgoing) -> Outgoing | None:
-        """Return the request as it may be sent, or None if it may not."""
+        """Return a request with safe values, or None if it may not be sent."""
         said = self._validity(item)
         operation = said.operation
         if operation is None:
@@ -61,7 +61,7 @@ class MotionGuard:
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
     def _fitted(self, item: Outgoing, operation: Operation) -> Outgoing | None:
-        """Return a valid request of a moving operation with sensible values; None after a few of them."""
+        """Return a valid request of a moving operation with sensible values; None after _ACCEPTED of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
         if not self._api.device.is_known:

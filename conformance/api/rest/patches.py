@@ -1,4 +1,4 @@
-"""What a patch makes of a document: JSON Merge Patch (RFC 7396) and JSON Patch (RFC 6902)."""
+"""Apply patches to a document: JSON Merge Patch (RFC 7396) and JSON Patch (RFC 6902)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class PatchError(ValueError):
 
 
 def merged(document: Any, patch: Any) -> Any:
-    """Return what a merge patch makes of a document (RFC 7396 2)."""
+    """Return a document after a merge patch (RFC 7396 2)."""
     if not isinstance(patch, dict):
         return patch
     found = dict(document) if isinstance(document, dict) else {}
@@ -30,7 +30,7 @@ def merged(document: Any, patch: Any) -> Any:
 
 
 def patched(document: Any, operations: Any) -> Any:
-    """Return what a JSON patch makes of a document.
+    """Return a document after a JSON patch (RFC 6902).
 
     Raises:
         PatchError: an operation fails, so that all have to be refused (RFC 6902 5; RFC 5789 2).

@@ -1,4 +1,4 @@
-"""Whether an operation that a description names is there."""
+"""Find out whether an operation that a description declares exists on the device."""
 
 from dataclasses import replace
 from http import HTTPStatus
@@ -53,7 +53,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
 
 
 def _to_be_refused(call: Call) -> Call | None:
-    """Return a request that reaches an operation and must be refused by it; None if there is no such request."""
+    """Return a request that reaches an operation and that it must refuse; None if no such request can be made."""
     operation = call.operation
     if operation.safe:
         return None
@@ -86,7 +86,7 @@ def _by_options(call: Call, exchange: Exchange) -> bool | None:
 
 
 def _absence(exchange: Exchange) -> str:
-    """Return a text on what shows that an operation does not exist."""
+    """Return the evidence in a response that the operation does not exist, as text."""
     allow, status = exchange.response.header("allow"), exchange.response.status
     named = f" with Allow: {allow}" if allow is not None else ""
     return f"status {status}{named} for {exchange.request.method}"

@@ -1,4 +1,4 @@
-"""Problem details (RFC 9457): what an error response says."""
+"""Problem details (RFC 9457): the content of an error response."""
 
 import re
 from typing import Any, Final
@@ -37,5 +37,5 @@ def detail_of(answer: Response) -> str:
 
 
 def names(detail: str, *words: str) -> bool:
-    """Return whether a detail contains one of some field names as a whole word."""
+    """Return whether a problem's detail contains one of the field names as a whole word."""
     return any(re.search(rf"(?<![A-Za-z0-9_]){re.escape(word)}(?![A-Za-z0-9_])", detail) for word in words)

@@ -77,7 +77,7 @@ def singular(name: str) -> str:
 
 
 def thing_of(name: str) -> str:
-    """Return the plain name of what a reference refers to: ``valve`` for ``valve_id``; empty for ``id``."""
+    """Return the normalised name of the thing that a reference names: ``valve`` for ``valve_id``; empty for ``id``."""
     plain = plain_name(name)
     end = next((end for end in ("ids", "uuid", "guid", "id", "name", "ref") if plain.endswith(end)), "")
     return singular(plain.removesuffix(end))
@@ -102,7 +102,7 @@ def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
 
 
 def is_free_text(schema: Schema) -> bool:
-    """Return whether a value may be any text, as the description does not say how to write it."""
+    """Return whether a value may be any text, because the description declares no form."""
     given = flat(schema)
     if given.keys() & {"enum", "const"} or "string" not in (kinds_of(given) or {"string"}):
         return False

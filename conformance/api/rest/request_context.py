@@ -84,7 +84,7 @@ class RequestContext:
         )
 
     def is_own_of(self, answer: Response) -> bool:
-        """Return whether a response is the server's own: to a condition or a range, so that no description has it."""
+        """Return whether the server itself sends a response, to a condition or range, so that no description has it."""
         asked = any(name.lower() in _CONDITIONS for name, _ in self.request.headers)
         return asked and answer.status in _CONDITIONAL
 
@@ -105,5 +105,5 @@ class RequestContext:
 
     @property
     def names_xml(self) -> bool:
-        """Whether the client asked for XML by name."""
+        """Return whether the client's Accept names XML."""
         return "xml" in (self.accept or "").lower() and self.likes_xml > 0

@@ -1,4 +1,4 @@
-"""Values that a schema allows, made from the schema alone."""
+"""Make values that a schema allows, from the schema alone."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def fits(schema: Schema, value: Any) -> bool:
 
 
 def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
-    """Return a value that a schema allows, as far as that can be made.
+    """Return a value that a schema allows, if one can be made.
 
     Args:
         schema: without references.
@@ -155,7 +155,7 @@ def alike_and_apart(schema: Schema) -> tuple[list[Any], list[Any]]:
 
 
 def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
-    """Return an item that differs from the others, if one can be made."""
+    """Return an item that differs from the given ones, if one can be made."""
     number = len(others)
     numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
     candidates = [item, *flat(schema).get("enum", ()), numbered]

@@ -1,4 +1,4 @@
-"""The parts of a robot's state that do not change by themselves, so that two readings can be compared."""
+"""Find the parts of a robot's state that do not change by themselves, so that two readings can be compared."""
 
 import time
 from collections.abc import Iterable
@@ -62,7 +62,7 @@ def changed(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
 
 
 def changes_by_itself(api: RestInterface, call: Call, place: str, seconds: float) -> bool:
-    """Return whether one value of a resource goes on changing while the suite sends nothing else.
+    """Return whether a value of a resource keeps changing while the suite sends nothing else.
 
     What has set it going may take a while to end (a robot that was set in motion): only a value that does not come
     to rest in any of several such times changes by itself.

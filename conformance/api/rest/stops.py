@@ -1,4 +1,4 @@
-"""Stop a device at the end of a run, and say so if it may still move. No other module sends a run's last stop.
+"""Stop a device at the end of a run, and report if it may still move. No other module sends a run's last stop.
 
 The contract pack (``leave_at_rest``), the motion map or the description (x-roaas-stop) says how a device is stopped.
 The stop is tried again and again, over new connections, for as long as a lost device is waited for: ``--wait``, 20 s by
@@ -169,7 +169,7 @@ def _stop_as_marked(api: RestInterface) -> str:
 
 
 def _is_moving(api: RestInterface) -> bool:
-    """Return whether reads show that the device moves: it says so, or its position changes."""
+    """Return whether reads show that the device moves: by a member such as "moving", or by a changing position."""
     reads = [one for one in operations_of(api.run.contract) if one.method == "GET" and not one.parameter("path")]
     seen: list[dict[str, Any]] = []
     for turn in range(2):
@@ -191,7 +191,7 @@ def _is_moving(api: RestInterface) -> bool:
 
 
 def _naming(inputs: Inputs, values: Iterable[tuple[str, str, Any]]) -> Inputs:
-    """Return inputs with other values, each given with its place and its name there."""
+    """Return inputs in which some values are replaced, each given with its place and name."""
     for where, name, value in values:
         if where != "body":
             inputs = inputs.having(where, name, value)

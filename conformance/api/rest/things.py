@@ -1,4 +1,4 @@
-"""Things of a collection: their paths in a description, what identifies them, and whether they read as written."""
+"""Things of a collection: their paths in a description, their identifiers, and whether they read as written."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def identified(value: Any, item: Operation) -> tuple[str, Any]:
 
 
 def identifier_of(value: Any, item: Operation) -> str:
-    """Return what identifies a representation in an item's path, as text in lower case; empty if nothing does."""
+    """Return the identifier of a representation as an item's path has it, in lower case; empty if there is none."""
     found = identified(value, item)[1]
     return "" if found is None else str(found).casefold()
 
@@ -85,7 +85,7 @@ def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
 
 
 def is_marked_deleted(value: Any) -> bool:
-    """Return whether a representation says that it is deleted, as that of a thing that can be restored does."""
+    """Return whether a representation is marked as deleted, as that of a restorable thing is."""
     if not isinstance(value, dict):
         return False
     inner = [one for one in value.values() if isinstance(one, dict)]
@@ -169,7 +169,7 @@ def entry_of(schema: Schema) -> Schema | None:
 
 
 def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:
-    """Return what was written, with the values that the response to it shows instead.
+    """Return the values that were written, or those that the response shows in their place.
 
     A device that tells which other value it took has written that, but for the one that was there before, and for
     another value of an enumeration.

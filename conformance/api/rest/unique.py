@@ -30,7 +30,7 @@ _ALPHABETS: Final = (string.digits, string.ascii_lowercase, string.ascii_upperca
 
 
 class Unique:
-    """What is known of the members that must be new.
+    """Members whose values must be unique, as far as the run has learned them.
 
     Args:
         collections: names of the collections that the API has, in the singular.
@@ -52,7 +52,7 @@ class Unique:
         return self._names.get(_collection(operation), ())
 
     def trials(self, operation: Operation, body: Any, schema: Schema) -> Iterator[tuple[tuple[str, ...], Any]]:
-        """Yield members that may have to be new, and the body with new values of them: first all, then each alone."""
+        """Yield members that may have to be unique, and the body with new values of them: all, then each alone."""
         parts = flat(schema).get("properties", {})
         names = [name for name in body if self._may_be(name, parts.get(name, {}))] if isinstance(body, dict) else []
         for chosen in [names[:_TRIED], *([name] for name in names[:_TRIED] if len(names) > 1)] if names else ():

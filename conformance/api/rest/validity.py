@@ -1,4 +1,4 @@
-"""Whether a request is valid by the contract, read back from what goes over the wire."""
+"""Decide whether a request is valid by the contract, read back from its bytes on the wire."""
 
 import re
 from collections.abc import Sequence
@@ -187,7 +187,7 @@ def _of_body(operation: Operation, content_type: str, body: bytes) -> _Said:
 
 
 def _of_form(media_type: str, content_type: str, body: bytes, given: Body) -> _Said:
-    """Judge a form or a text; what other media types contain is unclear."""
+    """Judge a form or a text body; other media types are unclear."""
     if media_type == "application/x-www-form-urlencoded":
         verdict, why = urlencoded_verdict(body, given)
     elif media_type == "multipart/form-data":
@@ -230,7 +230,7 @@ def _is_shown(contract: Contract, path: str, schema: Schema, body: bytes) -> boo
 
 
 def _xml_fault(body: bytes, schema: Schema) -> _Said:
-    """Return the fault of an XML body; one without a visible fault is unclear, as it may contain more."""
+    """Return the fault of an XML body; a body without a visible fault is unclear, as it may contain more."""
     try:
         root = parse_xml(body)
     except UnreadableError as error:

@@ -91,7 +91,7 @@ class Values:
             self._remember(self._seen[plain_name(name)], value)
 
     def accepted(self, operation: Operation, request: Outgoing) -> None:
-        """Remember what stood in a request that the device accepted."""
+        """Remember the values of a request that the device accepted."""
         for name, _, text in values_in(operation, request) if request.method == operation.method else ():
             self._accepted[plain_name(name)].add(text)
 
@@ -108,7 +108,7 @@ class Values:
         return text in self._accepted[plain] or text in map(text_of, known)
 
     def references(self, operation: Operation, name: str, schema: Schema) -> list[Any]:
-        """Return values that a reference of this name may have, by what the device has named; the likeliest first."""
+        """Return values for a reference of this name from earlier responses, the likeliest first."""
         items = flat(schema).get("items") if "array" in kinds_of(schema) else None
         schema = items if isinstance(items, dict) else schema
         plain, thing = plain_name(name), thing_of(name)

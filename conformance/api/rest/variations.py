@@ -47,7 +47,7 @@ _ODD_NUMBERS: Final = (0, -1, _BEYOND, -_BEYOND - 1, 1e308, 1.5)
 
 
 class Kind(StrEnum):
-    """What a request of the survey shows."""
+    """Kind of a request of the survey, by what its response shows."""
 
     USUAL = "usual"  # with what is required
     EXAMPLE = "example"  # with an example of the description
@@ -110,7 +110,7 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
 
 
 def most_references(operation: Operation, usual: Inputs, values: Values) -> Iterator[tuple[Inputs, Variation]]:
-    """Yield a request with as many known references as a list may have, and inputs with all but the first of them."""
+    """Yield a request with as many known references as a list may have, and inputs without the first of them."""
     if not is_json(usual.media_type) or not isinstance(usual.body, dict):
         return
     for name, part in flat(operation.bodies[usual.media_type].schema).get("properties", {}).items():
@@ -126,7 +126,7 @@ def most_references(operation: Operation, usual: Inputs, values: Values) -> Iter
 
 
 def least_inputs(operation: Operation, usual: Inputs) -> Inputs | None:
-    """Return inputs of a creation with the required members alone; None where these are all, or a choice of them."""
+    """Return inputs of a creation with only the required members; None if there are no others, or alternatives."""
     if operation.method != "POST" or not is_json(usual.media_type) or not isinstance(usual.body, dict):
         return None
     schema = operation.bodies[usual.media_type].schema

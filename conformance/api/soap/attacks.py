@@ -1,4 +1,4 @@
-"""Hostile XML documents, made from a harmless one that the robot takes.
+"""Make hostile XML documents from a harmless one that the robot accepts.
 
 Each attack names the requirement that it is for and what a robot must not do with it.
 """

@@ -39,7 +39,7 @@ class SoapServices:
 
 
 def callable_services(soap: SoapServices, *ids: str) -> list[SoapService]:
-    """Return the services that may be called, the one that only reads first.
+    """Return the services that may be called, the service that only reads first.
 
     A service that may not be called, or does not respond, is recorded at the requirements that need it, so that they do
     not pass on half of the evidence.
@@ -80,7 +80,7 @@ def accepted_messages(soap: SoapServices, service: SoapService, *ids: str) -> li
 def is_gone(
     soap: SoapServices, service: SoapService, accepted: tuple[SoapOperation, Node], answer: SoapResponse
 ) -> bool:
-    """Return whether a refusal only says that the thing which the operation reads has ended meanwhile.
+    """Return whether a refusal only shows that the thing to be read has ended meanwhile.
 
     Args:
         soap: the services of the run.

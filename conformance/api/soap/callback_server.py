@@ -1,4 +1,4 @@
-"""A server of ours that a robot must never call: every address in an attack is one of its URLs."""
+"""A server to which a robot must never connect: the addresses in attacks are its URLs."""
 
 import contextlib
 import socket

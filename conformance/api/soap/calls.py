@@ -18,7 +18,7 @@ _SHOWN = 200
 
 @dataclass(frozen=True)
 class SoapResponse:
-    """What a service answered.
+    """A service's response, with its SOAP message if it has one.
 
     Attributes:
         exchange: request and response.
@@ -47,12 +47,12 @@ class SoapResponse:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the answer says that all is well: 2xx, and no fault."""
+        """Return whether the response is 2xx and no fault."""
         return self.exchange.response.ok and self.fault is None
 
     @property
     def accepted(self) -> bool:
-        """Whether a SOAP message says that the request was accepted. An HTML page says nothing."""
+        """Return whether a SOAP message reports success. An HTML page reports nothing."""
         return self.succeeded and self.envelope is not None
 
     @property

@@ -1,4 +1,4 @@
-"""Compare two descriptions of one service by what a client sees of them; layout, prefixes and type names are free."""
+"""Compare two descriptions of one service by what matters to a client; layout, prefixes and type names may differ."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""SOAP 1.1 envelopes: made from body and header elements, and read from a robot's answers as frozen values."""
+"""SOAP 1.1 envelopes: make them from body and header elements, and read a robot's responses as frozen values."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Fault:
 
     @property
     def standard(self) -> str:
-        """The standard code that this is one of (SOAP 1.1, 4.4.1), or empty."""
+        """Return the standard fault code to which this one belongs (SOAP 1.1, 4.4.1), or an empty text."""
         return self.code.split(".", 1)[0] if self.code_namespace == ENVELOPE else ""
 
 

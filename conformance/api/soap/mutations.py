@@ -120,7 +120,7 @@ def facets(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
 
 
 def branches(element: Element, base: Node) -> Iterator[tuple[tuple[int, ...], str, Element]]:
-    """Yield the elements that a choice allows in place of one in a message: its path, words, and the other one."""
+    """Yield alternatives for an element that a choice allows: its path, a description, and the other element."""
     for path, declared in [((), element), *declarations(element, base)]:
         content = None if isinstance(declared.type, Simple) else declared.type.content
         for number, child in enumerate(base.at(path).children):
@@ -138,7 +138,7 @@ def _branches(group: Group | None, tag: str) -> Iterator[Element]:
 
 
 def _wrapped(simple: Simple, text: str) -> tuple[str, ...]:
-    """Return what becomes the same value where only the lower 32 bits of an integer are kept."""
+    """Return texts that equal a value in a program that keeps only the lower 32 bits of an integer."""
     number = lexical.number_in(text) if simple.builtin in lexical.INTEGERS else None
     return (str(int(number) + 2**32),) if number is not None else ()
 

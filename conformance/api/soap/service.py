@@ -116,7 +116,7 @@ class SoapService:
 
     @cached_property
     def described(self) -> Wsdl:
-        """What a client would go by: the robot's own description where it can be used, else the contract's."""
+        """Return the description that a client would use: the robot's own if it is usable, else the contract's."""
         return self.own if self.own is not None and not next(unusable(self.own), "") else self.contract
 
     def fetch(self, location: str) -> bytes:

@@ -1,4 +1,4 @@
-"""Rules of the Basic Profile 1.1 for descriptions: each function yields what breaks the rule that it is named after."""
+"""Rules of the Basic Profile 1.1 for descriptions: each function yields violations of the rule in its name."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -174,7 +174,7 @@ def r2702(description: Wsdl) -> Iterator[str]:
 
 
 def r2705(description: Wsdl) -> Iterator[str]:
-    """One style, document (which is what is meant where none is named)."""
+    """Yield bindings with another style than document, the default."""
     for binding in description.all("w:binding[s:binding]"):
         default = binding.find(clark(WSDL_SOAP, "binding"))
         style = (default.get("style") if default is not None else None) or "document"
@@ -187,7 +187,7 @@ def r2705(description: Wsdl) -> Iterator[str]:
 
 
 def r2706(description: Wsdl) -> Iterator[str]:
-    """Literal use (which is what is meant where none is named, R2707)."""
+    """Yield bodies with another use than literal, the default (R2707)."""
     for kind in ("body", "header", "headerfault", "fault"):
         for element in description.all(f"w:binding//s:{kind}"):
             if element.get("use", "literal") != "literal":

@@ -20,7 +20,7 @@ _OK = 200
 
 @dataclass(frozen=True)
 class _Reply:
-    """What zeep reads of a response."""
+    """The parts of a response that zeep reads."""
 
     status_code: int
     headers: CaseInsensitiveDict[str]
@@ -29,7 +29,7 @@ class _Reply:
 
 
 class _Transport(Transport):
-    """Sends what zeep makes through the service's client, and keeps the last exchange as evidence."""
+    """Sends zeep's messages through the service's client, and keeps the last exchange as evidence."""
 
     def __init__(self, service: SoapService) -> None:
         super().__init__()  # type: ignore[no-untyped-call] # zeep is typed in part
@@ -44,7 +44,7 @@ class _Transport(Transport):
         return self._service.fetch(url)
 
     def post(self, _address: str, message: bytes, headers: dict[str, str]) -> _Reply:
-        """Send a message to the service, wherever its description says it is."""
+        """Send a message to the service's address, whatever address its description has."""
         given = CaseInsensitiveDict(headers)
         exchange = self._service.post(
             message,
@@ -59,7 +59,7 @@ class _Transport(Transport):
 
 
 class ZeepCaller:
-    """A zeep client of one service, made from the robot's description or else from the contract's.
+    """A zeep client of one service, made from the robot's description or, if that fails, the contract's.
 
     Raises:
         Exception: zeep cannot make a client from the description; of any kind, with zeep's message.

@@ -46,7 +46,7 @@ def probe(run: Run, connection: Connection) -> Iterator[RosProbe]:
 
 @pytest.fixture(scope="session")
 def senders() -> list[DeliverySender]:
-    """Return the senders of the run's deliveries: later scenarios record what arrives after their batches."""
+    """Return the senders of the run's deliveries: later scenarios record messages that come after their batches."""
     return []
 
 
@@ -60,7 +60,7 @@ def _described(run: Run, interfaces: Interfaces) -> None:
 
 @pytest.fixture(scope="session")
 def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
-    """Return what reads the list of deliveries if some await that; empty without a REST interface."""
+    """Return functions that read the list of deliveries while a checker waits for it; empty without REST."""
     api = interfaces.rest
     if api is None or not isinstance(api.device, Device) or not run.allow_motion:
         return []
@@ -73,7 +73,7 @@ def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
 
 @pytest.fixture
 def read_deliveries(_lists_read: list[Callable[..., None]]) -> Callable[..., None]:
-    """Return a function that reads the list of deliveries until no delivery is awaited there.
+    """Return a function that reads the list of deliveries until every delivery has been looked for.
 
     Raises:
         NotPossibleError: there is no REST interface to read their list at.
@@ -85,7 +85,7 @@ def read_deliveries(_lists_read: list[Callable[..., None]]) -> Callable[..., Non
 
 @pytest.fixture
 def refused(api: RestInterface) -> RefusedRequests:
-    """Return what keeps the requests that were refused in the run."""
+    """Return the store of requests that the robot refused in the run."""
     if not isinstance(api.device, Device):
         raise TypeError("the run judges another kind of device")
     return api.device.refused[0]
@@ -122,7 +122,7 @@ def _looked_at(_lists_read: list[Callable[..., None]], _beats: list[Beats]) -> I
 
 @pytest.fixture(scope="session")
 def _beats(interfaces: Interfaces, _described: None) -> list[Beats]:
-    """Return what reads the robot's state between the checks; empty without a REST interface."""
+    """Return the reader of the robot's state between checks; empty without a REST interface."""
     api = interfaces.rest
     return [Beats(api, interfaces)] if api is not None and isinstance(api.device, Device) else []
 

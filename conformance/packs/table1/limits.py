@@ -1,4 +1,4 @@
-"""A robot's abilities and accuracy: what its statement declares, and the figures for judging it.
+"""A robot's abilities and accuracy: declared values of its statement, and figures for judging it.
 
 A figure is declared when the statement names it, whatever its value. What is not declared has a figure to drive the
 robot by all the same (contract.md, the statement): the reference robot's limits halved, so that a slower one can
@@ -236,7 +236,7 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return named
 
     def resolved(self) -> Limits:
-        """What the robot is judged by."""
+        """Return the figures by which the robot is judged."""
         declared: dict[str, Any] = self.figures | ({"noise": self.noise} if self.noise else {})
         both = declared.pop("tolerance_abs", None)
         if both is not None:

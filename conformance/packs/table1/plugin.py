@@ -1,4 +1,4 @@
-"""What the generic suite asks this pack for: the statement's own tables, and the robot as a device."""
+"""The pack's answers to the generic suite: the statement's own tables, and the robot as a device."""
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
@@ -83,12 +83,12 @@ class Device(device.Device):
 
     @cached_property
     def accepted(self) -> "list[Deliveries]":
-        """What judges the deliveries of the run; empty without a REST interface."""
+        """Return the checkers of the run's deliveries; empty without a REST interface."""
         return []
 
     @cached_property
     def refused(self) -> "list[RefusedRequests]":
-        """What keeps the requests that were refused in the run; empty without a REST interface."""
+        """Return the store of refused requests; empty without a REST interface."""
         return []
 
     @cached_property
@@ -109,7 +109,7 @@ class Device(device.Device):
         return self._examples.fit(api, operation_id, value)
 
     def marked(self, operation_id: str, value: Any) -> Any:
-        """Return a goal with an id of the suite's own; any other value as it is."""
+        """Return a goal with an id of the suite's own; any other value unchanged."""
         return {**value, "goal_id": {"id": "written as XML"}} if operation_id == "putGoal" else value
 
     def answers_alike(self, template: str) -> bool:
@@ -119,7 +119,7 @@ class Device(device.Device):
         return template in {VELOCITY, LINEAR, SENSORS, SERVICES}
 
     def is_near(self, place: str, shown: Any, wanted: Any) -> bool:
-        """Return whether a value that is read is the one that was sent, within the declared tolerance."""
+        """Return whether a read value equals the sent one within the declared tolerance."""
         if not (isinstance(shown, float) and isinstance(wanted, float)):
             return bool(shown == wanted)
         limits = said_of(self.run).limits
@@ -133,20 +133,20 @@ class Device(device.Device):
         return known_messages(service, operation)
 
     def questions(self, api: device.Rest) -> Iterable[device.Question]:
-        """Return plans to several poses, whose responses can be told apart."""
+        """Return requests for plans to several poses, whose responses can be told apart."""
         from conformance.packs.table1.robot.plan import plan_questions  # noqa: PLC0415 - see the class
 
         return plan_questions(api)
 
     def listeners(self, api: device.Rest) -> Iterable[Listener]:
-        """Return what keeps the requests that were refused."""
+        """Return the listener that keeps refused requests."""
         from conformance.packs.table1.robot.refused_requests import RefusedRequests  # noqa: PLC0415 - see the class
 
         self.refused.append(RefusedRequests(api))
         return self.refused
 
     def checkers(self, api: device.Rest | None, services: Iterable[device.Soap]) -> Iterable[Checker]:
-        """Return what judges every exchange with the robot's resources and services."""
+        """Return the checkers of every exchange with the robot's resources and services."""
         # Imported here: see the class.
         from conformance.packs.table1.checkers.deliveries import Deliveries  # noqa: PLC0415
         from conformance.packs.table1.checkers.goals import Goals  # noqa: PLC0415
@@ -169,13 +169,13 @@ class Device(device.Device):
         return judges
 
     def halt(self, api: device.Rest) -> None:
-        """Cancel and stop what the robot may be doing, without waiting until it stands still."""
+        """Cancel the robot's goal and stop it, without waiting until it stands still."""
         from conformance.packs.table1.robot.stopping import halt  # noqa: PLC0415 - see the class
 
         halt(api)
 
     def bring_to_rest(self, api: device.Rest) -> str:
-        """Cancel what the robot is doing and wait until it stands still; return why it does not, or an empty text."""
+        """Cancel the robot's goal and wait until it stands still; return why it does not, or an empty text."""
         from conformance.packs.table1.robot.stopping import bring_to_rest  # noqa: PLC0415 - see the class
 
         return bring_to_rest(api)

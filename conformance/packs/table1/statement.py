@@ -69,7 +69,7 @@ class Statement(RobotStatement, frozen=True):
 
     @property
     def limits(self) -> Limits:
-        """What the robot is judged by, declared or not."""
+        """Return the figures by which the robot is judged, declared or default."""
         return self.declared.resolved()
 
     @property

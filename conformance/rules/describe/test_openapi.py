@@ -52,7 +52,7 @@ def test_openapi_is_served(rest: HttpClient, judge: Judge) -> None:
 
 @pytest.mark.requirement("describe/openapi-operations")
 def test_openapi_has_the_operations(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Compare the description's paths, methods and parameters with the contract's; it may have more of them."""
+    """Compare the description's paths, methods and parameters with the contract's; it may have more."""
     document, exchange, fault = _document(rest)
     found = [] if document is None else described_by_openapi(document, rest.base_url)
     missing = [fault] if document is None else differences(operations_of(api.run.contract), found)

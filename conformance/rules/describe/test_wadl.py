@@ -56,7 +56,7 @@ def test_wadl_is_served(api: RestInterface, rest: HttpClient, judge: Judge) -> N
 
 @pytest.mark.requirement("describe/wadl-resources")
 def test_wadl_has_the_resources(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
-    """Compare the WADL's resources, methods and parameters with the contract's; it may have more of them."""
+    """Compare the WADL's resources, methods and parameters with the contract's; it may have more."""
     if _without(api):
         return
     found, exchange, fault = _read(rest)

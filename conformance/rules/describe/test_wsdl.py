@@ -59,7 +59,7 @@ def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
 
 
 def _served(service: SoapService) -> _Served:
-    """Get the description from where the statement says it is, else from ?wsdl of the endpoint."""
+    """Get the description from its address in the statement, else from ?wsdl at the endpoint."""
     source = service.published.url or f"{service.endpoint}?wsdl"
     exchange = get(source, service.client.connection)
     answer = exchange.response

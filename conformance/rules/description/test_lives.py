@@ -1,4 +1,4 @@
-"""Life cycles: what an API creates or writes can be read, stays while other things change, and ends when deleted.
+"""Life cycles: a created or written thing can be read, stays while others change, and ends when deleted.
 
 RFC 9110 15.3.2, 9.3.4, 9.3.5, 15.5.
 """
@@ -34,7 +34,7 @@ def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
 
 @rule("description/created-is-there", on=(lifecycles,))
 def created_is_there(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether a created thing is found under its identifier, with this identifier, and stays there."""
+    """Judge whether a created thing is found under its identifier, and stays there."""
     for life in (life for life in trace if life.create):
         there = life.found.response.status not in {HTTPStatus.NOT_FOUND, HTTPStatus.GONE}
         expected = f"the thing that {life.create} has created with status {life.created.response.status}"
@@ -48,7 +48,7 @@ def created_is_there(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 
 @rule("description/written-is-read", on=(lifecycles,))
 def written_is_read(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether what was written is read, also later."""
+    """Judge whether written values are read again, also later."""
     for write in (write for life in trace for write in life.writes):
         expected = f"what {write.operation} wrote with status {write.sent.response.status}"
         yield Case(not write.other, write.found, expected, "; ".join(write.other), cause=write.operation)
@@ -57,7 +57,7 @@ def written_is_read(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 
 @rule("description/deleted-is-gone", on=(lifecycles,))
 def deleted_is_gone(trace: tuple[Life, ...]) -> Iterable[Outcome]:
-    """Judge whether what was deleted is not served any more, by itself or in the list."""
+    """Judge whether a deleted thing is no longer served, alone or in the list."""
     for life in trace:
         if life.deleted is None or life.gone is None or life.deleted.response.status not in _DONE:
             continue
@@ -75,7 +75,7 @@ def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 
 @rule("description/deleted-is-gone", on=(used_things,))
 def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outcome]:
-    """Judge whether a thing was deleted although another one refers to it, so that the reference is broken."""
+    """Judge whether a thing was deleted although another one refers to it, which breaks the reference."""
     for one in trace:
         shown = one.deleted if one.fault else one.user
         expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
@@ -110,7 +110,7 @@ def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
 
 @rule("description/safe", on=(safe_reads,))
 def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
-    """Judge whether safe requests have left what clients write as it was."""
+    """Judge whether safe requests leave values unchanged that clients write."""
     for one in trace:
         yield Case(not one.fault, one.shown, one.expected, one.fault, cause=one.operation)
 

@@ -1,4 +1,4 @@
-"""The description against the device: what it requires, allows and forbids (OpenAPI 3.1, 4.8.12, 4.8.14)."""
+"""The description against the device: required, allowed and forbidden inputs (OpenAPI 3.1, 4.8.12, 4.8.14)."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _json_type(text: str) -> str:
 
 @rule("description/required", on=(survey,))
 def required(trace: Survey) -> Iterable[Outcome]:
-    """Judge whether what the description requires is required."""
+    """Judge whether the device demands the inputs that the description requires."""
     missing = [one for one in trace.probes if one.kind is Kind.MISSING and one.validity != VALID]
     probes = [one for one in missing if one.exchange is not None]
 
@@ -205,7 +205,7 @@ def _named(trace: Survey, run: Run) -> Iterator[Probe]:
 
 
 def _is_of_two(probe: Probe, text: str) -> bool:
-    """Return whether the operation's text, or the refusal, says of two values of the request that they must fit."""
+    """Return whether the operation's text or the refusal says that two values must fit together."""
     request = probe.attempt.request
     sent = read_json(request.body).value
     names = {*(sent if isinstance(sent, dict) else ()), *dict(parse_qsl(urlsplit(request.target).query))}

@@ -1,4 +1,4 @@
-"""Lists, methods, entity tags and conditions; checkers judge what these scenarios send (RFC 9110 9, 13)."""
+"""Lists, methods, entity tags and conditions; checkers judge the exchanges of these scenarios (RFC 9110 9, 13)."""
 
 from collections.abc import Iterable
 

@@ -47,7 +47,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
 
 
 def _found(api: RestInterface, resource: Resource) -> Call | None:
-    """Return a request for a resource with ids of something that the survey has found there."""
+    """Return a request for a resource, with ids of a thing that the survey has found there."""
     own = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
     if call := next(own, None):
         return cast("Call", call)
@@ -103,7 +103,7 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
 
 @pytest.mark.requirement("http/options", "http/allow", "http/allow-agrees", "description/allow")
 def test_options(api: RestInterface, judge: Judge) -> None:
-    """Send OPTIONS to each resource; a checker judges what Allow names."""
+    """Send OPTIONS to each resource; a checker judges the methods in Allow."""
     for _, call in _resources(api):
         exchange = call.send(api, method="OPTIONS")
         if expect(judge, "http/options", exchange).status(200, 204):

@@ -171,7 +171,7 @@ def _pair(api: RestInterface, call: Call) -> tuple[Exchange, str | None, Exchang
 @pytest.mark.phase("aside")
 @pytest.mark.requirement("http/delete-idempotent")
 def test_delete_twice(api: RestInterface, judge: Judge) -> None:
-    """Send DELETE twice: the second one gets 2xx or 404, and leaves the resource as it is."""
+    """Send DELETE twice: the second must get 2xx or 404, and leave the resource unchanged."""
     wanted = applicable_operations(api, ["http/delete-idempotent"], lambda item: item.method == "DELETE", "is a DELETE")
     by_path = {call.operation.template: call for call in reads(api)}
     for operation in wanted:

@@ -47,7 +47,7 @@ class _Pair:
 
     @property
     def crashed(self) -> bool:
-        """Whether one of the two requests made the robot crash."""
+        """Return whether either request made the robot crash."""
         return any(isinstance(came, Exchange) and came.response.status in CRASHES for came in (self.first, self.second))
 
     @property
@@ -68,7 +68,7 @@ class _Pair:
 
     @property
     def fault(self) -> str:
-        """What shows that the requests were read differently from how they were sent; empty if nothing does."""
+        """Return the evidence that the requests were read differently from how they were sent; empty if none."""
         if self.rejected:
             return ""
         if not self.taken:

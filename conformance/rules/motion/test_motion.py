@@ -130,7 +130,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _soon(readings: tuple[Reading, ...], motion: MotionMap) -> tuple[str, Reading]:
-    """Return what moves just when the device must rest, empty if nothing does, and the last reading that counts."""
+    """Return the axes that still move when the device must rest, as text, and the last reading that counts."""
     soon = tuple(one for one in readings if one.sent < readings[0].sent + _SOON_S)
     moved = off(at(soon[-SEVERAL:], motion), at(readings[:SEVERAL], motion), motion) or fastest(soon, motion)
     return moved, soon[-1]
@@ -156,7 +156,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 @rule("motion/new-target", on=(new_targets,))
 def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge what a second target under way does: it displaces the first for good, or is refused, as declared."""
+    """Judge a second target during a move: it displaces the first for good or is refused, as declared."""
     refuses = motion.goto is not None and motion.goto.while_moving == "refused"
     for leg in trace:
         first, second = leg.commands[:2]
@@ -240,7 +240,7 @@ def one_client(trace: tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) ->
 
 
 def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the device drives as one of several clients commanded."""
+    """Judge whether the device follows one of several clients' commands, not a mixture."""
     accepted = [one for one in drive.commands if one.accepted]
     if motion.velocity is None or not accepted:
         return

@@ -55,7 +55,7 @@ def _moves_anyway(trace: Quiet, motion: MotionMap) -> bool:
 
 
 def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[Outcome]:
-    """Judge attempts that were made again, one at a time, because the device moved after all of them."""
+    """Judge attempts that were repeated singly, because the device moved after all of them."""
     for quiet in trace.alone:
         moved = _moved(quiet, motion)
         last = ([one for one in quiet.tried if one.exchange and not is_refusal(one.exchange)] or list(quiet.tried))[-1:]
@@ -68,7 +68,7 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
 
 
 def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
-    """Judge whether attempts are refused, with one of the statuses if any are given; over SOAP by a fault."""
+    """Judge whether attempts are refused, with a given status if there are any; over SOAP by a fault."""
     for one in tried:
         soap = one.exchange is not None and is_soap(one.exchange)
         expected = "a fault" if soap else " or ".join(map(str, statuses)) or "4xx"
@@ -80,7 +80,7 @@ def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
 
 @rule("motion/beyond-limits", on=(clamped_targets, clamped_velocities, attempts_at_rest))
 def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a target or a velocity beyond the limits is refused or clamped, as the map says."""
+    """Judge whether targets and velocities beyond the limits are refused or clamped, as the map declares."""
     if not isinstance(trace, Quiet):
         yield from driven(tuple(one for one in trace if isinstance(one, Drive)), motion)
         for one in trace:
@@ -149,7 +149,7 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 @rule("motion/stamp", on=ALL)
 def stamp(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the stamp of the state goes on, and never back."""
+    """Judge whether the state's stamp increases, and never decreases."""
     if not motion.state.stamp:
         yield NotClaimed("the map names no stamp")
         return

@@ -18,7 +18,7 @@ _NO_ACTION = NotClaimed("the map has no [motion.action]")
 
 @rule("motion/agrees", on=(agreement,))
 def agrees(trace: tuple[Told, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether all operations show the same position and velocity, in one of several readings in a row."""
+    """Judge whether all operations return the same position and velocity, in one of several readings."""
     own = motion.state.read
     for index in range(0, len(trace) - SEVERAL + 1, SEVERAL):
         rounds = [told for told in trace[index : index + SEVERAL] if told.values[own]]
@@ -64,7 +64,7 @@ def action_succeeds(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
 
 @rule("motion/action-runs", on=(targets,))
 def action_runs(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a move under way says that it runs."""
+    """Judge whether a move is reported as running while it runs."""
     action = motion.action
     if action is None or not action.running:
         yield _NO_ACTION
@@ -86,7 +86,7 @@ def _is_between(one: Reading, leg: Leg, motion: MotionMap) -> bool:
 
 @rule("motion/action-canceled", on=(stops,))
 def action_canceled(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether a move that was stopped says that it was canceled."""
+    """Judge whether a stopped move is reported as canceled."""
     action = motion.action
     if action is None or not action.canceled:
         yield _NO_ACTION

@@ -154,6 +154,6 @@ class Preferred:
 
     @property
     def expected(self) -> str:
-        """What the requirement demands."""
+        """Return the media type that the requirement demands, as a phrase."""
         names = [name for name in self.formats if quality(name, self.accept) == self._best]
         return f"{' or '.join(names) if self._best else 'status 406'} when Accept is {self.accept}"

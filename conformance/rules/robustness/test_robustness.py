@@ -65,7 +65,7 @@ def no_hang(trace: Survey) -> Iterable[Outcome]:
 
 
 def _waits(operation: str) -> bool:
-    """Return whether an operation's path says that it waits for something, as a long poll does."""
+    """Return whether an operation's path suggests waiting, as a long poll does."""
     words = (
         "wait",
         "poll",
@@ -85,7 +85,7 @@ def _waits(operation: str) -> bool:
 
 @rule("robustness/recovers", on=(survey,))
 def recovers(trace: Survey) -> Iterable[Outcome]:
-    """Judge whether the usual request is answered after bad ones as it was before them."""
+    """Judge whether the usual request still gets its usual response after bad ones."""
     for label in {one.operation: None for one in trace.probes}:
         before = [one for one in trace.of(label, Kind.USUAL) if one.ok]
         after = trace.of(label, Kind.AGAIN)
@@ -124,7 +124,7 @@ def steady_latency(trace: Survey | tuple[TimedAgain, ...]) -> Iterable[Outcome]:
 
 
 def _at_the_end(timed: TimedAgain) -> Case:
-    """Judge the quickest response at the end of the run; what answers with more by then may take longer."""
+    """Judge the quickest response at the end of the run; a longer response may take longer."""
     before, after = timed.first.response.elapsed_ms, min(timed.times)
     more = len(timed.last.response.body) > _MORE * len(timed.first.response.body)
     return Case(
@@ -139,7 +139,7 @@ def _at_the_end(timed: TimedAgain) -> Case:
 
 
 def _steady(last: Exchange, times: Sequence[float], number: int) -> Case:
-    """Judge the response times of one request, ms: the medians of each ``number`` of them must not grow throughout."""
+    """Judge the response times of one request, ms: medians of ``number`` responses must not keep growing."""
     parts = [statistics.median(times[start : start + number]) for start in range(0, len(times) - number + 1, number)]
     first, middle, end = parts[0], parts[len(parts) // 2], parts[-1]
     grown = parts == sorted(set(parts)) and end > GROWN_TIMES * first and end - first > GROWN_MS

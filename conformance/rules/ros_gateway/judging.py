@@ -1,4 +1,4 @@
-"""What the rules of gateways share."""
+"""Shared functions of the rules on gateways."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def mapped(message: dict[str, object], body: Body) -> dict[str, object]:
 
 
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:
-    """Return whether a response reports a failure: by a declared status, else any, or in a 2xx as the map says."""
+    """Return whether a response reports a failure: by a declared or any error status, or in a 2xx by the map."""
     response = exchange.response
     return not succeeded(exchange, body) and (response.ok or not declared or response.status in declared)
 

@@ -30,7 +30,7 @@ _NO_STATE: Final = NotClaimed("the map has no state of goals")
 
 @rule("ros-gateway/goal-once", on=(action_goals,))
 def once(trace: Goals) -> Iterator[Outcome]:
-    """Judge whether an accepted goal has reached the server once, as it was sent; two sent together are two."""
+    """Judge whether an accepted goal reached the server unchanged, and exactly once."""
     for one in trace.probes:
         if one.course not in _ACCEPTED or one.course is Course.SECOND:
             continue
@@ -181,7 +181,7 @@ def _number_of(look: Look, one: Goal, trace: Goals, ros: RosMap) -> int | None:
 
 @rule("ros-gateway/goal-cancel", on=(action_goals,))
 def cancels(trace: Goals) -> Iterator[Outcome]:
-    """Judge whether a request to cancel reaches the server, for this goal alone, and is reported as it went."""
+    """Judge whether a cancel request reaches the server for this goal alone, and its result is reported."""
     for one in trace.probes:
         if not one.body.cancel:
             yield NotClaimed("the map has no operation that cancels")

@@ -23,7 +23,7 @@ _ABSENT: Final = (Server.MISSING, Server.GONE, Server.SILENT)
 
 @rule("ros-gateway/service-response", on=(service_calls,))
 def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether each call returns what the server responded to it."""
+    """Judge whether each call returns the server's response."""
     for one in trace.probes:
         if one.server not in _RESPONDS or not one.answer:
             continue
@@ -62,7 +62,7 @@ def _key(request: dict[str, Any], body: Body) -> str:
 
 @rule("ros-gateway/service-once", on=(service_calls,))
 def once(trace: Services) -> Iterator[Outcome]:
-    """Judge whether a call that succeeds has reached the server once, as it was sent."""
+    """Judge whether a successful call reached the server unchanged, and exactly once."""
     for one in trace.probes:
         if one.server not in _RESPONDS or not one.answer or not one.succeeded:
             continue
@@ -143,7 +143,7 @@ def others(trace: Services) -> Iterator[Outcome]:
 
 @rule("ros-gateway/recovers", on=(service_calls,))
 def recovers(trace: Services) -> Iterator[Outcome]:
-    """Judge whether a service is called again that was gone, and whether the gateway goes on after a silent one."""
+    """Judge whether a service that was gone is called again, and whether the gateway survives a silent one."""
     for one in trace.probes:
         if one.server in {Server.BACK, Server.AFTER}:
             yield Case(one.succeeded, one.attempt, f"2xx for {one.body.service}, {one.server}", cause=one.server)

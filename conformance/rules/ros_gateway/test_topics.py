@@ -51,7 +51,7 @@ def rows(found: list[Difference]) -> tuple[str, str]:
 
 @rule("ros-gateway/read-exact", on=(topic_reads,))
 def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether each field of a message is returned as it was published; old messages are another matter."""
+    """Judge whether each field of a message is returned as published; the age of messages is judged elsewhere."""
     for one, older in _with_older(trace):
         if one.kind is Kind.NON_FINITE and ros.non_finite == "refused":
             expected = f"an error status for {one.what} on {one.topic}, as the map says (non_finite)"
@@ -94,7 +94,7 @@ def _of_content(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> C
 
 @rule("ros-gateway/read-fresh", on=(topic_reads,))
 def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether new messages are returned in time: each at last, and half of them soon, as a machine is busy."""
+    """Judge whether new messages are returned in time: all eventually, half of them soon."""
     took: dict[str, list[tuple[float, Case]]] = {}
     for one, older in _with_older(trace):
         reads, took_s = reads_of(ros, one.operation), one.sent - one.published if one.earlier else 0.0
@@ -128,7 +128,7 @@ def read_newest(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
 
 @rule("ros-gateway/write-exact", on=(topic_writes, topic_refusals))
 def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
-    """Judge whether each field of what is published is that of the request."""
+    """Judge whether each published field equals the request's."""
     for burst in trace:
         for one in burst.sent:
             if one.is_wrong and one.accepted and burst.heard:

@@ -1,4 +1,4 @@
-"""Rules on topics of a real robot: the gateway returns what the suite hears of them."""
+"""Rules on topics of a real robot: the gateway returns the messages that the suite receives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Header blocks and versions: what a SOAP 1.1 node must understand, may ignore, and checks first."""
+"""Header blocks and versions: what a SOAP 1.1 node must understand, may ignore, and tests first."""
 
 from dataclasses import replace
 

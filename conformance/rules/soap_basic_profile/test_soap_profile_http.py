@@ -38,7 +38,7 @@ def _message(service: SoapService) -> Node:
 
 @pytest.mark.requirement("soap-basic-profile/R1109")
 def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Send SOAPAction as the description declares it; any other one would break R2744 or R2745."""
+    """Send SOAPAction as the description declares it; another value would break R2744 or R2745."""
     for service in callable_services(soap, "soap-basic-profile/R1109"):
         good = quiet_example(service)
         message = good[1] if good else _taken_otherwise(service)

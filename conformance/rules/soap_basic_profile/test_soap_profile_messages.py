@@ -44,7 +44,7 @@ def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 
 
 def _untyped(judge: Judge, service: SoapService) -> None:
-    """Send messages with xsi:type to operations that accept none without it: those must not accept these."""
+    """Send messages with xsi:type to operations that refuse them without it: they must refuse these too."""
     for operation in service.contract.operations:
         declared = service.contract.shape(operation.request) if operation.request else None
         if declared is None or example(service, operation) is not None:

@@ -1,4 +1,4 @@
-"""Rules on states: the device accepts and refuses operations by its state, and changes it as the state map says."""
+"""Rules on states: the device accepts, refuses and changes state as its state map declares."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _status(step: Step) -> int:
 
 @rule("states/keeps", on=(walked,))
 def keeps(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
-    """Judge whether refused operations leave the state as it was."""
+    """Judge whether refused operations leave the state unchanged."""
     for step in trace.steps:
         if not step.taken:
             may, expected = state_map.following(step.state), f"the state kept by {step.operation} in {step.state}"

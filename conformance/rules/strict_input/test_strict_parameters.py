@@ -77,7 +77,7 @@ def test_path_parameters(api: RestInterface) -> None:
 def _valid_calls(
     api: RestInterface, requirement: str, wanted: Callable[[Operation], bool], what: str
 ) -> Iterator[Call]:
-    """Yield valid requests that the robot accepts, so that only the later change can be why it rejects one."""
+    """Yield valid requests that the robot accepts, so that only a later change can be refused."""
     for operation in applicable_operations(api, [requirement], wanted, what):
         call = readable(api, operation) if operation.method == "GET" else example_call(api, operation)
         exchange = call.send(api)
@@ -89,7 +89,7 @@ def _valid_calls(
 
 
 def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
-    """Return invalid texts for the parameters: at quick effort one of each kind and a few more."""
+    """Return invalid texts for parameters: at quick effort one of each kind and a few more."""
     wrong = [item for parameter in operation.parameter(where) for item in wrong_texts(parameter)]
     first: dict[str, Wrong] = {}
     for item in wrong:

@@ -78,7 +78,7 @@ def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
 
 @pytest.mark.requirement(_SPOOFING, *_IDS)
 def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
-    """Send each attack in a message that the robot takes without it, in the Body and in Header blocks."""
+    """Send each attack in a message that is otherwise accepted, in the Body and in Header blocks."""
     if not soap.there:
         # The class is then judged over REST alone.
         for id_ in (_SPOOFING, "xml-security/soapaction-spoofing"):
@@ -106,7 +106,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
 def _attacks(
     service: SoapService, harmless: tuple[Node, Node, str], callbacks: CallbackServer, each: int
 ) -> Iterator[Attack]:
-    """Yield the attacks on a harmless message: in one of its values, and in a Header block that must be ignored."""
+    """Yield the attacks on a harmless message: in a value, and in a Header block that must be ignored."""
     _, marked, value = harmless
     aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
     document = envelope([marked], (aside,)).written().decode()

@@ -1,1 +1,1 @@
-"""What judges every exchange of a run by the paper's contract, whichever check sent it: live, and by roaas judge."""
+"""Checkers of the paper's contract for every exchange of a run, live and in roaas judge."""

@@ -78,7 +78,7 @@ class Deliveries:
         self._lists: list[tuple[float, Sequence[str]]] = []
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
-        """Take one exchange of the run: a delivery, or the list of them."""
+        """Judge one exchange of the run: a delivery, or a read of the list."""
         if not isinstance(attempt, Exchange):
             return
         exchange, request = attempt, attempt.request
@@ -92,7 +92,7 @@ class Deliveries:
             self._waiting.append(_Accepted(values, "rest" if request.method == "PUT" else "soap", exchange))
 
     def awaits(self, now_s: float) -> bool:
-        """Return whether many deliveries wait to be looked for, or one for long, so that the list should be read."""
+        """Return whether the list should be read, because many deliveries wait for it, or one waits long."""
         if not self.has_list:
             return False
         if self._before is None or len(self._waiting) >= _MANY:
@@ -112,7 +112,7 @@ class Deliveries:
         return _delivery(code, rest[1::2]) if tuple(rest[::2]) == PATH_NAMES else None
 
     def _look(self, exchange: Exchange) -> Iterator[Case]:
-        """Judge a list in any format by the one before, and by JSON the deliveries that were accepted before it."""
+        """Judge a list in any format by the list before; as JSON, also by the deliveries accepted before it."""
         response = exchange.response
         value, shown = _listed(response.media_type, response.body) if response.ok else (None, ())
         if value is None:
@@ -146,7 +146,7 @@ class Deliveries:
                 yield from self._judge(one, there=False)
 
     def _judge_kept(self, exchange: Exchange, entries: Sequence[str], requirement: str) -> Case:
-        """Judge whether a list still has every entry of the one before, unchanged; a full list may drop the oldest."""
+        """Judge whether a list still has all earlier entries unchanged; a full list may drop the oldest."""
         received_s = exchange.response.received_s
         asked_s = received_s - exchange.response.elapsed_ms / 1000
         before = next((one for at, one in reversed(self._lists) if at < asked_s), ())
@@ -205,7 +205,7 @@ def _is_repeatable(request: Request) -> bool:
 
 
 def _of_message(request: Request) -> Delivery | None:
-    """Return the values of a SOAP delivery that has each of them once; None for any other request."""
+    """Return the values of a SOAP delivery in which each occurs once; None for any other request."""
     if request.method != "POST" or b"Execute" not in request.body or len(request.body) > _LARGE:
         return None
     try:

@@ -79,7 +79,7 @@ class Goals:
             yield from self._look(self._before, self._since[0], self._since[1], self._first)
 
     def _judge_response(self, exchange: Exchange) -> Iterator[Case]:
-        """Judge that the response to a PUT has the goal in the request, as far as it has one.
+        """Judge that the response to a PUT repeats the request's goal, as far as it contains one.
 
         A robot may have transformed the pose to another frame.
         """

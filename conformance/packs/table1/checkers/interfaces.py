@@ -1,4 +1,4 @@
-"""Judge the goal and the velocity that are read over SOAP, as XML or by HEAD, by what is read as JSON around them."""
+"""Judge the goal and velocity read over SOAP, as XML or by HEAD, by JSON reads before and after."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -111,7 +111,7 @@ class AcrossInterfaces:
         self._acted_by_hand = True
 
     def _forget(self, at_s: float) -> None:
-        """Begin anew, as something may have changed the states."""
+        """Forget earlier values, because a request may have changed the states."""
         self._acted_s = at_s
         for state in self._states.values():
             state.before, state.since = _UNREAD, []

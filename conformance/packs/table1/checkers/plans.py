@@ -214,7 +214,7 @@ def _asked_over_soap(body: bytes) -> dict[str, str]:
 
 
 def _once(named: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """Return parameters by name; empty if one occurs twice, as it is unclear which one counts."""
+    """Return parameters by name; empty if a name occurs twice, because it is unclear which value counts."""
     pairs = list(named)
     found = dict(pairs)
     return found if len(found) == len(pairs) else {}
@@ -229,7 +229,7 @@ def _number(text: str) -> float:
 
 
 def longest_leap(poses: tuple[Pose, ...]) -> float:
-    """Return how far a path jumps aside to one of its poses and back again, m; 0 where it does not."""
+    """Return how far a path jumps aside for one pose and back again, m; 0 if it does not."""
     if len(poses) < _FEWEST:
         return 0.0
     steps = [one.distance(two) for one, two in itertools.pairwise(poses)]

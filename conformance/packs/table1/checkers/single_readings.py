@@ -203,7 +203,7 @@ class BesideOdometry(Generic[_Value]):
             )
 
     def _neighbours(self, stamps: list[float]) -> bool:
-        """Return whether samples with these stamps are consecutive, so that the suite missed none between them."""
+        """Return whether samples with these stamps are consecutive, so that none is missing between them."""
         if not self._lapses:
             return False
         hertz = self._limits.odometry_hz

@@ -1,4 +1,4 @@
-"""Judge every successful SOAP response of a run by the XSD, and whether what it returns is complete.
+"""Judge every successful SOAP response of a run by the XSD, and whether its content is complete.
 
 A response that is invalid now and then is found only if all are looked at.
 """
@@ -58,7 +58,7 @@ class SoapResponses:
         self._services = {service.endpoint: service for service in services}
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
-        """Judge one exchange, if it is a successful call of one of the services."""
+        """Judge one exchange, if it is a successful call of these services."""
         service = self._services.get(attempt.request.url)
         if service is None or attempt.request.method != "POST" or not isinstance(attempt, Exchange):
             return
@@ -90,7 +90,7 @@ class SoapResponses:
 
 
 def _content(exchange: Exchange, wrapper: etree._Element) -> Iterator[Case]:
-    """Judge that a reading operation returns all that the contract says; GetGoal may return nothing."""
+    """Judge that a reading operation returns everything in the contract; GetGoal may return nothing."""
     operation = local(str(wrapper.tag)).removesuffix(_SUFFIX)
     found = [child for child in elements(wrapper) if local(str(child.tag)) == "return"]
     if operation not in _CONTENT or (operation == "GetGoal" and not any(len(child) for child in found)):
@@ -112,7 +112,7 @@ def _content(exchange: Exchange, wrapper: etree._Element) -> Iterator[Case]:
 
 
 def _list_problem(entries: list[Any], shape: Shape, name: str) -> str:
-    """Return what is wrong with a list: an entry that is incomplete, twice, or not named in full."""
+    """Return what is wrong with a list: an entry that is incomplete, double, or not named in full."""
     if problem := shape.problem(entries):
         return problem
     listed = entries_of(entries, tuple(shape.schema["items"]["properties"]))

@@ -140,7 +140,7 @@ class State:
             self._none, self._velocity_of_none = True, None
 
     def _plain(self, exchange: Exchange) -> bool:
-        """Return whether a request has only usual headers, so that the robot must answer 200."""
+        """Return whether a request has only usual headers, so that the robot must respond 200."""
         # A check may send wrong credentials or none, to see them refused.
         request, own = exchange.request, self._credentials.fields(shown=True)
         if (

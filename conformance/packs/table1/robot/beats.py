@@ -1,4 +1,4 @@
-"""Read the robot's state between the checks of a run, a little each time, for those who judge every reading.
+"""Read the robot's state between the checks of a run, a little each time, for checkers of every reading.
 
 A fault that comes only after a certain kind of request is found only if somebody reads the state after each kind.
 """
@@ -88,7 +88,7 @@ class Beats:
         return claimed <= set(self._run.claims)
 
     def beat(self) -> None:
-        """Read a little, if something was sent since the last time; more where what was read was odd.
+        """Read a little, if a request was sent since the last time; more if the last reading was odd.
 
         Raises:
             NoAnswerError: no HTTP response came.

@@ -85,7 +85,7 @@ class Clock:
         return median(near) if len(near) >= _ENOUGH else None
 
     def is_right(self, time_scale: float) -> bool:
-        """Return whether the rate is within 5 % of the declared time scale, so that odometry ages can be computed."""
+        """Return whether the clock's rate is within 5 % of the time scale, so that odometry ages can be computed."""
         rate = self.rate
         return rate is not None and abs(rate - time_scale) <= time_scale * (_SHARE + _OLDER_S / self.span_s)
 

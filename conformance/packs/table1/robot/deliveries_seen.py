@@ -34,14 +34,14 @@ class DeliveryObserver(Protocol):
         """Forget the deliveries seen so far."""
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
-        """Return what was seen since the mark or the last call, oldest first.
+        """Return the deliveries seen since the mark or the last call, oldest first.
 
         Waits for ``count`` of them, and then for so much longer, s.
         """
 
 
 class NoObserverError(Exception):
-    """Raised when nothing can show arriving deliveries; the message says why."""
+    """Raised when no observer can see arriving deliveries; the message explains why."""
 
 
 class ListObserver:

@@ -60,7 +60,7 @@ class DeliverySender:
     _judged: int = 0
 
     def __post_init__(self) -> None:
-        """Disregard what arrived before."""
+        """Discard messages that arrived before."""
         self.observer.mark()
 
     def trace(self) -> Deliveries:

@@ -87,7 +87,7 @@ class Drive:
         self.trace = self.trace.commanded(Command(velocity, sent, self.clock.now(), exchange))
 
     def _renew(self) -> None:
-        """Send the last command again as it was sent, as another resource or format could hide a fault of this one."""
+        """Send the last command again in the same form, because another form could hide a fault of this one."""
         last = self.trace.last_command
         if last is not None:
             request, sent = last.exchange.request, self.clock.now()
@@ -120,7 +120,7 @@ class Drive:
         return hold_s is not None and self.look_s > _LOOK_SHARE * hold_s
 
     def hold(self, velocity: Velocity) -> Callable[[], bool]:
-        """Command a velocity; return a function that says whether it certainly still holds.
+        """Command a velocity; return a function that tells whether it certainly still holds.
 
         If it has, the robot may have slowed down and sped up again between two reads.
         """

@@ -131,7 +131,7 @@ class Trace:
         return replace(longer, odometry=(*self.odometry, turn.odometry), measured=(*self.measured, velocity))
 
     def upto(self, turns: int) -> Trace:
-        """Return the trace as it was after the given number of looks."""
+        """Return the trace up to a number of looks."""
         seen = self.turns[:turns]
         return replace(self, turns=seen, commands=self.commands[: seen[-1].commands] if seen else ())
 

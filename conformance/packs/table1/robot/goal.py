@@ -1,4 +1,4 @@
-"""Build goals, send them, and compare the goal that the robot shows with the one that was sent."""
+"""Build goals, send them, and compare the goal in the robot's response with the sent one."""
 
 import math
 from http import HTTPStatus
@@ -52,7 +52,7 @@ def goal_body(pose: Pose, frame: str, id_: str | None = None, *, length: float =
 
 
 def difference(goal: Any, put: dict[str, Any]) -> str:
-    """Return where the goal that the robot shows differs from the one that was PUT; empty if nowhere.
+    """Return where the robot's goal differs from the sent one; empty if nowhere.
 
     A quaternion and its negative are the same orientation.
     """
@@ -101,7 +101,7 @@ def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
 
 
 def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
-    """GET the active goal until it is one of those that were PUT, at most for the settle time.
+    """GET the active goal until it is one of the sent ones, at most for the settle time.
 
     Returns:
         The goal (None: the robot shows no goal), where it differs from those PUT, and the last exchange.

@@ -1,4 +1,4 @@
-"""Records of goals that were sent and of what the robot then showed, as data that rules can judge without a robot."""
+"""Records of sent goals and of the robot's responses, as data that rules can judge without a robot."""
 
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -59,7 +59,7 @@ class Put:
 
 @dataclass(frozen=True)
 class Cancelled:
-    """The DELETE of a goal, and what followed.
+    """The DELETE of a goal, and the reads after it.
 
     Attributes:
         exchange: the DELETE's request and response.

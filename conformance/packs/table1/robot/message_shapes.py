@@ -27,7 +27,7 @@ def _answer_of(operation_id: str) -> Schema:
 
 
 def _without(schema: Schema, name: str) -> Schema:
-    """Return the schema of an object without one of its fields."""
+    """Return an object's schema without one of its members."""
     return {
         **schema,
         "required": [one for one in schema["required"] if one != name],

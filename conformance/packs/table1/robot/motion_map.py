@@ -1,4 +1,4 @@
-"""The motion map of the paper's robot: how the generic suite drives it, by what its statement declares.
+"""The motion map of the paper's robot, from its statement: how the generic suite drives it.
 
 The map has velocities and no positions. Where the robot has room, and which velocities it can drive at once, the pack
 knows by plans and by abilities.drivable().

@@ -36,7 +36,7 @@ def refuse_goal(robot: Robot) -> object:
 
 
 def no_commands(robot: Robot, soap: SoapServices, seed: str) -> list[Callable[[], object]]:
-    """Return requests that are refused or only read, some from another client, in an order that the seed says.
+    """Return requests that are refused or only read, some of another client, in an order set by the seed.
 
     Args:
         robot: the robot.

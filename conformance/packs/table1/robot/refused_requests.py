@@ -1,4 +1,4 @@
-"""Keep the requests that the robot has refused in a run, so that they can be sent again in another state of the robot.
+"""Keep requests that the robot refused in a run, to send them again in another state of the robot.
 
 A robot may refuse a request without effect in one state, and let it have one in another: while a goal is active, while
 a velocity is held, between deliveries.
@@ -98,7 +98,7 @@ class Refused:
 
 
 def is_refused(exchange: Exchange) -> bool:
-    """Return whether a response says that the request is wrong: by its status, or by a SOAP fault."""
+    """Return whether a response says that the request is wrong: by its status, or as a SOAP fault."""
     response = exchange.response
     if exchange.request.method == "POST" and response.media_type in {"text/xml", "application/soap+xml"}:
         return read_exchange(exchange).code in _FAULTS
@@ -167,7 +167,7 @@ class RefusedRequests(Listener):
 
 
 def send_known(robot: Robot, soap: SoapServices, refused: RefusedRequests) -> None:
-    """Send requests that every robot refuses, so that a run of few checks has one of each kind, too."""
+    """Send requests that every robot refuses, so that a run of few checks has each kind too."""
     if refused.has_known:
         return
     refused.has_known = True
@@ -193,7 +193,7 @@ def _rank(rest: HttpClient, endpoint: str) -> int:
 
 
 def _is_plain(request: Request) -> bool:
-    """Return whether a request can be sent again as it was, and is no attack."""
+    """Return whether a request can be sent again unchanged, and is no attack."""
     names = [name.lower() for name, _ in request.headers]
     size = next((value for name, value in request.headers if name.lower() == "content-length"), str(len(request.body)))
     host = next((value for name, value in request.headers if name.lower() == "host"), "")

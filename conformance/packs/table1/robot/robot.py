@@ -262,7 +262,7 @@ class Robot:
         return Velocity(*abilities.drivable(self.limits, self.statement.motion, velocity))
 
     def only(self, component: int, value: float) -> Velocity:
-        """Return a velocity in one component, m/s or rad/s, plus what the robot needs to drive it."""
+        """Return a velocity in one component, m/s or rad/s, with the other components it needs to drive."""
         return self.drivable(Velocity(*(value if index == component else 0.0 for index in range(6))))
 
     def limit_declared(self, component: int) -> bool:
@@ -270,7 +270,7 @@ class Robot:
         return self.limits.linear_declared if component < len("xyz") else self.limits.angular_declared
 
     def actuated(self, component: int) -> bool:
-        """Return whether the statement says that the robot can move in a component."""
+        """Return whether the statement declares that the robot can move in a component."""
         return abilities.actuated(self.statement.motion, component)
 
     @property

@@ -53,7 +53,7 @@ def bring_to_rest(api: RestInterface) -> str:
 
 
 def await_rest(api: RestInterface, *, settled: bool) -> None:
-    """Bring a robot to rest; ``settled``: it gets the time to begin what it was told just before.
+    """Bring a robot to rest; ``settled``: wait first for the settle time, so that earlier commands have begun.
 
     Raises:
         NotPossibleError: it does not come to rest.
@@ -124,7 +124,7 @@ class _Stiller:
         self._silent = ""
 
     def bring(self, cancel_s: float, settle_s: float) -> str:
-        """Cancel, stop and wait; return what bring_to_rest() returns."""
+        """Cancel, stop and wait; return the reason why the robot still moves, or an empty text."""
         return self.halt(cancel_s) or self._wait(self._patience(settle_s))
 
     def halt(self, cancel_s: float) -> str:

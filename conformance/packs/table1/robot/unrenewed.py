@@ -18,7 +18,7 @@ _MOST: Final = 0.6
 def unrenewed(
     bent: Velocity, ahead: Velocity, across: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
 ) -> list[tuple[Velocity, By]]:
-    """Return velocities that are not renewed, and what commands them last.
+    """Return velocities to send without renewal, and how each is commanded last.
 
     A robot may keep a watchdog for each path, for each sign, for each part, and for small or large velocities. At the
     effort "quick" the seed says which one is tried.

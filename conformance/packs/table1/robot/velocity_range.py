@@ -49,7 +49,7 @@ def handy(robot: Robot, share: float) -> Velocity:
 
 
 def both(robot: Robot) -> Velocity:
-    """Return the fastest turn to the left beside the fastest drive, if the statement says how they depend."""
+    """Return the fastest left turn during the fastest drive, if the statement declares how both depend."""
     return robot.drivable(Velocity(linear_x=fastest(robot, AHEAD, direction(robot)), angular_z=fastest(robot, ABOUT)))
 
 

@@ -1,4 +1,4 @@
-"""A Hypothesis state machine that sends velocities in random order; the robot must do what the last one says."""
+"""A Hypothesis state machine that sends velocities in random order; the robot must follow the last one."""
 
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
@@ -92,7 +92,7 @@ class VelocityMachine(RuleBasedStateMachine):
         return self._drive.stop(moving, "xml" if self._as_xml(STILL) else "velocity")
 
     def _as_xml(self, wanted: Velocity) -> bool:
-        """Return whether to send a velocity as XML: every other one of the same signs is, where the robot takes it."""
+        """Return whether to send a velocity as XML: every second one with the same signs, if the robot reads XML."""
         signs = tuple((part > 0) - (part < 0) for part in wanted)
         self._walk.commands[signs] += 1
         return self._walk.commands[signs] % 2 == 1

@@ -41,7 +41,7 @@ _AWAY_M: Final = 1.0
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def attempts(api: RestInterface, robot: Robot, mapped_robot: MappedDevice) -> Quiet:
-    """At rest, send what must move nothing, and watch the robot and its goal."""
+    """Send requests to a robot at rest that must not move it, and watch its position and goal."""
     made = _Attempts(api, robot, mapped_robot)
     several = [made.cancelled, made.not_acceptable, made.incomplete, made.beyond, made.elsewhere, made.invalid]
     several += [made.unactuated]
@@ -56,11 +56,11 @@ class _Attempts:
     mapped: MappedDevice
 
     def settle(self) -> None:
-        """Bring the robot to rest; it may yet begin what it was told just before."""
+        """Bring the robot to rest, after waiting for earlier commands to begin."""
         await_rest(self.api, settled=True)
 
     def goal(self) -> str:
-        """Return what the robot shows if it has a goal."""
+        """Return the robot's goal for a message; empty if it has none."""
         return "" if self.robot.goal()[0] is None else GOAL
 
     def cancelled(self) -> Iterator[Tried]:

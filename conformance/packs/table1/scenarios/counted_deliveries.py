@@ -81,7 +81,7 @@ class Rejected:
 
     @classmethod
     def of(cls, what: str, delivery: Delivery, answer: SoapResponse) -> "Rejected":
-        """Return the record of what a service answered."""
+        """Return the record of a service's response."""
         rejected = 400 <= answer.status < 500 or answer.code in _FAULTS  # noqa: PLR2004 - RFC 9110 15.5
         return cls(what, delivery, answer.exchange, answer.accepted, rejected)
 
@@ -212,7 +212,7 @@ def _invalid(api: RestInterface, soap: SoapServices) -> CountedDeliveries:
 
 
 def _put(api: RestInterface, delivery: Delivery, keys: Sequence[str]) -> tuple[Exchange, ...]:
-    """PUT a delivery once with each key, each on a new connection so that the client does not retry."""
+    """PUT a delivery once with each key, each on a new connection, which prevents retries."""
     fields = [(("Idempotency-Key", f'"{key}"'),) for key in keys]
     return tuple(put_delivery(api, delivery.rest_path, headers=field, fresh=True) for field in fields)
 

@@ -105,7 +105,7 @@ class _Player:
         return Put(exchange, body, goal, read, differs, ended=False), goal is None
 
     def _repeat(self, body: dict[str, Any], there: Pose) -> bool:
-        """PUT the active goal again; return whether it was still active, as it may have ended ``there`` before."""
+        """PUT the active goal again; return whether it was still active: at the place ``there`` it may have ended."""
         for turn in range(_TIMES):
             put, none = self._put_beside(body, body)
             if none and arrived(self.robot, there):
@@ -133,7 +133,7 @@ class _Player:
         return True
 
     def _velocity_meanwhile(self, body: dict[str, Any], there: Pose) -> None:
-        """Command velocities while a goal is active: an invalid one, one of both parts, and a linear one."""
+        """Command velocities during a goal: an invalid one, one with both parts, and a linear one."""
         robot, drive = self.robot, Drive(self.robot)
         self._keeps(robot.rest.send("PUT", VELOCITY, headers=JSON_BODY, body=b"{}"), body, there)
         slow, sent = slow_turn(robot), robot.clock.now()
@@ -223,7 +223,7 @@ def slow_turn(robot: Robot) -> Velocity:
 
 
 def await_motion(robot: Robot) -> None:
-    """Wait a little until the robot moves, so that a cancel has an effect."""
+    """Wait shortly until the robot moves, so that cancelling has an effect."""
     for _ in poll_for(robot.clock, _STEP_S, min(1.0, robot.settle_s)):
         velocity, _ = robot.velocity()
         if velocity is None or not robot.near(velocity, STILL, 3):

@@ -113,7 +113,7 @@ def _turning_before(robot: Robot, effort: Effort) -> Command | None:
 
 
 def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
-    """Put a goal: where the statement says that the frames differ, in the odometry's, if the robot takes that."""
+    """PUT a goal, in the odometry's frame if the statement declares two frames and the robot accepts that."""
     odometry, _ = robot.read(POSE, ODOMETRY)
     if odometry is not None and any(robot.statement.motion.odom_to_map):
         body = goal_body(robot.in_odometry(there), odometry["header"]["frame_id"], _REACHED)
@@ -242,7 +242,7 @@ class _Way:
         self.trace = replace(self.trace, start_over_soap=found, over_soap=None if other else (exchange, shown))
 
     def _turn_at(self, there: Pose) -> None:
-        """PUT a goal under the same id where the robot is, with another heading, and watch whether it turns there."""
+        """PUT a goal with the same id at the robot's place and another heading, and watch whether it turns."""
         robot, drive, clock = self.robot, Drive(self.robot), self.drive.clock
         heading = wrapped(there.yaw + _ASIDE_RAD)
         put = put_goal(robot, goal_body(there._replace(yaw=heading), robot.statement.motion.frame, _REACHED))

@@ -152,6 +152,6 @@ class _Goals(RuleBasedStateMachine):
         return self._record("goal-delete", exchange, differs, ended=near)
 
     def _record(self, kind: str, exchange: Exchange, differs: str = "", *, ended: bool = False) -> bool:
-        """Record a step; return whether the robot is as the walk takes it to be, so that the walk can go on."""
+        """Record a step; return whether the robot's state is as expected, so that the walk can continue."""
         self._steps.append(GoalStep(kind, exchange, differs, ended))
         return self._steps[-1].case.holds

@@ -58,7 +58,7 @@ def _of(code: int, first: int) -> Delivery:
 
 @dataclass(frozen=True)
 class Ordered:
-    """Valid deliveries directly after refused requests, with what arrived.
+    """Valid deliveries directly after refused requests, and the messages that arrived.
 
     Attributes:
         orders: the deliveries that were accepted, each with its exchange.
@@ -92,7 +92,7 @@ class DuringGoal:
 
 @dataclass(frozen=True)
 class RefusedAgain:
-    """What became of requests that were refused before.
+    """The effects of refused requests that were sent again.
 
     Attributes:
         rests: readings after them at rest.
@@ -126,7 +126,7 @@ def refused_again(
     refused: RefusedRequests,
     senders: list[DeliverySender],
 ) -> RefusedAgain:
-    """Send what was refused in the run again: at rest, between deliveries, and while a goal is active."""
+    """Send the run's refused requests again: at rest, between deliveries, and during a goal."""
     player = _Player(api, robot, soap, refused)
     try:
         send_known(robot, soap, refused)
@@ -179,7 +179,7 @@ class _Player:
         return off or target["header"]["frame_id"] == NO_FRAME
 
     def elsewhere(self) -> None:
-        """Send a valid goal by methods and to a path that the robot has to refuse, so that it is sent again."""
+        """Send a valid goal with methods and to a path that the robot must refuse, so that it is sent again later."""
         (near,) = choose_goals(self.robot, 1.0, 1)
         body = body_of(goal_body(near, self.robot.statement.motion.frame, "not to be followed"))
         for method, path in elsewhere(self.robot, GOAL_PATH):

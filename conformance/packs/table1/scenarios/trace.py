@@ -1,4 +1,4 @@
-"""What the scenarios that drive a robot record."""
+"""Records of scenarios that drive a robot."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

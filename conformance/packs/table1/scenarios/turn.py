@@ -119,7 +119,7 @@ class _Turning:
         return replace(recorded, over_soap=tuple(self.over_soap))
 
     def read_over_soap(self, subscribers: SoapService, turn: int) -> None:
-        """Read the state over SOAP beside some looks, so that it is compared with the odometry at every heading."""
+        """Read the state over SOAP beside some looks, to compare it with the odometry at every heading."""
         if turn % _BESIDE == 0:
             self.over_soap.append(ask(subscribers, _STATES[turn // _BESIDE % len(_STATES)]))
 
@@ -162,7 +162,7 @@ class _Turning:
             self._ahead_from_rest(renewed=run.effort.name != "quick")
 
     def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, By]]:
-        """Return what unrenewed() returns."""
+        """Return the velocities that are sent without renewal."""
         robot = self.robot
         ahead = robot.drivable(Velocity(*(-one for one in bent)))
         across = robot.drivable(ahead._replace(angular_z=-ahead.angular_z))
@@ -227,7 +227,7 @@ class _Turning:
         drive.saw("safety/renewal", expected, seen, "ended", holds=lasts if in_time else None)
 
     def let_go(self, turning: Velocity, by: By = "velocity") -> None:
-        """Command a velocity and then nothing any more, and watch how it ends; ``by``: what commands it last.
+        """Command a velocity, then send nothing, and watch it end; ``by``: how it is commanded last.
 
         The first one is renewed for longer than it holds, and others that the robot must refuse come after it. Where it
         does not last, or the robot takes what it had refused before, the velocity is let go again.

@@ -60,7 +60,7 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
 
 @rule("equivalence/delivery-only", on=(deliveries, deliveries_later))
 def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
-    """Judge that no message arrives beside the one for each accepted request."""
+    """Judge that no message arrives besides one for each accepted request."""
     for batch, before in trace.judged():
         exchange = next((one.exchange for one in _accepted(batch)), None)
         found, cause = "", ""

@@ -77,7 +77,7 @@ def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.phase("resting")
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
 def test_pose_and_velocity_at_one_moment(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
-    """Read pose and velocity over SOAP by several clients at once: what REST steadily shows is in most responses."""
+    """Read pose and velocity over SOAP by several clients at once: most responses must agree with a steady REST."""
     for name, (path, _, _) in STATES.items():
         odd: _Odd = {}
         for number in range(_REPEATS):
@@ -99,7 +99,7 @@ def test_pose_and_velocity_at_one_moment(robot: Robot, subscribers: SoapService,
 
 
 def _odd_at_one_moment(robot: Robot, subscribers: SoapService, name: str, effort: Effort) -> _Odd | None:
-    """Read a state by several clients at once; return where most differ from what REST shows before and after.
+    """Read a state by several clients at once; return where most responses differ from REST's before and after.
 
     None: the readings over REST cannot be read.
     """

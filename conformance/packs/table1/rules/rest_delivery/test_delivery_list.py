@@ -102,7 +102,7 @@ class Listed(NamedTuple):
 
     @property
     def out_of_order(self) -> str:
-        """What is in the place of another delivery; empty if nothing."""
+        """Return the delivery that stands in another one's place; empty if none does."""
         wrong = ((entry, wanted) for wanted, entry in self._pairs if entry is None or _request(entry) != wanted)
         return next((f"{entry and _request(entry)} in the place of {wanted}" for entry, wanted in wrong), "")
 

@@ -33,7 +33,7 @@ velocity_range = shown("rest-resources/velocity-range", straight, turn, further_
 
 @rule("rest-resources/velocity-both", on=(turn,))
 def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the robot reaches both limits at once, where its statement does not say that it cannot."""
+    """Judge that the robot reaches both limits at once, unless its statement excludes that."""
     statement = said_of(run)
     found = list(outcomes("rest-resources/velocity-both", trace.drive, statement.limits))
     if not found:
@@ -47,7 +47,7 @@ velocity_odometry = shown("rest-resources/velocity-odometry", straight, turn, ve
 
 @rule("rest-resources/velocity-odometry", on=(turn,))
 def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the velocity read first after a pause is not the one from before; once is chance."""
+    """Judge that the first velocity read after a pause is not an old one; a single old one may be chance."""
     limits = said_of(run).limits
     stale = [
         first
@@ -64,7 +64,7 @@ def velocity_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 @rule("rest-resources/pose-motion", on=(turn,))
 def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
-    """Judge that the pose read first after a pause is the one that the resting robot has in the next GET."""
+    """Judge that the first pose read after a pause equals the next, as the robot rests."""
     limits = said_of(run).limits
     room_m, room_rad = _PLACE_M + FARTHEST * limits.noise.position_m, _HEADING_RAD + FARTHEST * limits.noise.heading_rad
     stale = []

@@ -50,7 +50,7 @@ def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-outcome", on=(goal_reached,))
 def goal_outcome(trace: GoalReached) -> Iterator[Outcome]:
-    """Judge that the 404 after the goal says that the goal was reached."""
+    """Judge that the 404 after the goal reports that it was reached."""
     if trace.read is not None and trace.ended and trace.arrived:
         wrong = outcome_fault(trace.read, SUCCEEDED, "reached")
         yield Case(not wrong, trace.read, "a 404 with last_goal {goal_id, status}, which succeeded (code 4)", wrong)

@@ -1,4 +1,4 @@
-"""Rules on goals with random ids and poses: the robot must accept each id, and show each goal as it was sent."""
+"""Rules on goals with random ids and poses: the robot must accept each id, and return each goal unchanged."""
 
 from collections.abc import Iterator
 
@@ -34,7 +34,7 @@ def goal_get(trace: tuple[Put, ...]) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-get", on=(goal_poses,))
 def goal_get_pose(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
-    """Judge that GET shows each goal as it was sent, in every reading."""
+    """Judge that GET returns each goal unchanged, in every reading."""
     return (Case(not one.differs, one.exchange, "the goal that was put", one.differs) for one in trace)
 
 

@@ -197,7 +197,7 @@ def goal_delete(trace: GoalLife) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-outcome", on=(goal_life,))
 def goal_outcome(trace: GoalLife) -> Iterator[Outcome]:
-    """Judge that the 404 after a DELETE says that the goal was cancelled."""
+    """Judge that the 404 after a DELETE reports that the goal was cancelled."""
     for one in trace.cancelled:
         if one.exchange.response.status in CANCELLED and one.gone:
             wrong = outcome_fault(one.read, CANCELED)

@@ -1,4 +1,4 @@
-"""The lists of sensors and of navigation services; their entries are judged by a checker, whoever reads them."""
+"""Read the lists of sensors and of navigation services; a checker judges the entries of every read."""
 
 import pytest
 

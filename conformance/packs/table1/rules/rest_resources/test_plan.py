@@ -1,4 +1,4 @@
-"""Rules on plans: whether there is one, where the robot's own begin, and what must not change them."""
+"""Rules on plans: whether one exists, where it begins, and which requests must not change it."""
 
 from collections.abc import Iterator
 from http import HTTPStatus
@@ -63,7 +63,7 @@ def plan_numbers(trace: PlansFromStart) -> Iterator[Outcome]:
 
 
 def _other_plan(one: DefaultPlan, plan: Plan) -> str:
-    """Return where a plan differs from the one with the defaults written out; empty if nowhere."""
+    """Return where a plan differs from the plan for explicit defaults; empty if nowhere."""
     last, wanted = plan.poses[-1], one.explicit.poses[-1]
     off_m, apart_m = last.distance(one.goal), plan.poses[0].distance(one.explicit.poses[0])
     if off_m > 0.11:

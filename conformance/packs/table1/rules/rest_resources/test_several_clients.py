@@ -49,7 +49,7 @@ def one_velocity_is_reached(trace: tuple[Drive, ...], run: Run) -> Iterator[Outc
 
 
 def _echoed(put: Command) -> Iterator[Case]:
-    """Yield whether the velocity in the response, if any, is the one that was sent."""
+    """Yield whether the response's velocity, if it has one, is the sent velocity."""
     twist, problem = read_as(put.exchange.response, TWIST)
     if put.accepted and not problem:
         echo, velocity = Velocity.of(twist), velocity_of(put.targets)

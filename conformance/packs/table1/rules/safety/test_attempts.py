@@ -1,4 +1,4 @@
-"""Rules on what must leave the robot at rest: the generic ones on attempts, by the requirements of the contract."""
+"""Rules on requests that must not move a robot at rest: the generic ones, under this contract's requirements."""
 
 from collections.abc import Iterator
 

@@ -47,7 +47,7 @@ def goal_is_shown(trace: GoalBySoap) -> Iterator[Outcome]:
 
 @rule("soap-subscribers/goal-outcome", on=(goal_by_soap,))
 def outcome_is_told(trace: GoalBySoap) -> Iterator[Outcome]:
-    """Judge that a fault of GetGoal after a goal says which goal has ended, and how."""
+    """Judge that GetGoal's fault after a goal names the ended goal, and how it ended."""
     fault = None if trace.after is None else read_exchange(trace.after).fault
     if fault is not None:
         id_ = text_at(fault.element, *_LAST, "goal_id", "id")

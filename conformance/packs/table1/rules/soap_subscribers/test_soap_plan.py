@@ -82,7 +82,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
 
 
 def _told(answer: SoapResponse) -> tuple[tuple[Pose, ...], str]:
-    """Return the path in a response without a fault, and what is wrong with it."""
+    """Return the path in a response without a fault, and the path's fault."""
     value, problem = answered(answer.exchange, GET_PLAN)
     problem = problem or GET_PLAN.problem(value)
     return ((), problem) if problem else (plan_of(value).poses, "")

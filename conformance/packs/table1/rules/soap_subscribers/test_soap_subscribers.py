@@ -1,4 +1,4 @@
-"""The subscribers service: the readable resources of Table 1 over SOAP. A checker judges what each response holds."""
+"""Read Table 1's resources over the subscribers SOAP service. A checker judges each response's content."""
 
 from typing import Final
 

@@ -65,13 +65,13 @@ def not_acceptable_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
 
 @rule("equivalence/delivery-rest", on=(counted_deliveries,))
 def rest_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
-    """Judge that a valid delivery just after invalid ones arrives as it was sent."""
+    """Judge that a valid delivery directly after invalid ones arrives unchanged."""
     yield from _arrived(trace, soap=False)
 
 
 @rule("equivalence/delivery-soap", on=(counted_deliveries,))
 def soap_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
-    """Judge that a valid delivery just after invalid messages arrives as it was sent."""
+    """Judge that a valid delivery directly after invalid messages arrives unchanged."""
     yield from _arrived(trace, soap=True)
 
 

@@ -15,7 +15,7 @@ from conformance.verdict.evidence import Case
 
 @rule("strict-input/velocity-refused", on=(refused_again,))
 def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that the robot stays at rest, without a goal, when what it has refused is sent again."""
+    """Judge that the robot stays at rest, without a goal, when refused requests are sent again."""
     yield from trace.rests
 
 
@@ -72,7 +72,7 @@ def conflict(trace: RefusedAgain) -> Iterator[Outcome]:
 
 @rule("rest-resources/goal-outcome", on=(refused_again,))
 def outcome(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that the 404 after a cancelled goal describes that goal, and not the one that it replaced."""
+    """Judge that the 404 after a cancelled goal describes that goal, not the one before."""
     if trace.cancelled is not None:
         read, id_ = trace.cancelled
         fault = outcome_fault(read, CANCELED, id_) if read.response.status == HTTPStatus.NOT_FOUND else read.came
@@ -81,7 +81,7 @@ def outcome(trace: RefusedAgain) -> Iterator[Outcome]:
 
 @rule("strict-input/delivery-refused", on=(refused_again,))
 def no_delivery(trace: RefusedAgain) -> Iterator[Outcome]:
-    """Judge that no delivery is ordered when what the robot has refused is sent again."""
+    """Judge that refused requests sent again order no delivery."""
     if trace.unseen:
         yield Note(f"deliveries are not seen: {trace.unseen}")
     if trace.ordered:
