@@ -113,6 +113,8 @@ class Feeder(Device):
 
     def _refused(self, octets: bytes) -> None:
         """Let a message that the schema forbids have an effect, if that is the fault."""
+        if "refused creates" in self.faults and b"AddRecipe" in octets:
+            self.recipes[f"r{next(self.numbers)}"] = "broken"
         if b"SetSettings" not in octets:
             return
         try:
@@ -156,8 +158,7 @@ class Feeder(Device):
         values = {**sent, "Quiet": {"1": "true", "0": "false"}.get(sent["Quiet"], sent["Quiet"])}
         if "mode burst refused" in self.faults and values["Mode"] == "burst":
             return None
-        if "label ignored" in self.faults:
-            values["Label"] = "feeder"
+        values["Label"] = self._label(values["Label"])
         if "burst is slow" in self.faults and values["Mode"] == "burst":
             values["Mode"] = "slow"
         if "quiet stays" in self.faults and values["Quiet"] == "false":
@@ -176,6 +177,13 @@ class Feeder(Device):
             self.due.append((time.monotonic() + 0.5, {"Rate": "0"}))
         return ""
 
+    def _label(self, text: str) -> str:
+        if "label ignored" in self.faults:
+            return "feeder"
+        if "empty label stays" in self.faults:
+            text = text or self.settings["Label"]
+        return text[:30] if "label cut" in self.faults else text
+
     def _GetBin(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         number = sent["Bin"]
         if number not in self.bins:
@@ -192,7 +200,8 @@ class Feeder(Device):
         return ""
 
     def _AddRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
-        id_ = f"r{next(self.numbers)}"
+        is_old = "id twice" in self.faults and len(self.recipes) % 3 > 1
+        id_ = list(self.recipes)[-1] if is_old else f"r{next(self.numbers)}"
         if not ("third recipe lost" in self.faults and len(self.recipes) == 2):
             self.recipes[id_] = sent["Title"]
         return f"<c:RecipeId>{id_}</c:RecipeId>"
@@ -206,6 +215,8 @@ class Feeder(Device):
     def _DeleteRecipe(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         if sent["RecipeId"] not in self.recipes:
             return None
+        if "delete takes another" in self.faults and len(self.recipes) > 1:
+            del self.recipes[next(one for one in self.recipes if one != sent["RecipeId"])]
         if "delete takes all" in self.faults:
             self.recipes.clear()
         elif "delete does nothing" not in self.faults and not (

@@ -35,33 +35,11 @@ SOAP_12: Final = b"http://www.w3.org/2003/05/soap-envelope"
 _CHARSET: Final = re.compile(r"""charset\s*=\s*["']?([^\s;"']+)""", re.IGNORECASE)
 _UTF: Final = "UTF-8 or UTF-16"
 _DECLARED: Final = re.compile(rb"""\A(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-PASSIVE: Final = tuple(
-    f"soap-basic-profile/{name}"
-    for name in (
-        "R1000",
-        "R1001",
-        "fault-complete",
-        "R1004",
-        "fault-code",
-        "faultcode-qualified",
-        "R1005",
-        "R1006",
-        "R1008",
-        "R1009",
-        "R1011",
-        "R1012",
-        "R1013",
-        "R1014",
-        "R1018",
-        "R1111",
-        "R1124",
-        "R1126",
-        "R1141",
-        "content-type",
-        "R2712",
-        "fault-no-traceback",
-    )
+_PASSIVE: Final = (
+    "R1000 R1001 fault-complete R1004 fault-code faultcode-qualified R1005 R1006 R1008 R1009 R1011 R1012 R1013 "
+    "R1014 R1018 R1111 R1124 R1126 R1141 content-type R2712 fault-no-traceback"
 )
+PASSIVE: Final = tuple(f"soap-basic-profile/{name}" for name in _PASSIVE.split())
 
 
 class SoapCheckers:

@@ -15,10 +15,12 @@ from math import isclose
 from typing import Final
 from urllib.parse import urlsplit
 
-from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
+from lxml import etree
+
+from conformance.api.soap.roles import MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
 from conformance.documents.wsdl import Wsdl
 from conformance.documents.xml import local
-from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, Simple, is_alike, number_in
+from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Simple, is_alike, number_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
@@ -30,12 +32,21 @@ _LOST: Final = 6
 # Values that are read at once: one of them may be read later, by a read that failed.
 _FEW: Final = 3
 _MOST: Final = 1_000
+# Things of a list that are compared one by one, and reads of a list that show whether it changes by itself.
+_ITEMS: Final = 50
+_STEADY: Final = 3
+# What programs write in place of a text that is not there.
+_NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
+# Values that may say that a thing is removed, though it is still told.
+_STATES: Final = re.compile(r"stat(?:e|us)|delet|remov|activ|enabl|valid|archiv|exist")
 # Nouns of values that are kept as they are given, and are not measured.
 _KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 # What no XML has, between the values of one name.
 _BETWEEN: Final = "\0"
 _WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
+# The texts of a message by their names.
+_Texts = dict[str, list[str]]
 
 
 @dataclass
@@ -61,6 +72,7 @@ class _Thing:
     name: str
     id: str
     at_s: float
+    values: frozenset[tuple[str, str]] = frozenset()
     gone: bool = False
 
 
@@ -121,6 +133,13 @@ class SoapMemory:
         self._written: dict[str, list[_Write]] = defaultdict(list)
         self._things: list[_Thing] = []
         self._past: dict[tuple[str, str, str], _Past] = defaultdict(_Past)
+        # What identified a thing in a response, by name; of each list its ids, how many requests may have changed the
+        # device before it was read, and how often it was the same without any. The last such request: who, values,
+        # and whether it was refused.
+        self._given: set[tuple[str, str]] = set()
+        self._lists: dict[str, tuple[set[str], int, int]] = {}
+        self._done_last: tuple[Act, set[str], bool] | None = None
+        self._changes = 0
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -134,37 +153,54 @@ class SoapMemory:
             if not isinstance(attempt, Exchange) and not (act and act.role is Role.READS):
                 self._forget()
             return
-        answer, sent = payload_of(attempt.response.body), texts_of(payload)
+        response, sent = attempt.response, texts_of(payload)
+        answer = payload_of(response.body, response.header("content-type") or "")
         is_fault = answer is not None and local(str(answer.tag)) == "Fault"
+        told = texts_of(answer) if answer is not None and not is_fault else {}
+        if (act.role is not Role.READS or not sent) and len(self._given) < _MOST:
+            self._given.update((name, text) for name, texts in told.items() if REFERS.search(name) for text in texts)
         if act.role is Role.READS:
-            if answer is not None and attempt.response.ok and not is_fault:
-                told = texts_of(answer)
-                yield from self._values(act, attempt, sent, told)
+            yield from self._gone(act, attempt, sent, told)
+            if response.ok and answer is not None and not is_fault:
                 yield from self._listed(act, attempt, told)
-        elif is_fault:
+                yield from self._named(act, attempt, sent, told)
+                yield from self._values(act, attempt, sent, told)
+                # The items of a list tell what was written to each.
+                items = list(map(texts_of, answer.iterdescendants(etree.Element))) if not sent else []
+                for one in items if len(items) <= _ITEMS else ():
+                    yield from self._values(act, attempt, one, one)
+            return
+        self._changes += 1
+        self._done_last = act, {text for texts in sent.values() for text in texts}, is_fault
+        if is_fault:
             self._refused(act, sent)
-        elif not attempt.response.ok or self._types.invalid(payload):
+        elif not response.ok or self._types.invalid(payload):
             self._forget()
         else:
-            self._done(act, attempt, sent, texts_of(answer) if answer is not None else {})
+            yield from self._done(act, attempt, sent, told)
 
     def _forget(self) -> None:
         self._written.clear()
         self._things.clear()
+        self._done_last = None
 
-    def _refused(self, act: Act, sent: dict[str, list[str]]) -> None:
+    def _refused(self, act: Act, sent: _Texts) -> None:
         for write in self._written[act.label]:
             for name, texts in sent.items():
                 write.refused[name].update(texts)
 
-    def _done(self, act: Act, exchange: Exchange, sent: dict[str, list[str]], told: dict[str, list[str]]) -> None:
-        """Keep what a successful request did."""
+    def _done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+        """Keep what a successful request did; judge whether what it created is a thing of its own."""
         at_s, keys = exchange.response.received_s, self._keys[act.label]
         others: list[_Write] = []
-        if act.role in {Role.WRITES, Role.CREATES}:
+        if act.role is Role.WRITES or act.role in MAKERS:
             named = sent if act.role is Role.WRITES else told
             key = {name: texts[0] for name, texts in named.items() if name in keys and len(texts) == 1}
-            values = {name: _joined(told.get(name, sent[name])) for name in sent.keys() & act.sent.keys() - keys}
+            # A device may leave a value as it is for xsi:nil.
+            names = {name for name in sent.keys() & act.sent.keys() - keys if "nil" not in sent or sent[name] != [""]}
+            if act.role is Role.OTHER:
+                names = {name for name in names if REFERS.search(name)}  # what it does may change all else
+            values = {name: _joined(told.get(name, sent[name])) for name in names}
             others = [one for one in self._written[act.label] if one.key != key][-_MOST:]
             others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
         self._written.clear()
@@ -174,7 +210,8 @@ class SoapMemory:
         if act.role is Role.CREATES:
             new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
             new = [one for one in new if REFERS.search(one[0])] or (new if len(new) == 1 else [])
-            self._things += [_Thing(act, name, text, at_s) for name, text in new[:1]]
+            for name, text in new[:1]:
+                yield from self._made(_Thing(act, name, text, at_s, _texts(sent)), exchange)
             del self._things[:-_MOST]
         elif act.role is Role.REMOVES:
             for thing in self._things:
@@ -183,25 +220,43 @@ class SoapMemory:
         else:
             self._things.clear()
 
-    def _values(
-        self, act: Act, exchange: Exchange, sent: dict[str, list[str]], told: dict[str, list[str]]
-    ) -> Iterator[Case]:
-        """Judge what was written before."""
+    def _made(self, thing: _Thing, exchange: Exchange) -> Iterator[Case]:
+        """Keep a thing; judge whether its id is its own."""
+        own = [one for one in self._things if one.creator is thing.creator and not one.gone]
+        self._things.append(thing)
+        # With no value in common, no key by which a device may take them for one thing; with one id for all, it has
+        # one thing at a time.
+        is_other = bool(own) and bool(thing.values) and own[-1].id == thing.id and not own[-1].values & thing.values
+        if is_other and any(one.id != thing.id for one in own):
+            expected, got = f"{thing.name} of a new thing", f"{thing.name} {thing.id!r}, which the thing before has"
+            cause = f"{thing.creator.label} {thing.name}"
+            yield case("soap/created-is-there", False, exchange, expected, got, cause)  # noqa: FBT003 - see Case
+
+    def _values(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+        """Judge what was written before by a response, or by one item of a list in place of request and response."""
         for writer in self._writers[act.label]:
-            if not sent.keys() <= self._keys[writer.label]:
+            if sent is not told and not sent.keys() <= self._keys[writer.label]:
                 continue
             for write in self._written[writer.label]:
-                if any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items()):
+                is_other = any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items())
+                if is_other or (sent is told and not write.key):
                     continue
                 for name, text in write.values.items():
                     if told.get(name):
                         yield from self._compared(act, writer, write, name, exchange, _joined(told[name]), text)
+                for name in writer.sent.keys() & told.keys() - write.values.keys() - write.key.keys():
+                    # A device that keeps texts of any kind keeps none that its program has written for nothing.
+                    is_none = writer.sent[name].builtin in STRINGS and _NO_TEXTS.intersection(told[name])
+                    if is_none and len(self._past[writer.noun, act.label, name].kept) >= _KEPT:
+                        expected = f"no {name}, since {writer.operation.name} wrote none, or an older one"
+                        got, cause = f"{name} {told[name][0]!r}", f"{writer.label} {name}"
+                        yield case("soap/written-is-read", False, exchange, expected, got, cause)  # noqa: FBT003 - see Case
 
     def _compared(
         self, act: Act, writer: Act, write: _Write, name: str, exchange: Exchange, got: str, text: str
     ) -> Iterator[Case]:
         """Judge one value."""
-        past, simple = self._past[writer.label, act.label, name], writer.sent[name]
+        past, simple = self._past[writer.noun, act.label, name], writer.sent[name]
         age_s = exchange.response.received_s - write.at_s
         expected = f"{name} {text!r}, which {writer.operation.name} wrote"
         if _is_same(simple, text, got):
@@ -221,7 +276,8 @@ class SoapMemory:
         if not is_shown:
             write.late.add(name)
         is_refused = is_shown and any(is_alike(simple, one, got) for one in write.refused.get(name, ()))
-        if age_s < SETTLES_S and not is_shown:
+        is_begun = writer.role is Role.OTHER
+        if age_s < SETTLES_S and not is_shown and not is_begun:
             return
         past.lost = [*past.lost, got][-_LOST:]
         others = [other for other in past.kept if other != text]
@@ -230,19 +286,21 @@ class SoapMemory:
             and len(others) + is_shown >= _KEPT
             and (is_shown or text in past.kept or _is_usual(simple, text, others) or _is_cut(simple, text, got))
         )
+        if is_begun:  # what was begun for one thing is not about another one
+            has_to = not is_shown and got in others
         is_ignored = self._is_ignored(act, writer, past)
         if has_to or is_ignored:
             requirement = "soap/refused-keeps" if is_refused else "soap/written-is-read"
             expected += ": what was written later was refused" if is_refused else ""
             cause = f"{writer.label} {name}"
             found = case(requirement, False, exchange, expected, f"{name} {got!r}", cause)  # noqa: FBT003 - see Case
-            past.pending = [*past.pending, (0.0 if is_ignored else age_s, got, found)][-_MOST:]
+            past.pending = [*past.pending, (0.0 if is_ignored or is_begun else age_s, got, found)][-_MOST:]
             yield from past.lasted(past.longest(got), "")
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past) -> bool:
         """Return whether a device stores the values beside one, and never that value."""
         beside = [
-            self._past[writer.label, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
+            self._past[writer.noun, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
         ]
         return (
             len(past.lost) == _LOST
@@ -253,8 +311,65 @@ class SoapMemory:
             and any(len(other.kept) >= _KEPT and not other.moves for other in beside)
         )
 
-    def _listed(self, act: Act, exchange: Exchange, told: dict[str, list[str]]) -> Iterator[Case]:
+    def _named(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+        """Judge whether a response is about the thing whose id, as the device gave it, was sent."""
+        for name in sent.keys() & told.keys() if len(sent) == 1 else ():
+            stem = REFERS.sub("", name)
+            is_its = bool(stem) and (
+                stem == act.noun or any(name in self._keys[one.label] for one in self._writers[act.label])
+            )
+            if not is_its or len(told[name]) != 1 or (name, sent[name][0]) not in self._given:
+                continue
+            past, expected = self._past[act.label, "", name], f"{name} {sent[name][0]!r}, which was asked for"
+            holds = is_alike(act.sent[name], sent[name][0], told[name][0])
+            past.misses += not holds
+            if holds or past.misses >= _SEEN:
+                cause = f"{act.label} {name}"
+                yield case("soap/written-is-read", holds, exchange, expected, f"{name} {told[name][0]!r}", cause)
+
+    def _gone(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+        """Judge whether a thing that was removed can still be read; a value of its own may say that it is removed."""
+        for thing in self._things:
+            age_s = exchange.response.received_s - thing.at_s
+            is_asked = sent.keys() == act.needs and [thing.id] in sent.values() and act.shows(thing.creator)
+            if not thing.gone or not is_asked or age_s < SETTLES_S or any(map(_STATES.search, told)):
+                continue
+            past, expected = self._past[thing.creator.label, act.label, "gone"], f"a fault for {thing.id!r}"
+            expected += f", which was removed {age_s:.1f} s before"
+            is_there = [thing.id] in told.values()
+            past.misses += is_there
+            if not is_there or past.misses >= _SEEN:
+                cause = f"{thing.creator.label} {act.label}"
+                yield case("soap/deleted-is-gone", not is_there, exchange, expected, "its values", cause)
+
+    def _unchanged(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
+        """Judge whether a list is as it was, but for what the one request did that came since."""
+        names = {thing.name for thing in self._things if act.lists(thing.creator)}
+        ids = {text for name in names for text in told.get(name, ())}
+        before, changes, steady = self._lists.get(act.label, (ids, self._changes, 0))
+        since = self._changes - changes
+        steady += (ids == before or -_MOST) if not since else 0
+        self._lists[act.label] = ids, self._changes, steady
+        if since != 1 or self._done_last is None or steady < _STEADY:
+            return
+        doer, values, is_refused = self._done_last
+        if is_refused and doer.role is Role.CREATES and act.lists(doer):
+            name, odd, what = "refused-keeps", ids - before, "a list as before, since the message was refused"
+        elif not is_refused and doer.role is Role.REMOVES and act.lists(doer):
+            # What a list counts is counted anew.
+            odd = {text for text in before - ids - values if not text.isdigit()}
+            name, what = "created-is-there", f"a list without what {doer.operation.name} removed, and with all else"
+        else:
+            return
+        past = self._past[doer.label, act.label, name]
+        past.misses += bool(odd)
+        if not odd or past.misses >= _SEEN:
+            got, cause = f"a list with or without {', '.join(sorted(odd))}", f"{doer.label} {act.label}"
+            yield case(f"soap/{name}", not odd, exchange, what, got, cause)
+
+    def _listed(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
         """Judge whether a list contains what was created, and nothing that was removed."""
+        yield from self._unchanged(act, exchange, told)
         ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
         for thing in self._things:
             if not act.lists(thing.creator):
@@ -276,6 +391,11 @@ class SoapMemory:
                     observed = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
                     cause = f"{thing.creator.label} {act.label}"
                     yield case(f"soap/{name}", False, exchange, expected, observed, cause)  # noqa: FBT003 - see Case
+
+
+def _texts(sent: _Texts) -> frozenset[tuple[str, str]]:
+    """Return the values of a request that may identify a thing, with their names."""
+    return frozenset((name, text) for name, texts in sent.items() for text in texts if len(text) > _FEW)
 
 
 def _joined(texts: list[str]) -> str:
@@ -300,10 +420,13 @@ def _is_near(simple: Simple, text: str, got: str) -> bool:
 
 
 def _is_cut(simple: Simple, text: str, got: str) -> bool:
-    """Return whether only the lower 32 bits of an integer are left: no limit makes that of it."""
+    """Return whether an integer has lost its sign, or all but its lower 8, 16 or 32 bits: no limit makes that of it."""
     if simple.builtin not in INTEGERS or not (_WHOLE.fullmatch(text) and _WHOLE.fullmatch(got)):
         return False
-    return int(got) not in {0, int(text)} and (int(text) - int(got)) % 2**32 == 0
+    lost = int(text) - int(got)
+    if int(got) in {0, -int(text)}:
+        return int(got) != 0
+    return any(lost and lost % 2**bits == 0 and abs(int(got)) < 2**bits for bits in (8, 16, 32))
 
 
 def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
@@ -317,5 +440,5 @@ def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
         if number is None or not numbers:
             return False
         return min(numbers) <= number <= max(numbers)
-    longest = max(map(len, kept))
+    longest = max(*map(len, kept), simple.max_length or 0)
     return len(text) <= longest or not _WORDS.fullmatch(text)

@@ -298,23 +298,11 @@ def _text_of_value(value: Any, simple: Simple | None) -> str:
 
 
 # 3.3.13 to 3.3.25: the integers, each with its own bounds where it has any.
-INTEGERS: Final = frozenset(
-    {
-        "integer",
-        "long",
-        "int",
-        "short",
-        "byte",
-        "nonNegativeInteger",
-        "positiveInteger",
-        "nonPositiveInteger",
-        "negativeInteger",
-        "unsignedLong",
-        "unsignedInt",
-        "unsignedShort",
-        "unsignedByte",
-    }
+_INTEGERS: Final = (
+    "integer long int short byte nonNegativeInteger positiveInteger nonPositiveInteger negativeInteger "
+    "unsignedLong unsignedInt unsignedShort unsignedByte"
 )
+INTEGERS: Final = frozenset(_INTEGERS.split())
 # 3.2.4 and 3.2.5: those that know INF and NaN.
 FLOATS: Final = frozenset({"double", "float"})
 NUMBERS: Final = INTEGERS | FLOATS | {"decimal"}
@@ -383,12 +371,16 @@ def beyond(simple: Simple, text: str) -> Iterator[str]:
         for bound, sign in ((simple.minimum, -1), (simple.maximum, 1)):
             # An exclusive bound is itself forbidden.
             yield from () if bound is None else (f"{bound:f}", f"{bound + sign * step:f}")
+        number = number_in(text) if simple.builtin == "decimal" else None
+        yield from () if number is None else (f"{number + Decimal('1e-7'):f}",)  # more digits than are allowed
     elif simple.enumeration:
         yield f"{text}~"
     else:
         if simple.max_length is not None and simple.max_length < _LONGEST:
             yield (text or "a").ljust(simple.max_length + 1, text[-1:] or "a")
-        yield from (text[: max((simple.min_length or 1) - 1, 0)], text[:-1], text + text[-1:], text + "~")
+        if simple.patterns or simple.min_length:
+            yield from (text[: max((simple.min_length or 1) - 1, 0)], text + text[-1:])
+        yield from (text[:-1], text + "~")
 
 
 def unreadable(simple: Simple) -> tuple[str, ...]:
@@ -453,10 +445,11 @@ def is_alike(simple: Simple, one: str, two: str) -> bool:
     return one == two
 
 
-# What makes two forms of a value equal (3.2.2, 3.2.15, 3.2.16).
+# What makes two forms of a value equal (3.2.2, 3.2.15, 3.2.16, 3.3.2).
 _READ: Final[Mapping[str, Callable[[str], str]]] = {
     "boolean": lambda text: {"1": "true", "0": "false"}.get(text, text),
     "hexBinary": str.upper,
+    "token": lambda text: " ".join(text.split()),
     "base64Binary": lambda text: "".join(text.split()),
 }
 

@@ -16,15 +16,14 @@ from itertools import islice
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.forms import another, rewritten
+from conformance.api.soap.forms import another, extreme, rewritten, shortest
 from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
 from conformance.api.soap.mutations import branches, invalid_ones, mutations
-from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, acts_of, in_order, texts_of
+from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
-from conformance.documents.openapi import operations_of
 from conformance.documents.xml import NEXT_12, NEXT_ACTOR, XSI, Node, clark, parse
 from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, is_alike, plain
-from conformance.scenarios.described_messages import DescribedMessages, fields_of, target_of
+from conformance.scenarios.described_messages import fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
 from conformance.scenarios.soap_survey import (
     Caller,
@@ -38,7 +37,6 @@ from conformance.scenarios.soap_survey import (
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
-from conformance.transport.reach import is_same
 
 # Interval of reads while a value is awaited, s; time that it has to last: longer than any that is judged.
 _STEP_S: Final = 0.1
@@ -64,6 +62,8 @@ _BLOCKS: Final = (
     ("a header block that another node must understand", "1", "urn:example:other"),
 )
 _GIVES: Final = frozenset({Role.WRITES, Role.CREATES})
+# The values of a message with their types.
+_Leaves = list[tuple[tuple[int, ...], Simple]]
 # An operation with the declaration of its request, and a message that it accepts.
 _Message = tuple[Act, Element | None, Node | None]
 
@@ -84,9 +84,8 @@ class _Changes:
     def _is_quick(self) -> bool:
         return self.caller.api.run.effort.name == "quick"
 
-    def find(self, found: list[Act], allowed: set[str]) -> None:
+    def find(self) -> None:
         """Call each operation that reads, changes, creates or removes once, to know a message that it accepts."""
-        self.caller.acts = {act.label: act for act in found if act.label in allowed}
         for act in in_order(self.caller.acts.values(), self.caller.asks):
             if act.role in {Role.OTHER, Role.ENDS}:
                 continue
@@ -156,11 +155,10 @@ class _Changes:
                 self.caller.send(act, kind, says, octets, charset)
                 self._wait(readers, other, free)
         self._others(act, node, free, readers)
+        self._ends(act, declared, node, free, readers)
         self.caller.ask(act, _as_it_was(node, leaves, began), "the values that were there before")
 
-    def _forms(
-        self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]]
-    ) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
+    def _forms(self, act: Act, node: Node, free: _Leaves) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
         """Yield messages in other forms: what is special, its kind, the plain message, its octets, their encoding."""
         made = _varied(node, free, _BEYOND_ASCII)
         whole = self.caller.messages.whole(act.port, act.operation, made)
@@ -183,7 +181,30 @@ class _Changes:
             octets = self.caller.messages.message(act.port, act.operation, other)
             yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
 
-    def _wait(self, readers: list[_Message], made: Node, free: list[tuple[tuple[int, ...], Simple]]) -> bool:
+    def _ends(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
+        """Write the longest and the shortest values, and none, and read what comes of it."""
+        for says, texts in (("the longest values", extreme), ("empty texts and negative numbers", shortest)):
+            tried = [node]
+            for leaves in (free, *([one] for one in free)):
+                made = node
+                for path, simple in leaves:
+                    is_free = REFERS.search(node.at(path).name) is None
+                    made = with_text(made, path, texts(simple, node.at(path).text, is_free))
+                if made in tried:
+                    continue
+                tried.append(made)
+                if self.caller.ask(act, made, f"a message with {says}").succeeded:
+                    self._wait(readers, made, leaves)
+                    if leaves is free:
+                        break
+        names = {node.at(path).name for path, _ in free}
+        for says, made in _without(declared, node):
+            if not self.caller.messages.found.types.invalid(parse(made.written())):
+                self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
+                left = [one for one in simple_leaves(declared, made) if one[0] and made.at(one[0]).text]
+                self._wait(readers, made, [one for one in left if made.at(one[0]).name in names])
+
+    def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> bool:
         """Read until what was written is read, or a device should have taken it; return whether anything was."""
         until = time.monotonic() + SETTLES_S
         while True:
@@ -216,9 +237,7 @@ class _Changes:
             says = "a header block that must be understood"
             self.caller.ask(act, node, says, Kind.UNDERSTAND, mandatory(act.port))
 
-    def _others(
-        self, act: Act, node: Node, free: list[tuple[tuple[int, ...], Simple]], readers: list[_Message]
-    ) -> None:
+    def _others(self, act: Act, node: Node, free: _Leaves, readers: list[_Message]) -> None:
         """Write to other things of the device, and read each of them afterwards."""
         keys = [
             path
@@ -263,10 +282,12 @@ class _Changes:
             return
         forms = _forms_of(declared, node)[::-1]
         node, free = forms[0]
+        short = self.caller.messages.usual(act.operation)[1]
         readers = [one for one in self.acts if one[0].shows(act)]
         made, asks = list[str](), list[Node]()
+        forms = [*forms[:2], *_forms_of(declared, short or node)[:1]]
         for turn in range(_THINGS):
-            probe = self.caller.ask(act, _varied(*forms[turn % 2], turn), "a message that creates")
+            probe = self.caller.ask(act, _varied(*forms[turn], turn), "a message that creates")
             if not probe.succeeded:
                 probe = self.caller.ask(act, node, "a message that creates")
             told = {name: texts[0] for name, texts in _told(probe).items() if len(texts) == 1}
@@ -281,13 +302,16 @@ class _Changes:
         self._read(lists, node)
         for asked in asks * 3:
             self._read(readers, asked)
-        self._refuse(act, declared, _varied(node, free, _THINGS), 0)
-        self._read(lists, node, times=2)
-        for id_ in reversed(made):
+        for kind in (0, _REFUSALS - 1):
+            self._refuse(act, declared, _varied(node, free, _THINGS), kind)
+            self._read(lists, node, times=2)
+        for id_ in made:
             self.remove(remove[0], remove[2], id_)
             self._read(lists, node, times=2)
         time.sleep(SETTLES_S)
         self._read(lists, node, times=2)
+        for asked in asks:
+            self._read(readers, asked)
 
     def remove(self, act: Act, node: Node, id_: str) -> None:
         """Remove a thing by its id."""
@@ -323,7 +347,10 @@ class _Changes:
                 continue
             # A bound of what names a thing names none that is there.
             free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
-            for says, made in _alternatives(declared, node, free) if declared and node else ():
+            made_of = [*_alternatives(declared, node, free)] if declared and node else []
+            # What is left out of a message that writes is read too (_ends).
+            made_of += [*_without(declared, node)] if declared and node and act.role is not Role.WRITES else []
+            for says, made in made_of:
                 if self.caller.messages.found.types.invalid(parse(made.written())):
                     continue
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
@@ -338,7 +365,8 @@ class _Changes:
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, node, block))
             next_ = mandatory(act.port, "1", NEXT_12 if act.port.is_12 else NEXT_ACTOR)
             self.caller.ask(act, node, "a header block that the next node must understand", Kind.UNDERSTAND, next_)
-            other = next((one for one, _, _ in self.acts if one.role is Role.READS and one is not act), None)
+            others = [one for one, _, _ in self.acts if one.role is Role.READS and one is not act]
+            other = min(others, key=lambda one: len(one.needs), default=None)
             if other is not None:
                 # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
                 self.caller.ask(act, node, f"a message with the SOAPAction of {other.operation.name}", action=other)
@@ -361,13 +389,8 @@ class _Changes:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
 def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
     """Change what may be changed over SOAP, read it back, be refused in between, and put it back."""
-    messages = DescribedMessages.of(api)
-    if messages is None:
-        raise NotPossibleError("the device has no WSDL")
-    decided = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
-    acts = [one for one in acts_of(messages.found) if is_same(one.port.url, messages.found.base)]
-    changes = _Changes(Caller(api, messages))
-    changes.find(acts, {label for label, reason in decided.items() if reason.may})
+    changes = _Changes(Caller.of(api))
+    changes.find()
     if not changes.acts:
         raise NoOccasionError("no operation that reads, writes, creates or removes by its name accepted a message")
     changes.vary()
@@ -399,7 +422,7 @@ def _asked(node: Node | None, written: Node) -> Node | None:
     return node
 
 
-def _forms_of(declared: Element, node: Node) -> list[tuple[Node, list[tuple[tuple[int, ...], Simple]]]]:
+def _forms_of(declared: Element, node: Node) -> list[tuple[Node, _Leaves]]:
     """Return a message, and the same one in which nothing is there twice, each with its values."""
     return [(one, [leaf for leaf in simple_leaves(declared, one) if leaf[0]]) for one in (node, _once(node))]
 
@@ -410,7 +433,7 @@ def _once(node: Node) -> Node:
     return replace(node, children=tuple(children.values())[::-1])
 
 
-def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -> Node:
+def _varied(node: Node, free: _Leaves, turn: int) -> Node:
     """Return a message with other values, by turn."""
     there = Counter[str]()
     for path, simple in free:
@@ -422,7 +445,7 @@ def _varied(node: Node, free: list[tuple[tuple[int, ...], Simple]], turn: int) -
     return node
 
 
-def _as_it_was(node: Node, leaves: list[tuple[tuple[int, ...], Simple]], began: dict[str, list[str]]) -> Node:
+def _as_it_was(node: Node, leaves: _Leaves, began: dict[str, list[str]]) -> Node:
     there = {name: iter(texts) for name, texts in began.items()}
     for path, _ in leaves:
         node = with_text(node, path, next(there.get(node.at(path).name.lower(), iter(())), node.at(path).text))
@@ -454,6 +477,17 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
             yield f"{other!r} as {name}", with_text(node, path, other)
     for path, says, branch in branches(declared, node):
         yield says, node.replaced(path, ordinary(branch))
+    if (turned := _turned(node)) != node:
+        yield "attributes in another order", turned
+
+
+def _turned(node: Node) -> Node:
+    """Return a message whose attributes are in another order."""
+    return replace(node, children=tuple(map(_turned, node.children)), attributes=node.attributes[::-1])
+
+
+def _without(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield messages that lack a value, or have none by xsi:nil, each with what is special about it."""
     for path, part in declarations(declared, node):
         for text in ("true", "1") if part.nillable else ():
             nil = Node(part.tag, "", (), ((clark(XSI, "nil"), text),))

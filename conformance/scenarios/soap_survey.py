@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
 # Faults of invalid messages that are tried: services differ on others, such as the order.
-_FORBIDDEN: Final = ("missing", "unknown", "lexical", "range")
+_FORBIDDEN: Final = ("missing", "unknown", "lexical", "range", "namespace")
 # Messages of one operation at standard: invalid ones of each kind; usual ones.
 _MOST: Final = 4
 _USUAL: Final = 6
@@ -160,6 +160,26 @@ class Caller:
     current: dict[str, str] = field(default_factory=dict)
     accepted: dict[str, Node | None] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, api: RestInterface) -> Caller:
+        """Return one for the operations that may be called.
+
+        Raises:
+            NotPossibleError: the device has no WSDL.
+        """
+        messages = DescribedMessages.of(api)
+        if messages is None:
+            raise NotPossibleError("the device has no WSDL")
+        found, left_out = messages.found, dict[str, str]()
+        described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
+        for port, operation in each(found.ports):
+            label = label_of(port, operation)
+            why = found.remark(operation) or ("" if described[label].may else str(described[label]))
+            why = why or ("" if is_same(port.url, found.base) else f"its port is at another server, {port.url}")
+            left_out |= {label: why} if why else {}
+        acts = {act.label: act for act in acts_of(found) if act.label not in left_out}
+        return cls(api, messages, acts, left_out=list(left_out.items()))
+
     def asks(self, operation: SoapOperation) -> int:
         """Return how many values the message of an operation has that only the device can know."""
         try:
@@ -262,19 +282,7 @@ def wsdl_faults(run: Run) -> tuple[str, ...]:
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
 def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     """Call each operation that may be called, with valid messages and with wrong ones."""
-    messages = DescribedMessages.of(api)
-    if messages is None:
-        raise NotPossibleError("the device has no WSDL")
-    found = messages.found
-    described = {item.label: api.call_rules.decide(item) for item in operations_of(api.run.contract)}
-    caller = Caller(api, messages, {act.label: act for act in acts_of(found)})
-    for port, operation in each(found.ports):
-        rule = described[label_of(port, operation)]
-        why = found.remark(operation) or ("" if rule.may else str(rule))
-        why = why or ("" if is_same(port.url, found.base) else f"its port is at another server, {port.url}")
-        if why:
-            caller.left_out.append((label_of(port, operation), why))
-            caller.acts.pop(label_of(port, operation), None)
+    caller = Caller.of(api)
     # What one operation answers, another asks for: those that ask for nothing that must be known come first.
     order = in_order(caller.acts.values(), caller.asks)
     api.run.limit.in_turns({act.label: _explore(caller, act) for act in order}, _SURVEY_SHARE)
@@ -294,9 +302,12 @@ def _explore(caller: Caller, act: Act) -> Iterator[None]:
 
 def _groups(caller: Caller, act: Act) -> Iterator[None]:
     declared, node, kind = usual_message(caller, act)
-    if act.role in {Role.OTHER, Role.ENDS, Role.WRITES}:
+    if act.role is not Role.READS and act.role is not Role.REMOVES:
         node = full_message(caller, act, declared, node) or node
+    works = caller.probes[-1].succeeded
     _read_what_it_did(caller, act, node)
+    if works:
+        _about_others(caller, act, node)
     yield
     effort = caller.api.run.effort
     # What was created may be there only once, and what was removed is not there any more.
@@ -321,11 +332,7 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
             caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)
     _ask_for_nothing(caller, act, declared, node)
     yield
-    odd, number = list(_odd(caller, act, node)), list(caller.acts).index(act.label)
-    if effort.name == "quick" and number >= _WHOLLY:
-        # A server reads XML before it knows the operation: each operation gets another one of these messages.
-        odd = [one for turn, one in enumerate(odd) if one[0] is Kind.UNDERSTAND or turn % _WRONG == number % _WRONG]
-    for kind, says, octets in odd:
+    for kind, says, octets in _some_odd(caller, act, node):
         if time.monotonic() < until and act.label not in caller.lost:
             caller.send(act, kind, says, octets)
             if not is_once:
@@ -416,6 +423,16 @@ def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
                 caller.ask(reader, asked, f"what {act.operation.name} concerns")
 
 
+def _about_others(caller: Caller, act: Act, node: Node | None) -> None:
+    """Begin something for another thing, twice; end what has just begun; and read it."""
+    for turn in (1, 1) if act.role is Role.OTHER and act.makes else (0,) if act.role is Role.ENDS else ():
+        if turn or caller.renew(act):
+            other = caller.messages.usual(act.operation, turn, caller.known(act))[1]
+            if other != node:
+                caller.ask(act, other, "a message about another thing")
+                _read_what_it_did(caller, act, other)
+
+
 def _ask_for_nothing(caller: Caller, act: Act, declared: Element | None, node: Node | None) -> None:
     """Name a thing that is not there, so that a declared fault is seen."""
     if not act.operation.faults or act.role not in {Role.READS, *LAST} or declared is None or node is None:
@@ -430,6 +447,17 @@ def mandatory(port: SoapPort, text: str = "1", actor: str = "") -> Node:
     name = clark(port.envelope, "role" if port.is_12 else "actor")
     named = ((name, actor),) if actor else ()
     return Node(clark(STRANGE, "Strange"), "1", (), ((clark(port.envelope, "mustUnderstand"), text), *named))
+
+
+def _some_odd(caller: Caller, act: Act, node: Node | None) -> list[tuple[Kind, str, bytes]]:
+    """Return the wrong messages of `_odd` for an operation: a server reads XML before it knows the operation.
+
+    So at quick each operation gets another one of them, and that with the header block.
+    """
+    odd, number = list(_odd(caller, act, node)), list(caller.acts).index(act.label)
+    if caller.api.run.effort.name != "quick" or number < _WHOLLY:
+        return odd
+    return [one for turn, one in enumerate(odd) if one[0] is Kind.UNDERSTAND or turn % _WRONG == number % _WRONG]
 
 
 def _odd(caller: Caller, act: Act, node: Node | None) -> Iterator[tuple[Kind, str, bytes]]:

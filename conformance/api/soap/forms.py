@@ -35,7 +35,7 @@ EXTREMES: Final[dict[str, tuple[float, ...]]] = {
     "float": (0.0, -0.0, 1.401298464324817e-45, 1.1754943508222875e-38, 3.4028234663852886e38, 0.5),
 }
 # Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
-_TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas six", "\U0001f916 ok")
+_TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas  six", "\U0001f916 ok")
 # Values of other types, by turn.
 _TYPED: Final = {
     "boolean": ("true", "false"),
@@ -43,13 +43,17 @@ _TYPED: Final = {
     "date": ("2031-05-06", "2032-10-11", "2031-12-31"),
     "time": ("07:08:09Z", "12:13:14Z", "09:10:11Z"),
     "duration": ("PT5S", "PT7M", "P1D"),
-    "base64Binary": ("AAEC", "+/8A", "/wD+", "//79/Pv6"),
-    "hexBinary": ("0A1B", "00FF", "FF00AC"),
+    "base64Binary": ("//79/Pv6", "+/+/", "AAEC", "/wD+"),
+    "hexBinary": ("0A1B", "FFAC", "FF00AC"),
 }
 # Integers by turn, far from each other first, so that later ones lie between; those of wide types beyond what a double
 # or 32 bits hold.
 _SMALL: Final = (1, 9, 4, 7, 2, 6, 3, 8, 5)
 _LARGE: Final = (1, 2**55, 4, 2**53 + 1, 2**32 + 7, 6, 3, 8, 5)
+# Integers whose lower 32, 16 and 8 bits are other integers, and the longest text that is sent, characters.
+_BEYOND_BITS: Final = (2**32 + 7, 2**16 + 300, 300)
+_LONGEST: Final = 1_000
+_NEGATIVE: Final = -7
 _WIDE: Final = frozenset({"long", "unsignedLong"})
 # Characters of random texts: those that XML has to escape, and some of two and three octets.
 _CHARACTERS: Final = string.ascii_letters + string.digits + " _-./<>&'\"\u00e4\u20ac\u65e5"
@@ -148,6 +152,30 @@ def another(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa
         share = (0.25, 0.75, 0.5, 0.6, 0.4, 0.7)[turn % 6]
         return f"{low + share * (high - low):.10g}"
     return text
+
+
+def extreme(simple: Simple, text: str, is_free: bool) -> str:  # noqa: FBT001 - as another()
+    """Return the longest text that a type allows, or an integer beyond 8, 16 or 32 bits; else the same value."""
+    if _is_limited(simple) or not is_free:
+        return text
+    if simple.builtin in INTEGERS:
+        low, high = bounds(simple)
+        return next((str(one) for one in _BEYOND_BITS if low <= one <= high), text)
+    longest = simple.max_length if simple.builtin in STRINGS else None
+    return text if longest is None or longest > _LONGEST else (string.ascii_lowercase * longest)[:longest]
+
+
+def shortest(simple: Simple, text: str, is_free: bool) -> str:  # noqa: FBT001 - as another()
+    """Return an empty text or a negative number if a type allows it; else the same value."""
+    if _is_limited(simple) or not is_free:
+        return text
+    if simple.builtin in INTEGERS:
+        return str(_NEGATIVE) if bounds(simple)[0] <= _NEGATIVE else text
+    return "" if simple.builtin in STRINGS and not simple.min_length else text
+
+
+def _is_limited(simple: Simple) -> bool:
+    return bool(simple.enumeration or simple.patterns or simple.many or simple.others)
 
 
 def _known(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - as another()

@@ -43,12 +43,12 @@ def _ordinary(group: Group | None, form: int, *, optional: bool) -> tuple[Node, 
     if group.model == "choice":
         return _some(group.items[form % len(group.items)], form, optional=optional) if group.items else ()
     alone = len(group.items) == 1
-    return tuple(node for item in group.items for node in _some(item, form, optional=optional or alone))
+    return tuple(node for item in group.items for node in _some(item, form, optional=optional, alone=alone))
 
 
-def _some(item: Element | Group, form: int, *, optional: bool) -> tuple[Node, ...]:
+def _some(item: Element | Group, form: int, *, optional: bool, alone: bool = False) -> tuple[Node, ...]:
     most = 1 + form % 2
-    count = max(item.minimum, min(most, most if item.maximum is None else item.maximum) if optional else 0)
+    count = max(item.minimum, min(most, most if item.maximum is None else item.maximum) if optional or alone else 0)
     if isinstance(item, Element):
         return (ordinary(item, optional=optional, form=form),) * min(count, _MOST)
     return _ordinary(item, form, optional=optional) * min(count, _MOST)

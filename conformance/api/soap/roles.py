@@ -11,6 +11,7 @@ from typing import Final
 
 from lxml import etree
 
+from conformance.documents.multipart import in_utf_8
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, local, parse
@@ -49,6 +50,8 @@ _VERBS: Final = {
 }
 #: Roles of operations after which a thing has ended.
 LAST: Final = frozenset({Role.ENDS, Role.REMOVES})
+#: Roles of operations that may begin a thing, which the response names.
+MAKERS: Final = frozenset({Role.CREATES, Role.OTHER})
 _ROLES: Final = {verb: role for role, verbs in _VERBS.items() for verb in verbs.split()}
 
 
@@ -82,7 +85,7 @@ class Act:
     @property
     def names(self) -> dict[str, Simple]:
         """The values by which a thing that it writes or creates may be identified."""
-        return self.makes if self.role is Role.CREATES else self.sent
+        return self.makes if self.role in MAKERS else self.sent
 
     def keys(self, name: str, simple: Simple) -> list[str | Simple]:
         """Return the keys by which other messages may know a value: its name, a bare id with the noun, and its type."""
@@ -96,7 +99,7 @@ class Act:
 
     def shows(self, writer: Act) -> bool:
         """Return whether this operation reads values that another one writes, or creates a thing with."""
-        is_its = writer.role is Role.CREATES and self.noun == writer.noun and bool(self.needs)
+        is_its = writer.role in MAKERS and self.noun == writer.noun and bool(self.needs)
         return (
             self.role is Role.READS
             and (writer.role is Role.WRITES or is_its)
@@ -172,12 +175,12 @@ def _values(declared: Element, depth: int = 0, *, needed: bool = True) -> Iterat
         yield from _values(child, depth + 1, needed=needed and bool(child.minimum))
 
 
-def payload_of(octets: bytes) -> etree._Element | None:
+def payload_of(octets: bytes, content_type: str = "") -> etree._Element | None:
     """Return the first element in a message's Body; None if it is no message, or too long."""
     if not 0 < len(octets) <= _LONGEST:
         return None
     try:
-        root = parse(octets, comments=False)
+        root = parse(in_utf_8(content_type, octets), comments=False)
     except NotXmlError:
         return None
     body = next((one for one in elements(root) if local(str(one.tag)) == "Body"), None)

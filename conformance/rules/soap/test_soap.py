@@ -253,49 +253,37 @@ def _came(probe: SoapProbe) -> str:
     return f"a fault: {' '.join(' '.join(map(str, found.itertext())).split())[:200]}"
 
 
-def _refused(trace: Trace, expected: str, *kinds: Kind, code: str = "") -> Iterator[Outcome]:
-    """Judge whether messages are refused, and with a fault of SOAP that has the code for that, if there is one."""
-    usable = {one.operation for one in trace if one.kind is Kind.AGAIN and one.succeeded}
+def _refused(expected: str, *kinds: Kind, code: str = "") -> Callable[[Trace], Iterator[Outcome]]:
+    """Return a function that judges whether messages are refused.
 
-    def wrong(probe: SoapProbe) -> str | None:
-        if probe.exchange is None or probe.succeeded:
-            return None if probe.exchange is None else "success"
-        own = _code_of(probe.fault) if probe.fault is not None else (probe.envelope, code)
-        return (
-            "" if not code or probe.operation not in usable or own == (probe.envelope, code) else f"the code {own[1]}"
-        )
+    A fault of the port's SOAP version must have the ``code`` for that, if there is one.
+    """
 
-    return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
+    def judged(trace: Trace) -> Iterator[Outcome]:
+        usable = {one.operation for one in trace if one.kind is Kind.AGAIN and one.succeeded}
 
+        def wrong(probe: SoapProbe) -> str | None:
+            if probe.exchange is None or probe.succeeded:
+                return None if probe.exchange is None else "success"
+            own = _code_of(probe.fault) if probe.fault is not None else (probe.envelope, code)
+            is_right = not code or probe.operation not in usable or own == (probe.envelope, code)
+            return "" if is_right else f"the code {own[1]}"
 
-@rule("soap/malformed-refused", on=_ON)
-def malformed_refused(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether what is no message is refused."""
-    return _refused(trace, "a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)
+        return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
 
-
-@rule("soap/invalid-refused", on=_ON)
-def invalid_refused(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a message that the schema forbids is refused."""
-    return _refused(trace, "a fault", Kind.INVALID)
+    return judged
 
 
-@rule("soap/version-mismatch", on=_ON)
-def version_mismatch(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a message of an unknown SOAP version is refused."""
-    return _refused(trace, "a VersionMismatch fault", Kind.VERSION, code="VersionMismatch")
-
-
-@rule("soap/must-understand", on=_ON)
-def must_understand(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a message with a header block that must be understood, and is unknown, is refused."""
-    return _refused(trace, "a MustUnderstand fault", Kind.UNDERSTAND, code="MustUnderstand")
-
-
-@rule("soap/doctype-refused", on=_ON)
-def doctype_refused(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a message with a DOCTYPE is refused."""
-    return _refused(trace, "a fault", Kind.DOCTYPE)
+malformed_refused, invalid_refused, version_mismatch, must_understand, doctype_refused = (
+    rule(f"soap/{name}", on=_ON)(judge)
+    for name, judge in (
+        ("malformed-refused", _refused("a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)),
+        ("invalid-refused", _refused("a fault", Kind.INVALID)),
+        ("version-mismatch", _refused("a VersionMismatch fault", Kind.VERSION, code="VersionMismatch")),
+        ("must-understand", _refused("a MustUnderstand fault", Kind.UNDERSTAND, code="MustUnderstand")),
+        ("doctype-refused", _refused("a fault", Kind.DOCTYPE)),
+    )
+)
 
 
 @rule("soap/no-bare-error", on=_ON)

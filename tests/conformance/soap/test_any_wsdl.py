@@ -95,12 +95,8 @@ def test_a_right_service_breaks_nothing(name, tmp_path, secret):
 
 def _replacing(old, new, *, faults=False):
     """Return a mutant that changes the body of successes, or of faults."""
-
-    def alter(_, status, media_type, body):
-        concerned = (status != 200) is faults
-        return status, media_type, re.sub(old, new, body, count=1) if concerned else body
-
-    return alter
+    on = _on_faults if faults else _on_success
+    return on(lambda status, media_type, body: (status, media_type, re.sub(old, new, body, count=1)))
 
 
 def _on_faults(change):
@@ -174,6 +170,9 @@ def _mutants(device):
     yield "fault-without-code", _replacing(rb"<faultcode>.*</faultcode>|<s:Code>.*</s:Code>", b"", faults=True)
     yield "fault-without-text", _replacing(rb"<faultstring>.*</faultstring>|<s:Reason>.*</s:Reason>", b"", faults=True)
     yield "fault-of-unknown-prefix", _replacing(rb">s:(Client|Sender)<", rb">q:\1<", faults=True)
+    other = b"s:Sender" if device.soap == SOAP_11 else b"s:Client"
+    yield "code-of-the-other-version", _replacing(rb"s:(?:Client|Sender)", other, faults=True)
+    yield "doctype-in-success", _on_success(lambda status, media, body: (status, media, b"<!DOCTYPE x>" + body))
     yield (
         "fault-with-namespace",
         _replacing(rb"faultcode>(.*)faultcode>|s:Value", rb"s:faultcode>\1s:faultcode>", faults=True),
