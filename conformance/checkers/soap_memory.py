@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
-from conformance.api.soap.roles import MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
+from conformance.api.soap.roles import KEEPS, MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
 from conformance.documents.wsdl import Wsdl
 from conformance.documents.xml import local
 from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Simple, is_alike, number_in
@@ -39,8 +39,6 @@ _STEADY: Final = 3
 _NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
 # Values that may say that a thing is removed, though it is still told.
 _STATES: Final = re.compile(r"stat(?:e|us)|delet|remov|activ|enabl|valid|archiv|exist")
-# Nouns of values that are kept as they are given, and are not measured.
-_KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 # What no XML has, between the values of one name.
 _BETWEEN: Final = "\0"
 _WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
@@ -307,7 +305,7 @@ class SoapMemory:
             and not any(_BETWEEN in one for one in past.lost)
             and len({*past.lost, *past.kept}) == 1
             and act.noun == writer.noun
-            and bool(_KEEPS.search(act.noun))
+            and bool(KEEPS.search(act.noun))
             and any(len(other.kept) >= _KEPT and not other.moves for other in beside)
         )
 

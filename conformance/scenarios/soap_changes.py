@@ -19,7 +19,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.forms import another, extreme, rewritten, shortest
 from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
 from conformance.api.soap.mutations import branches, invalid_ones, mutations
-from conformance.api.soap.roles import REFERS, SETTLES_S, Act, Role, in_order, texts_of
+from conformance.api.soap.roles import KEEPS, REFERS, SETTLES_S, Act, Role, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
 from conformance.documents.xml import NEXT_12, NEXT_ACTOR, XSI, Node, clark, parse
 from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, is_alike, plain
@@ -188,7 +188,9 @@ class _Changes:
             for leaves in (free, *([one] for one in free)):
                 made = node
                 for path, simple in leaves:
+                    # A large or negative number may be a speed, unless it is a setting.
                     is_free = REFERS.search(node.at(path).name) is None
+                    is_free = is_free and (simple.builtin in STRINGS or KEEPS.search(act.noun) is not None)
                     made = with_text(made, path, texts(simple, node.at(path).text, is_free))
                 if made in tried:
                     continue

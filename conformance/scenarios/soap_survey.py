@@ -426,8 +426,9 @@ def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
 def _about_others(caller: Caller, act: Act, node: Node | None) -> None:
     """Begin something for another thing, twice; end what has just begun; and read it."""
     for turn in (1, 1) if act.role is Role.OTHER and act.makes else (0,) if act.role is Role.ENDS else ():
-        if turn or caller.renew(act):
-            other = caller.messages.usual(act.operation, turn, caller.known(act))[1]
+        with contextlib.suppress(NotPossibleError):
+            is_new = turn or caller.renew(act)
+            other = caller.messages.usual(act.operation, turn, caller.known(act))[1] if is_new else node
             if other != node:
                 caller.ask(act, other, "a message about another thing")
                 _read_what_it_did(caller, act, other)

@@ -20,6 +20,8 @@ from conformance.documents.xsd_shapes import STRINGS, Element, Simple
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 #: Names of values by which a device identifies one of its things.
 REFERS: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name|channel)$", re.IGNORECASE)
+#: Nouns of values that are kept as they are given, and are not measured.
+KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 #: Types whose values may refer to something.
 TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
 #: A device may apply a change or a removal this much later, s.
