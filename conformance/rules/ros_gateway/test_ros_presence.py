@@ -18,6 +18,7 @@ from conformance.scenarios.ros.presence import (
     publishers_of_each_quality,
     topics_at_first,
 )
+from conformance.scenarios.ros.topics import Burst, topic_bursts
 from conformance.scenarios.ros.web import succeeded
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.verdict.evidence import Case
@@ -110,3 +111,13 @@ def subscriptions(trace: tuple[Growth, ...]) -> Iterator[Outcome]:
         more = one.after - one.before
         expected = f"at most {_FEW} more subscriptions after {one.reads} reads"
         yield Case(more <= _FEW, one.exchange, expected, observed=f"{more} more", cause="more")
+
+
+@rule("ros-gateway/subscriptions", on=(topic_bursts,))
+def publishers(trace: tuple[Burst, ...]) -> Iterator[Outcome]:
+    """Judge whether requests to publish leave no publishers behind."""
+    for operation in dict.fromkeys(burst.operation for burst in trace):
+        bursts = [one for one in trace if one.operation == operation and one.sent]
+        count, worst = sum(len(one.sent) for one in bursts), max(bursts, key=lambda one: one.more)
+        expected = f"at most {_FEW} more publishers on {worst.sent[0].topic} after {count} requests"
+        yield Case(worst.more <= _FEW, worst.sent[-1].exchange, expected, f"{worst.more} more", "publishers")

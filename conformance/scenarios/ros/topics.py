@@ -205,6 +205,7 @@ class Burst:
         sent: in the order of sending.
         heard: in the order of arrival.
         reliable: whether the gateway publishes reliably, and so few that no message is lost on the way.
+        more: publishers on the topic beyond those before the first burst.
     """
 
     operation: str
@@ -212,6 +213,7 @@ class Burst:
     sent: tuple[Sent, ...]
     heard: tuple[Heard, ...]
     reliable: bool = True
+    more: int = 0
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -348,12 +350,22 @@ class _Writer:
 
     def in_bursts(self, times: int, *, many: bool) -> Iterator[Burst]:
         """Yield messages in a row of one client, at once of several, and of many, each of which sends several."""
+        before = self.publishers()
         for _ in range(times):
             yield self.burst(1, _BURST, f"{_BURST} messages in a row")
-            yield self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
+            crowded = self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
+            # A publisher that leaves late leaves all the same.
+            until = WALL_CLOCK.now() + self.body.within_s
+            while (more := self.publishers() - before) > 1 and WALL_CLOCK.now() < until:
+                WALL_CLOCK.sleep(PACE_S)
+            yield replace(crowded, more=more)
         if many:
             # A publisher with ROS's usual depth of 10 may lose some of so many.
             yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
+
+    def publishers(self) -> int:
+        """Return how many publishers the topic has."""
+        return int(self.gateway.robot.tell("graph")["topics"].get(self.body.publishes, {}).get("publishers", 0))
 
     def burst(self, clients: int, each: int, how: str) -> Burst:
         """Return the outcome of messages of clients that send at the same moment, each one after another."""

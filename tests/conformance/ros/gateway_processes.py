@@ -46,13 +46,7 @@ def gateway(style: str, domain_id: int, folder: Path, faults: Iterable[str] = ()
     subprocess.run([sys.executable, _GATEWAYS / "surface.py", style, str(domain_id), folder], check=True)
     port, bridge = free_port(), free_port()
     script = "rosbridge.py" if style == "node" else f"on_{style}.py"
-    python = [
-        sys.executable,
-        _GATEWAYS / script,
-        str(bridge if style == "node" else port),
-        str(domain_id),
-        ",".join(faults),
-    ]
+    python = [sys.executable, _GATEWAYS / script, bridge if style == "node" else port, domain_id, ",".join(faults)]
     node = ["node", "--experimental-websocket", _GATEWAYS / "over_rosbridge.js", port, bridge]
     commands = [python] + ([[*node, folder / "surface.json"]] if style == "node" else [])
     url = f"http://127.0.0.1:{port}"

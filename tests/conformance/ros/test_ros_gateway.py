@@ -22,6 +22,7 @@ FAULTS = {
         "refused goal as accepted": "goal-rejected",
         "list keeps what is gone": "lists",
         "stream reorders": "stream-order",
+        "stream repeats": "stream-once",
     },
     ("flask", "quick"): {
         "NaN as 0": "read-exact write-exact",
@@ -31,6 +32,7 @@ FAULTS = {
         "first feedback for ever": "goal-feedback",
         "cancel lost": "goal-cancel",
         "reliable only": "qualities",
+        "publishers left": "subscriptions",
     },
     ("aiohttp", "quick"): {
         "ascii": "read-exact write-exact",

@@ -80,6 +80,8 @@ OPEN = RosMap({})
         ("float64_value", 5e-324, "0", OPEN, False),
         ("float64_value", 1e300, "1e400", OPEN, False),
         ("float64_value", math.nan, "null", OPEN, True),
+        ("float64_value", math.nan, '"nan"', OPEN, True),
+        ("float64_value", math.nan, "0", OPEN, False),
         ("float64_value", math.nan, "null", RosMap({}, non_finite="string"), False),
         ("float64_value", math.nan, "0", RosMap({}, non_finite="null"), False),
         ("float64_value", -math.inf, '"-Infinity"', RosMap({}, non_finite="string"), True),

@@ -22,6 +22,7 @@ _STATES = {
 _BODY_BYTES = 2_000_000
 ros, port = begun("fastapi")
 app = FastAPI(openapi_url=None)
+_sent: list[str] = []
 _reads, _publishes, _services = ({end.name: end for end in ends} for ends in (READS, PUBLISHES, SERVICES))
 
 
@@ -90,15 +91,19 @@ async def last(name: str) -> Any:
 
 
 @app.get("/api/v1/topics/{name}/events")
-async def events(name: str) -> StreamingResponse:
+async def events(name: str, request: Request) -> StreamingResponse:
     """Stream the messages of a topic as server-sent events."""
     queue: asyncio.Queue[str] = asyncio.Queue()
+    repeats = "stream repeats" in ros.faults and "Last-Event-ID" in request.headers
     end = ros.stream(_found(_reads, name), partial(asyncio.get_running_loop().call_soon_threadsafe, queue.put_nowait))
 
     async def written() -> AsyncIterator[str]:
         try:
+            for text in _sent[-4:] if repeats else ():
+                yield f"data: {text}\n\n"
             while True:
-                yield f"data: {await queue.get()}\n\n"
+                _sent.append(await queue.get())
+                yield f"id: {len(_sent)}\ndata: {_sent[-1]}\n\n"
         finally:
             end()
 

@@ -136,7 +136,7 @@ class RosEnd:
             held.append(json.dumps(self.forms.write(message), ensure_ascii=False))
             if "stream drops" in self.faults and len(held) % 4 == 0:
                 return
-            if "stream reorders" in self.faults and not throttle_s:
+            if "stream reorders" in self.faults and end.name == "scan":
                 if len(held) % 2 == 0:
                     send(held[-1])
                     send(held[-2])
@@ -185,6 +185,8 @@ class RosEnd:
                 self._held.append(message)
                 return
             publisher.publish(message)
+            if "publishers left" in self.faults:
+                self.node.create_publisher(interface(end.type), end.ros, 1)
             if "message doubled" in self.faults:
                 publisher.publish(message)
 
