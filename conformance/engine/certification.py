@@ -163,7 +163,7 @@ def _concluded(
     if run.refused:
         remarks.insert(0, run.refused)
         robot.refusals.withdraw()
-    remarks[:0] = filter(None, [run.stop_undelivered])
+    remarks[:0] = filter(None, [robot.connection.overload.reason, run.stop_undelivered])
     robot.note_uncalled()
     run.unshown = robot.nothing_shown
     remarks += run.remarks

@@ -28,6 +28,7 @@ from conformance.engine.refused import RefusalListener
 from conformance.engine.resending import SentListener
 from conformance.engine.ros_ends import RosEnds
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
+from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
 from conformance.statement.ros_map import Publishes
 from conformance.transport.client import Connection, HttpClient
@@ -122,6 +123,10 @@ class RobotUnderTest:
             # A known device has no streams, and counts what it is sent; of another one only a response shows that.
             self.connection.endless = self.connection.resends = True
             self.connection.is_away = self._is_away
+        # Where moments count, the scenarios decide when they send again.
+        said = self.run.statement
+        self.connection.is_patient = not (self.device.is_known or said.motion_map or said.ros_map)
+        self.connection.overload.ended = self._end
         self._connect_rest()
         self._connect_soap()
         kinds = [one.kind for one in self.connection.recent]
@@ -192,6 +197,16 @@ class RobotUnderTest:
             yield
         finally:
             later.cancel()
+
+    def _end(self, reason: str) -> None:
+        """End the run, and the check that is running.
+
+        Raises:
+            NotPossibleError: a check is running.
+        """
+        self.run.aborted = self.run.aborted or reason
+        if self.run.judge.check_name:
+            raise NotPossibleError(reason)
 
     def _tell(self, line: str) -> None:
         if self._progress is not None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
@@ -41,7 +42,7 @@ from conformance.transport.exchange import (
     Unanswered,
     sendable,
 )
-from conformance.transport.pace import HANGS, Hangs, Pace, time_to_arrive
+from conformance.transport.pace import HANGS, Hangs, Overload, Pace, time_to_arrive
 from conformance.transport.passage import Heard, Passage, Recorder
 from conformance.transport.reach import Trust
 
@@ -76,7 +77,8 @@ class Connection:
         log_in: logs in, and returns the credential that this gives, the last of all; None: the run has no login.
         certificate: client certificate for TLS, or None.
         trust: the servers to which the credentials may go; None: to each that a client is made for.
-        patience_s: how long the run may yet wait for a device that puts requests off, s.
+        overload: how long the run yet waits for a device that puts requests off.
+        is_patient: whether each request that the device puts off is sent again.
         request_rate: maximum requests per second, or None.
         listeners: are called with every response and every failed request.
         sent: number of requests sent.
@@ -118,7 +120,8 @@ class Connection:
     log_in: Callable[[], Credential] | None = None
     certificate: ClientCertificate | None = None
     trust: Trust | None = None
-    patience_s: float = 120.0
+    overload: Overload = field(default_factory=Overload)
+    is_patient: bool = True
     recorder: Recorder = field(default_factory=Recorder)
     heard: Heard = Heard.ALWAYS
     number: Callable[[], int] = field(default_factory=lambda: itertools.count(1).__next__)
@@ -137,8 +140,8 @@ class Connection:
         return self.trust is None or self.trust.trusts(url)
 
     def unheard(self, **changes: Any) -> "Connection":
-        """Return a copy without listeners, with some settings changed."""
-        return replace(self, **{"listeners": [], "heard": Heard.NEVER, **changes})
+        """Return a copy without listeners, which sends nothing again, with some settings changed."""
+        return replace(self, **{"listeners": [], "heard": Heard.NEVER, "is_patient": False, **changes})
 
     def take_slot(self, *requests: tuple[str, str]) -> None:
         """Count one message, after waiting until ``request_rate`` allows it. Everything that sends calls this before.
@@ -233,7 +236,7 @@ class HttpClient:
         authorized: bool = True,
         timeout_s: float | None = None,
     ) -> Exchange:
-        """Send a request and return it with the complete response.
+        """Send a request and return it with the complete response, that to the last try if the device puts it off.
 
         Args:
             method: any token.
@@ -248,8 +251,26 @@ class HttpClient:
             NoAnswerError: no HTTP response was received.
             NotPermittedError: the request may not be sent in this run, or HTTP has no way to write it.
         """
-        path = sendable(path)
-        fields = self._fields(method, tuple(headers), body, close=fresh)
+        path, headers = sendable(path), tuple(headers)
+        for tries in itertools.count(1):
+            exchange = self._sent(method, path, headers, body, timeout_s, fresh=fresh, authorized=authorized)
+            endpoint = partial(self.connection.endpoint_of, exchange.request)
+            if not self.connection.is_patient or not self.connection.overload.waits(exchange.response, endpoint, tries):
+                return exchange
+        raise AssertionError("unreachable: it counts without an end")
+
+    def _sent(
+        self,
+        method: str,
+        path: str,
+        headers: Headers,
+        body: bytes,
+        timeout_s: float | None,
+        *,
+        fresh: bool,
+        authorized: bool,
+    ) -> Exchange:
+        fields = self._fields(method, headers, body, close=fresh)
         shown = tuple((name, value) for name, value in fields if name != "Connection")
         sent, target, query = list(fields), path, ""
         credentials = self.connection.credentials

@@ -1,7 +1,9 @@
 """Requests and responses as values that can be recorded, shown and sent again."""
 
 import re
+import time
 from dataclasses import dataclass, field, replace
+from email.utils import parsedate_to_datetime
 from enum import StrEnum
 from functools import cached_property
 from typing import Final, NamedTuple, Self
@@ -20,6 +22,10 @@ IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
 _PARTIAL: Final = 206
+#: Statuses by which an overloaded server refuses any request (RFC 6585 4, RFC 9110 15.6.4).
+TOO_MANY, UNAVAILABLE = 429, 503
+BUSY: Final = frozenset({TOO_MANY, UNAVAILABLE})
+_SECONDS: Final = re.compile(r"\d{1,9}", re.ASCII)
 # The first element in a SOAP Body names the operation: the operations of a service share one URL.
 _SOAP_OPERATION = re.compile(rb"<(?:[\w.-]+:)?Body[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
 _SOAP_HEAD = 4096
@@ -191,6 +197,26 @@ class Response:
     def media_type(self) -> str:
         """The media type in Content-Type, without parameters, in lower case; empty without the header."""
         return media_type_of(self.header("content-type") or "")
+
+    @cached_property
+    def put_off_s(self) -> float | None:
+        """For how long an overloaded server puts the request off, s (RFC 9110 10.2.3); None: it does not.
+
+        A 429 without Retry-After leaves the time open: 0.
+        """
+        if self.status not in BUSY:
+            return None
+        after, otherwise = (self.header("retry-after") or "").strip(), 0.0 if self.status == TOO_MANY else None
+        if _SECONDS.fullmatch(after):
+            return float(after)
+        try:
+            now = parsedate_to_datetime(self.header("date") or "").timestamp()
+        except ValueError:
+            now = time.time()
+        try:
+            return max(0.0, parsedate_to_datetime(after).timestamp() - now)
+        except (ValueError, OverflowError):
+            return otherwise
 
     @property
     def ok(self) -> bool:

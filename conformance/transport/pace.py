@@ -1,9 +1,15 @@
-"""How fast a robot responds, how much of a delay came from the network, and how long the run waits for what hangs."""
+"""How fast a robot responds, how much of a delay came from the network, and how long the run waits.
+
+It waits for what hangs, and for a device that puts requests off because it is overloaded.
+"""
 
 import threading
 import time
 from collections import defaultdict
+from collections.abc import Callable
 from typing import Final
+
+from conformance.transport.exchange import TOO_MANY, UNAVAILABLE, Response
 
 # Octets a second of the slowest link: an exchange may take as much longer.
 _SLOWEST_OCTETS_PER_S = 256 * 1024
@@ -18,6 +24,14 @@ _HANGS_WITHIN_S: Final = 60.0
 # After waiting for hangs for so long in all, s, the run waits less: so long, or so many times its slowest answer, s.
 _MOST_WAITED_S: Final = 60.0
 _HURRIED_S, _SLOWER = 2.0, 3.0
+# Times that a request is sent that the device puts off: by 429, and by 503, which may be the state of a thing as well.
+_TRIES: Final = {TOO_MANY: 6, UNAVAILABLE: 3}
+# Wait before the second try if the device asks for none, which grows with each try; the longest of them, s.
+_BACKOFF_S, _GROWTH, _LONGEST_BACKOFF_S = 0.02, 4, 3.0
+# Longest that a device may ask to wait; that all requests may, as many a limit counts for a minute, s.
+_PUT_OFF_S, _SHARED_S = 10.0, 90.0
+# Refusals by 429 in a row, of this many endpoints, that show a limit which all requests share.
+_IN_ROW, _ENDPOINTS = 12, 2
 
 
 def time_for(octets: int) -> float:
@@ -98,3 +112,59 @@ class Hangs:
         """Ask again those that did not answer."""
         self._at.clear()
         self.hurried.clear()
+
+
+class Overload:
+    """How long a run yet waits for a device that puts requests off by 429, or by 503 with Retry-After.
+
+    Args:
+        patience_s: for how long it waits in all, s.
+
+    Attributes:
+        reason: why the run waits no longer, although the device refuses all requests; or empty.
+        ended: is called with this reason.
+    """
+
+    def __init__(self, patience_s: float = 900.0) -> None:
+        self.ended: Callable[[str], None] = lambda _reason: None
+        self.reason = ""
+        self._left_s = patience_s
+        # Endpoints that are not waited for; endpoints that 429 refused since the last other response, and
+        # how long was waited meanwhile, s.
+        self._given_up: set[str] = set()
+        self._row: list[str] = []
+        self._row_s = 0.0
+
+    def waits(self, response: Response, endpoint: Callable[[], str], tries: int) -> bool:
+        """Wait for as long as a response puts a request off; return whether to send it again.
+
+        Args:
+            response: of any request.
+            endpoint: returns what the request is for, as Connection.endpoint_of.
+            tries: times that the request was sent.
+        """
+        if response.put_off_s is None:
+            self._row, self._row_s = [], 0.0
+            if self._given_up and response.ok:
+                self._given_up.discard(endpoint())
+            return False
+        status, name = response.status, endpoint()
+        self._row += [name] if status == TOO_MANY else []
+        is_shared = len(self._row) >= _IN_ROW and len(set(self._row)) >= _ENDPOINTS
+        wait_s = max(response.put_off_s, min(_LONGEST_BACKOFF_S, _BACKOFF_S * _GROWTH ** (tries - 1)))
+        most_s = min(self._left_s, _SHARED_S - self._row_s if is_shared else _PUT_OFF_S)
+        if wait_s > most_s or (not is_shared and (tries >= _TRIES[status] or name in self._given_up)):
+            self._given_up.add(name)
+            if is_shared:
+                after = response.header("retry-after") or "missing"
+                self.reason = (
+                    f"The device limits the rate of requests: {len(self._row)} in a row were answered 429, the last "
+                    f"one with Retry-After {after}. What came after was not judged. Raise the limit for the suite, or "
+                    "give it a slower pace by --request-rate."
+                )
+                self.ended(self.reason)
+            return False
+        self._left_s -= wait_s
+        self._row_s += wait_s
+        time.sleep(wait_s)
+        return True

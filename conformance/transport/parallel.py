@@ -1,24 +1,20 @@
 """Several concurrent clients: their requests are sent at the same moment, each on its own connection."""
 
 import itertools
-import re
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from http import HTTPStatus
+from functools import partial
 from typing import Final, TypeVar
 
 from conformance.transport.client import Connection, HttpClient
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing
+from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, NoAnswerError, Outgoing
 from conformance.transport.passage import Heard
 
 # More concurrent clients would be a load test, and exceed a small robot's sockets.
 MOST_CLIENTS: Final = 8
-#: Statuses by which an overloaded server refuses any request (RFC 9110 15.6.4, RFC 6585 4).
-BUSY: Final = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
-
 
 #: A request with the interface to send it to.
 Addressed = tuple[HttpClient, Outgoing]
@@ -163,31 +159,16 @@ def _tell(requests: Sequence[Addressed], attempts: Sequence[Attempt]) -> None:
 
 
 _Attempt = TypeVar("_Attempt", bound=Attempt)
-# Times that a deferred request is sent in all; longest wait that the device may ask for, s.
-_TRIES: Final = 6
-_LONGEST_WAIT_S: Final = 10
-_SECONDS: Final = re.compile(r"\d{1,9}", re.ASCII)
-
-
-def put_off_s(attempt: Attempt) -> int | None:
-    """Return for how many seconds the device puts a request off: 503 or 429 with Retry-After in seconds; None: not."""
-    if not isinstance(attempt, Exchange) or not is_busy(attempt):
-        return None
-    after = attempt.response.header("retry-after") or ""
-    return int(after) if _SECONDS.fullmatch(after) else None
 
 
 def until_taken(connection: Connection, send: Callable[[], _Attempt]) -> Iterator[_Attempt]:
     """Send a request, again and again while the device puts it off, and yield every attempt.
 
-    Each request that it puts off is refused, so that sending it again does nothing twice. All waits of a run together
-    have a bound (``Connection.patience_s``).
+    Each request that it puts off is refused, so that sending it again does nothing twice.
     """
-    for _ in range(_TRIES):
+    for tries in itertools.count(1):
         attempt = send()
         yield attempt
-        after = put_off_s(attempt)
-        if after is None or after > min(_LONGEST_WAIT_S, connection.patience_s):
+        endpoint = partial(connection.endpoint_of, attempt.request)
+        if not isinstance(attempt, Exchange) or not connection.overload.waits(attempt.response, endpoint, tries):
             return
-        connection.patience_s -= after
-        time.sleep(after)

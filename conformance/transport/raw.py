@@ -10,8 +10,9 @@ import select
 import socket
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from http import HTTPStatus
 from typing import Final, Self
 
@@ -118,6 +119,8 @@ def talk(
 ) -> RawAnswer:
     """Send bytes over a new connection, and read until the robot closes it or the deadline passes.
 
+    While an overloaded device puts one of the requests off, they are sent again, unless it may have acted before.
+
     Args:
         client: the interface to send to.
         octets: the bytes.
@@ -130,6 +133,31 @@ def talk(
         NoAnswerError: the connection cannot be opened, or the endpoint did not respond before.
         NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
+    endpoint = partial(client.connection.endpoint_of, shown(client, octets))
+    for tries in itertools.count(1):
+        came = _talked(client, octets, timeout_s, answers, cuts, pause_s)
+        overload = client.connection.overload
+        if not any(overload.waits(response, endpoint, tries) for response in _responses(octets, came)):
+            return came
+    raise AssertionError("unreachable: it counts without an end")
+
+
+def _responses(octets: bytes, came: RawAnswer) -> Iterator[Response]:
+    """Yield the responses to the requests up to the first one that may have changed something."""
+    left = came.octets
+    for method, _ in requests_in(octets) or [("GET", "")]:
+        try:
+            response, left = parse(left, method, closed=came.closed)
+        except FramingError:
+            return
+        yield response
+        if method not in SAFE_METHODS:
+            return
+
+
+def _talked(
+    client: HttpClient, octets: bytes, timeout_s: float | None, answers: int, cuts: Sequence[int], pause_s: float
+) -> RawAnswer:
     within_s = (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     deadline = time.monotonic() + within_s
     request = shown(client, octets)

@@ -1,6 +1,7 @@
 """One quick run finds faults that show under a condition alone, and blames no right device of another style."""
 
 import json
+import re
 
 import pytest
 from aiohttp import web
@@ -72,6 +73,7 @@ def test_faults_under_a_condition_are_found(faults, tmp_path):
     "styles",
     [
         ("404 first", "closes after errors", "weak ETags", "weak If-Match", "no HEAD"),
+        ("429 often",),
         ("gzip", "HEAD without length", "no If-Match", "no conditions", "404 for methods"),
     ],
 )
@@ -79,6 +81,7 @@ def test_a_right_device_of_any_style_passes(styles, tmp_path):
     with wired_device(styles=styles) as url:
         done = certified(url, tmp_path / "out", *CALLS)
     assert (done.exit_code, done.blamed) == (0, {}), done.text
+    assert not re.search("status 429|Got 429", done.text), done.text
 
 
 @pytest.mark.parametrize("missing", [405, 404])

@@ -164,7 +164,7 @@ class Rack:
         }
         self.jobs: dict[int, dict[str, Any]] = {1: {"id": 1, "label": "first"}}
         self.config: dict[str, Any] = {"name": "rack", "speed": 20}
-        self.count, self.refused, self.deleted, self.created = 100, False, 0, 0
+        self.count, self.refused, self.deleted, self.created, self.came = 100, False, 0, 0, 0
         self.reads: Counter[str] = Counter()
         self.lock = threading.RLock()
 
@@ -230,7 +230,9 @@ class Rack:
         except UnicodeDecodeError as error:
             raise Refused(400, "no UTF-8") from error
         act, faults = "GET" if method == "HEAD" else method, self.faults
-        self.fields = fields
+        self.fields, self.came = fields, self.came + 1
+        if "429 often" in self.styles and self.came % 6 == 0 and target != "/openapi.json":
+            raise Refused(429, "slow down", **{"Retry-After": "0"})
 
         def only(*methods: str) -> None:
             if act in methods and not (method == "HEAD" and "no HEAD" in self.styles):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
@@ -88,8 +87,8 @@ class Call:
         asked = method or self.operation.method
         sent = [pair for pair in fields if pair != ("Content-Type", "")]
         exchange = api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
-        after = _put_off(exchange)
-        if asked not in SAFE or after is None or api.waits <= 0:
+        after = exchange.response.put_off_s
+        if asked not in SAFE or after is None or after > _MOMENT_S or api.waits <= 0:
             return exchange
         api.waits -= 1
         time.sleep(after)
@@ -108,13 +107,6 @@ def value_text(item: Parameter, value: Any) -> Any:
     if is_json(item.media_type):
         return json_text(value)
     return value if isinstance(value, list | dict) else text_of(value)
-
-
-def _put_off(exchange: Exchange) -> int | None:
-    """Return the seconds of Retry-After (RFC 9110 10.2.3) if they are few, otherwise None."""
-    after = exchange.response.header("retry-after") or ""
-    put_off = exchange.response.status == HTTPStatus.SERVICE_UNAVAILABLE and after.isdecimal() and after.isascii()
-    return int(after) if put_off and len(after) == 1 and int(after) <= _MOMENT_S else None
 
 
 def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:

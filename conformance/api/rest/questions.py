@@ -18,8 +18,8 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
-from conformance.transport.exchange import Outgoing, Response
-from conformance.transport.parallel import BUSY, Addressed
+from conformance.transport.exchange import BUSY, Outgoing, Response
+from conformance.transport.parallel import Addressed
 
 # Begins the values in a question that only one client sends.
 _MARK: Final = "roaas-client-"

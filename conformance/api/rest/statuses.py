@@ -10,8 +10,7 @@ from conformance.contract.classes import LIMIT_OCTETS
 from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
-from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswered
-from conformance.transport.parallel import BUSY
+from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, Unanswered
 
 #: Statuses by which a server says that it, or one behind it, failed; 503 means not now, 501 never.
 CRASHES = frozenset({500, 502, 504})

@@ -31,7 +31,9 @@ class Stranger:
         self._api = api
         connection = api.client.connection
         self._client = HttpClient(
-            api.client.base_url, replace(connection, token=None, credentials=wrong or connection.credentials.wrong)
+            api.client.base_url,
+            # Sent again, wrong credentials would shut the suite out for longer.
+            replace(connection, token=None, credentials=wrong or connection.credentials.wrong, is_patient=False),
         )
 
     def close(self) -> None:

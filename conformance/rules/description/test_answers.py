@@ -51,16 +51,16 @@ def _answered(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Respo
         operation = by_label.get(probe.operation)
         if probe.exchange is None or operation is None or probe.exchange.request.method != operation.method:
             continue
-        if operation.responses and probe.kind is not Kind.ANONYMOUS and not _by_server(probe):
-            yield probe, operation, probe.exchange.response
+        answer = probe.exchange.response
+        if operation.responses and probe.kind is not Kind.ANONYMOUS and not _by_server(probe, answer, operation):
+            yield probe, operation, answer
 
 
-def _by_server(probe: Probe) -> bool:
-    """Return whether a web server may have refused a strange request before the application saw it."""
-    answer = probe.exchange.response if probe.exchange else None
+def _by_server(probe: Probe, answer: Response, operation: Operation) -> bool:
+    """Return whether a web server may have refused a request before the application saw it: strange, or too many."""
     strange = probe.kind in {Kind.ODD, Kind.GENERATED, Kind.OTHER}
-    refuses = answer is not None and answer.status in {_BAD_REQUEST, _FORBIDDEN} and not is_json(answer.media_type)
-    return strange and refuses
+    refuses = answer.status in {_BAD_REQUEST, _FORBIDDEN} and not is_json(answer.media_type)
+    return (strange and refuses) or (answer.put_off_s is not None and str(answer.status) not in operation.responses)
 
 
 def _in_question(probe: Probe, status: int) -> bool:

@@ -52,7 +52,7 @@ def test_writes_without_credentials(api: RestInterface, judge: Judge) -> None:
     if not connection.credentials:
         judge.unclaimed(_WRITES, "the run has no credentials")
         return
-    stranger = replace(connection, token=None, credentials=connection.credentials.wrong)
+    stranger = replace(connection, token=None, credentials=connection.credentials.wrong, is_patient=False)
     with closing(HttpClient(api.client.base_url, stranger)) as unknown:
         for operation in applicable_operations(api, [_WRITES], lambda item: not item.safe, "acts"):
             _judge_write(api, judge, unknown, example_call(api, operation))

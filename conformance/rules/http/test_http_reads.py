@@ -21,7 +21,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.scenarios.scenario import NoOccasionError
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Exchange, NoAnswerError, Unanswered
-from conformance.transport.parallel import is_busy, put_off_s
+from conformance.transport.parallel import is_busy
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("settling"), pytest.mark.needs("rest")]
@@ -65,9 +65,9 @@ class _Reads:
         ]
 
     @property
-    def put_off(self) -> list[Attempt]:
+    def put_off(self) -> list[Exchange]:
         """The lost reads that the robot deferred with a Retry-After."""
-        return [one for one in self.lost if put_off_s(one) is not None]
+        return [one for one in self.lost if isinstance(one, Exchange) and one.response.put_off_s is not None]
 
     @property
     def fine(self) -> bool:
@@ -203,4 +203,4 @@ def _read(api: RestInterface, calls: Sequence[Call], rate: str, count: int, ever
 
 def _wait(seen: _Reads) -> None:
     """Wait as long as the robot asked for."""
-    time.sleep(min(_LONGEST_WAIT_S, max((put_off_s(one) or 0 for one in seen.put_off), default=0)))
+    time.sleep(min(_LONGEST_WAIT_S, max((one.response.put_off_s or 0.0 for one in seen.put_off), default=0.0)))

@@ -32,7 +32,7 @@ def test_messages_without_credentials(soap: SoapServices, judge: Judge) -> None:
         if good is None:
             judge.note(_ID, f"the {service.name} service took none of the messages tried")
             continue
-        stranger = replace(connection, token=None, credentials=connection.credentials.wrong)
+        stranger = replace(connection, token=None, credentials=connection.credentials.wrong, is_patient=False)
         with closing(HttpClient(service.client.base_url, stranger)) as unknown:
             for what, client, authorized in (("missing", service.client, False), ("wrong", unknown, True)):
                 exchange = client.send(

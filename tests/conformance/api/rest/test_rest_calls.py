@@ -44,7 +44,7 @@ def test_a_robot_without_odometry_for_a_moment_is_asked_again(slept):
 
 
 @pytest.mark.parametrize(
-    "answer", [(503, None), (503, "3600"), (503, "Fri, 20 Nov 2026 23:00:00 GMT"), (429, "1"), (500, "1")]
+    "answer", [(503, None), (503, "3600"), (503, "Fri, 20 Nov 2226 23:00:00 GMT"), (429, "9"), (500, "1")]
 )
 def test_what_is_not_put_off_for_a_moment_is_taken_as_it_is(slept, answer):
     assert _POSE.send(_robot(answer, (200, None))).response.status == answer[0]
