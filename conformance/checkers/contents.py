@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 from conformance.api.rest.statuses import refuses
 from conformance.checkers.entity_tags import Fields, fields_of, label_of
 from conformance.checkers.occasion import Occasion
+from conformance.documents.files import MEDIA, keeps_octets
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, is_json
 from conformance.documents.parameters import plain_name
@@ -29,7 +30,8 @@ _MEMBERS: Final = {"sha256": hashlib.sha256, "sha512": hashlib.sha512}
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # _MOST: contents that are remembered. _LARGEST: bytes of each.
 _MOST, _LARGEST = 200, 1 << 20
-_FILES: Final = frozenset({_OCTETS, "application/pdf", "application/zip"})
+# _START: octets by which a file of a media type is known. _WITHIN: some of an image's pixels, behind its header.
+_START, _WITHIN = 4, slice(60, 76)
 _RANGE, _DIGESTS, _READ, _TAGS = (
     "http/range",
     "description/digest",
@@ -42,11 +44,6 @@ _KEEPS: Final = re.compile(
     r"\b(?:octets?|bytes?)\b[^.]*\b(?:stored|sent|uploaded|received|written)\b|\bverbatim\b|\bbyte[ -](?:for|by)[ -]",
     re.IGNORECASE,
 )
-
-
-def keeps_octets(media_type: str) -> bool:
-    """Return whether content of a media type is a file, in which every byte matters."""
-    return media_type in _FILES or media_type.partition("/")[0] in {"image", "audio", "video"}
 
 
 class _Key(NamedTuple):
@@ -123,7 +120,7 @@ class Contents:
         body, known = occasion.response.body, self._known.setdefault(occasion.request.url, set())
         if sent is not None and (sent.request.body == body or hash(body) not in known):
             octets, label = sent.request.body, label_of(occasion.operation)
-            is_kept = octets == body or (_is_free(occasion, sent) and octets.split() == body.split())
+            is_kept = octets == body or _may_be(body, occasion, sent)
             differs = self._differs.setdefault(occasion.request.url.partition("?")[0], set())
             differs |= set() if is_kept else {octets}
             # A single difference may come from another client's upload.
@@ -145,10 +142,20 @@ class Contents:
             yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
 
 
-def _is_free(read: Occasion, sent: Occasion) -> bool:
-    """Return whether a device may end the lines of a file as it likes: it is a text, and no description says more."""
-    operations = [one.operation for one in (read, sent) if one.operation is not None]
-    return sent.request.media_type == _TEXT and not any(_KEEPS.search(one.text) for one in operations)
+def _may_be(body: bytes, read: Occasion, sent: Occasion) -> bool:
+    """Return whether a device may make this content of a file, because no description says that it keeps each octet.
+
+    It may end the lines of a text as it likes, and write an image, a sound or a film anew (RFC 9110 9.3.4): that begins
+    as such files do, is not only the first part of what was sent, and has nothing of its pixels and samples as they
+    were.
+    """
+    if any(_KEEPS.search(one.operation.text) for one in (read, sent) if one.operation is not None):
+        return False
+    octets, kind = sent.request.body, sent.request.media_type
+    if kind == _TEXT:
+        return octets.split() == body.split()
+    is_of_kind = body.startswith(octets[:_START]) and not octets.startswith(body)
+    return kind.partition("/")[0] in MEDIA and is_of_kind and octets[_WITHIN] not in body
 
 
 def _part(occasion: Occasion, whole: bytes) -> Iterator[Case]:

@@ -70,7 +70,7 @@ def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str],
             "request differently, a client can hide a second request in it (request smuggling)."
         )
     yield from _remedies([one.id for one in failed], server)
-    yield "This is the server's doing, not the API's, and does not change the verdict; --class web-server judges by it."
+    yield "Most often the server does this, not the API, and the verdict stays; --class web-server judges by it."
 
 
 def _remedies(failed: Sequence[str], server: str) -> Iterator[str]:

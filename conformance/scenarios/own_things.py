@@ -21,8 +21,8 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
-from conformance.checkers.contents import keeps_octets
 from conformance.checkers.memory import ending_with
+from conformance.documents.files import file_of, keeps_octets
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
@@ -57,7 +57,7 @@ _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 _FILES: Final = (
     bytes(range(255, -1, -1)) * 18,
     bytes(range(256)) * 17 + b"\r\n\n \0end",
-    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n",
+    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n" * 9,
 )
 # How a client sends content of unknown length (RFC 9112 7.1).
 _IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
@@ -318,16 +318,16 @@ class _Thing:
                 continue
             path = self.target.rstrip("/") + below
             whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
-            files = [(media_type, octets) for octets in _FILES if media_type]
+            files = [(media_type, file_of(media_type, octets)) for octets in _FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
-            for kept_as, octets in files:
+            for number, (kept_as, octets) in enumerate(files, 1):
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=kept_as)
                 request = replace(written(put, inputs), target=path)
-                # A device may look into an image, and refuse what is none.
+                # A device may look into an image, and refuse one that is too small or too wide.
                 kind = Kind.AGAIN if kept_as == _OCTETS else Kind.ODD
                 if not self.surveyor.send(put, Variation(kind, "", "", inputs), request).ok:
                     break
-                self.in_parts(read, path, more="206" in read.responses and octets is _FILES[-1])
+                self.in_parts(read, path, more="206" in read.responses and number == len(_FILES))
             else:
                 for _, octets in files[-2:]:
                     coded = replace(request, body=octets, headers=(*request.headers, _IN_CHUNKS))

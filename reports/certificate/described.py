@@ -23,7 +23,7 @@ class Status:
     Attributes:
         code: as it was received, or as the description writes it if it did not occur.
         count: how often it occurred.
-        declared: whether the description declares it, by itself, its class or `default`.
+        declared: whether the description declares it, by itself, its class or `default`, or need not declare it.
     """
 
     code: str
@@ -56,7 +56,8 @@ class Row:
     def statuses(self) -> list[Status]:
         """Return the statuses that occurred, then the declared ones that did not."""
         declared, seen = self.entry["declared"], set(self.entry.get("seen_declared", ()))
-        found = [Status(code, count, _is_declared(code, declared)) for code, count in self.entry["statuses"].items()]
+        known = [*declared, *self.entry.get("need_no_declaration", ())]
+        found = [Status(code, count, _is_declared(code, known)) for code, count in self.entry["statuses"].items()]
         return found + [Status(code, 0, declared=True) for code in declared if code not in seen]
 
     @property

@@ -10,6 +10,7 @@ from urllib.parse import quote
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import require_valid
+from conformance.documents.files import file_of, is_made
 from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import SAFE, Operation, is_json
 from conformance.documents.parameters import Parameter
@@ -141,7 +142,9 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
     value = _fitted(api, operation, plain[0] if plain else sample(body.schema))
-    if media_type == XML:
+    if is_made(media_type):
+        octets = file_of(media_type)
+    elif media_type == XML:
         octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
     else:
         octets = json_text(value).encode()

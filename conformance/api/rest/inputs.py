@@ -8,7 +8,9 @@ from typing import Any, Final
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import validity_by
 from conformance.api.rest.values import Values
-from conformance.documents.openapi import Operation, is_json, is_xml
+from conformance.documents.files import file_of, is_made
+from conformance.documents.json_schema import Schema
+from conformance.documents.openapi import Body, Operation, is_json, is_xml
 from conformance.documents.parameter_reading import is_binary
 from conformance.documents.parameters import Parameter
 from conformance.documents.writing import (
@@ -145,7 +147,7 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
         found = values.body(body.schema, body.examples, operation)
         found = [values.unique.renewed(operation, value, body.schema) for value in found]
-        bodies = [(name, _with_files(value, body.schema, name)) for value in found]
+        bodies = [(name, _with_files(value, body, name)) for value in found]
     if bodies:
         base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
     found = [base]
@@ -155,12 +157,21 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     return found
 
 
-def _with_files(value: Any, schema: dict[str, Any], media_type: str) -> Any:
-    """Return a form's value with bytes where the schema asks for a file."""
+def _with_files(value: Any, body: Body, media_type: str) -> Any:
+    """Return a form's value with bytes where the schema asks for a file, and a file of a media type that is one."""
+    if is_made(media_type):
+        return file_of(media_type)
     if media_type != MULTIPART or not isinstance(value, dict):
         return value
-    properties = schema.get("properties", {})
-    return {name: b"roaas" if is_binary(properties.get(name, {})) else item for name, item in value.items()}
+    properties = body.schema.get("properties", {})
+    files = {name: part for name, part in properties.items() if name in value and is_binary(part)}
+    return value | {name: file_of(_type_of_part(name, part, body)) for name, part in files.items()}
+
+
+def _type_of_part(name: str, part: Schema, body: Body) -> str:
+    """Return the first media type that a description gives a part of a form; empty without one."""
+    given = body.encoding[name].media_type if name in body.encoding else ""
+    return (given or str(part.get("contentMediaType", ""))).partition(",")[0].partition(";")[0].strip()
 
 
 def renewed(operation: Operation, inputs: Inputs, values: Values, place: str = "") -> Inputs:
@@ -176,5 +187,5 @@ def whole_body(operation: Operation, values: Values) -> tuple[str, Any]:
     for name, body in operation.bodies.items():
         whole = values.filled(sample(body.schema, whole=True), body.schema, operation)
         whole = values.unique.renewed(operation, whole, body.schema)
-        return name, _with_files(whole, body.schema, name)
+        return name, _with_files(whole, body, name)
     return "", NOTHING

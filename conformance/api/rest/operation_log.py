@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl
 from conformance.api.call_rules import CallRules
 from conformance.api.rest.branches import branches_in, branches_of
 from conformance.api.rest.left_behind import LeftBehind
-from conformance.api.rest.statuses import need_of
+from conformance.api.rest.statuses import ANY_TIME, need_of
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import Operation, is_json, matching, operations_of, resource_at
 from conformance.documents.wsdl_pack import label_in, services_of
@@ -78,9 +78,12 @@ class OperationLog(Listener):
                 self._left.follow(operation, exchange)
 
     def by_hand(self, exchange: Exchange) -> None:
-        """Note what a request over a raw socket has changed."""
+        """Count the response to a request over a raw socket, and note what that has changed."""
         operation = self._operation(exchange.request)
         if operation is not None:
+            record = self._records[operation.label]
+            record.sent += 1
+            record.statuses[exchange.response.status] += 1
             self._left.follow(operation, exchange)
 
     def unanswered(self, request: Unanswered) -> None:
@@ -220,6 +223,7 @@ class OperationLog(Listener):
             "statuses": {str(status): count for status, count in sorted(record.statuses.items())},
             "declared": list(operation.responses),
             "seen_declared": sorted(map(str, keys)),
+            "need_no_declaration": sorted(map(str, ANY_TIME & record.statuses.keys())),
             "slowest_ms": round(record.slowest_ms, 1),
             **({"needs": need} if need else {}),
             **({"values": values} if values else {}),

@@ -7,6 +7,7 @@ from typing import Final
 from urllib.parse import unquote
 
 from conformance.contract.classes import LIMIT_OCTETS
+from conformance.documents.files import keeps_octets
 from conformance.documents.json_schema import Schema
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
@@ -14,6 +15,9 @@ from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, Un
 
 #: Statuses by which a server says that it, or one behind it, failed; 503 means not now, 501 never.
 CRASHES = frozenset({500, 502, 504})
+#: Statuses that HTTP lets any server or gateway send, so that no description need have them: conditions, ranges, rates,
+#: sizes, upgrades.
+ANY_TIME: Final = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 #: Statuses of a device whose state keeps it from acting, whatever the request contains: a conflict, a condition, a
 #: lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
 HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
@@ -115,6 +119,9 @@ def need_of(operation: Operation, status: int) -> tuple[str, list[str]]:
     if need != _VALUES:
         # Another thing of the same kind may be in the right state.
         return need, in_path if status in HELD else []
+    files = [name for name in operation.bodies if keeps_octets(name)]
+    if files and len(files) == len(operation.bodies) and status not in {404, 410}:
+        return f"a file of {files[0]} that it takes, which the suite cannot make", []
     required = [item.name for item in operation.parameters if item.required and item.where != "path"]
     members = [name for body in operation.bodies.values() for name in _members(body.schema)]
     names = in_path if in_path and status in {404, 410} else [*in_path, *required, *members]

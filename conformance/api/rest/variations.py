@@ -288,6 +288,10 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
                 )
     extra = usual.having("query", "roaas_unknown", "1")
     yield Variation(Kind.ODD, "an unknown query parameter", "query", extra)
+    if isinstance(usual.body, bytes):
+        cut = usual.body[: len(usual.body) // 2]
+        for says, octets in (("an empty file", b""), ("half a file", cut), ("octets that are no such file", b"roaas")):
+            yield Variation(Kind.ODD, says, "body", replace(usual, body=octets))
     if is_json(usual.media_type) and isinstance(usual.body, dict):
         for name, part in flat(operation.bodies[usual.media_type].schema).get("properties", {}).items():
             kinds = kinds_of(part) or {"string"}

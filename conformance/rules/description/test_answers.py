@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from conformance.api.rest.statuses import CRASHES
+from conformance.api.rest.statuses import ANY_TIME, CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of, wrong_formats
@@ -29,8 +29,6 @@ from conformance.verdict.run import Run
 # Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, held_operations, generated_requests, neighbours, own_things, others)
-# Statuses that HTTP lets any server or gateway send: conditions, ranges, rates, sizes, upgrades.
-_ANY_TIME = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
 # Statuses that HTTP allows as well, unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
 # Those of these statuses that come from the application, in the media type that it declares for them.
@@ -77,7 +75,7 @@ def _in_question(probe: Probe, status: int) -> bool:
         return False
     if status == _BAD_REQUEST and (probe.kind is Kind.MALFORMED or _is_unreadable(probe)):
         return False  # any server may say so of content that it cannot read (RFC 9110 15.5.1)
-    return status not in _ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
+    return status not in ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
 
 
 def _is_unreadable(probe: Probe) -> bool:

@@ -8,10 +8,12 @@ import pytest
 from conformance.checkers.rest import RestCheckers
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
+from conformance.documents.files import file_of
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE, _OCTETS = "http://device:80", "application/octet-stream"
 _FILE = {"description": "", "content": {_OCTETS: {"schema": {}}}}
+_PNG = {"image/png": {"schema": {}}}
 _TEXT = {"description": "", "content": {"text/plain": {"schema": {}}}}
 _JSON = {"description": "", "content": {"application/json": {"schema": {}}}}
 _IF = [{"in": "header", "name": name, "schema": {"type": "string"}} for name in ("If-Match", "If-None-Match")]
@@ -20,6 +22,10 @@ _PATHS = {
     "/map": {
         "get": {"responses": {"200": _FILE, "206": _FILE}},
         "put": {"requestBody": {"content": {_OCTETS: {"schema": {}}}}, "responses": {"200": _JSON}},
+    },
+    "/icon": {
+        "get": {"responses": {"200": {"description": "", "content": _PNG}}},
+        "put": {"requestBody": {"content": _PNG}, "responses": {"200": _JSON}},
     },
     **{
         path: {
@@ -39,7 +45,8 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, **fields):
     method, target, status = line.split()
     back = [(name[1:].replace("_", "-"), text) for name, text in fields.items() if name.startswith("_")]
     asked = [(name.replace("_", "-"), text) for name, text in fields.items() if not name.startswith("_")]
-    asked += [("Content-Type", "text/plain" if target in {"/label", "/note"} else _OCTETS)] if sent else []
+    types = {"/label": "text/plain", "/note": "text/plain", "/icon": "image/png"}
+    asked += [("Content-Type", types.get(target, _OCTETS))] if sent else []
     request = Request(method, _BASE + target, (("Host", "device:80"), *asked), sent)
     return Exchange(request, Response(int(status), tuple([*back, ("Content-Type", kind)] if body else back), body, 1.0))
 
@@ -64,12 +71,17 @@ _PUT = _one("PUT /map 200", b"{}", _WHOLE, kind="application/json")
 _PUT_NEXT = _one("PUT /map 200", b"{}", b"next", kind="application/json")
 
 
-def _lines(path, *pairs):
-    """Return texts that are stored one after another, and read."""
+def _stored(path, *pairs, kind="text/plain"):
+    """Return files that are stored one after another, and read."""
     steps = [(_one(f"PUT {path} 200", b"{}", sent, kind="application/json"), got) for sent, got in pairs]
-    return [one for put, got in steps for one in (put, _one(f"GET {path} 200", got, kind="text/plain"))]
+    return [one for put, got in steps for one in (put, _one(f"GET {path} 200", got, kind=kind))]
 
 
+_IMAGES = [file_of("image/png", bytes(range(start, 200))) for start in (0, 1)]
+_WRITTEN_ANEW = [(image, file_of("image/png", b"\7" * 100)) for image in _IMAGES]
+_AS_TEXT = [(image, image.decode("utf-8", "replace").encode()) for image in _IMAGES]
+_HALF = [(image, image[: len(image) // 2]) for image in _IMAGES]
+_OTHER_PIXEL = [(image, image.replace(b"\x90", b"?")) for image in _IMAGES]
 _CHANGED_ENDS = ((b"a\nb", b"a\r\nb"), (b"c\nd", b"c\r\nd"))
 _CUT = ((b"a\nb c", b"a\nb"), (b"c\nd e", b"c\nd"))
 _IF_RANGE = {"range": "bytes=2-2", "_etag": '"a"', "_content_range": "bytes 2-2/10"}
@@ -116,7 +128,9 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
         [_STATE, _one("PUT /state 412", if_match='"s"', if_none_match='"s"'), _STATE],
         [_one("GET /free 200", b"{}", _etag='"s"'), _one("PUT /free 200"), _one("PUT /free 200", if_none_match="*")],
         # Lines of a text may end in several ways where no description says more.
-        _lines("/note", *_CHANGED_ENDS),
+        _stored("/note", *_CHANGED_ENDS),
+        # An image may be written anew.
+        _stored("/icon", *_WRITTEN_ANEW, kind="image/png"),
         # A problem need not state a status.
         [_one("GET /state 404", b"{}", kind="application/problem+json")],
         [_one("GET /state 404", b'{"status": 404}', kind="application/problem+json")],
@@ -137,8 +151,12 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
         ("http/range", [_GET, _one("GET /map 206", b"23", range="bytes=2-3", _content_range="bytes 2-3/2"), _GET]),
         ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **_IF_RANGE)]),
         ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **{**_IF_RANGE, "_etag": 'W/"a"'})]),
-        ("description/written-is-read", _lines("/label", *_CHANGED_ENDS)),
-        ("description/written-is-read", _lines("/note", *_CUT)),
+        ("description/written-is-read", _stored("/label", *_CHANGED_ENDS)),
+        ("description/written-is-read", _stored("/note", *_CUT)),
+        *(
+            ("description/written-is-read", _stored("/icon", *pairs, kind="image/png"))
+            for pairs in (_AS_TEXT, _HALF, _OTHER_PIXEL)
+        ),
         ("description/entity-tag", [_STATE, _STALE, _STATE]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _repr_digest=_digest(b"other"))]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _content_digest=f"{_digest(_WHOLE)[:-3]}A=:")]),

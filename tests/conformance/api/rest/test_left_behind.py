@@ -30,6 +30,7 @@ _DOCUMENT = {
         "/jobs/{id}": {method: {**_ANY, "parameters": [_ID]} for method in ("get", "put", "delete")},
         "/config": dict.fromkeys(("get", "put", "patch"), _ANY),
         "/start": {"post": _ANY},
+        "/scan": {"put": {**_ANY, "requestBody": {"content": {"image/tiff": {}}}}},
         "/move": {"post": {**_ANY, **_BODY, "parameters": [_SPEED]}},
     },
 }
@@ -113,6 +114,7 @@ def test_the_latest_success_comes_first_and_refusals_change_nothing():
         ("POST /move", 409, "another state of the device", []),
         ("PUT /jobs/{id}", 409, "another state of the device", ["id"]),
         ("POST /start", 423, "a lock or lease that another client may hold", []),
+        ("PUT /scan", 422, "a file of image/tiff that it takes, which the suite cannot make", []),
         ("POST /start", 403, "credentials that may do this", []),
         ("POST /start", 507, "room on the device", []),
         ("POST /start", 400, "", []),

@@ -43,6 +43,7 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     log = OperationLog(Contract.load(write_described_pack(tmp_path, API, API)), BASE)
     log.answered(exchange("/joints/a?unit=rad", body=b'{"x": 1}'))
     log.answered(exchange("/joints/b", status=404))
+    log.by_hand(exchange("/joints/b", status=304))
     log.answered(exchange("/elsewhere"))
     log.unanswered(Unanswered(Request("GET", f"{BASE}/joints/c"), "closed", NoAnswer.CLOSED))
     head, brew = exchange("/joints/b", method="HEAD"), exchange("/joints/b", method="BREW")
@@ -54,8 +55,9 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     ]
     document = log.document(CallRules(), findings)
     joints, delete, state = document["operations"]
-    assert (joints["requests"], joints["unanswered"]) == (3, 1)
-    assert (joints["statuses"], joints["seen_declared"]) == ({"200": 1, "404": 1}, ["200"])
+    assert (joints["requests"], joints["unanswered"]) == (4, 1)
+    assert joints["statuses"] == {"200": 1, "304": 1, "404": 1}
+    assert (joints["seen_declared"], joints["need_no_declaration"]) == (["200"], ["304"])
     assert [one["findings"] for one in (joints, delete, state)] == [[1, 2, 3], [3], [1]]
     assert [one["called"] for one in (joints, delete, state)] == [True, False, True]
     assert document["coverage"] == {"operations": [1, 3], "parameters": [2, 2], "statuses": [1, 3], "branches": [1, 4]}
