@@ -99,6 +99,12 @@ class _Past:
         """Return for how long another value was kept, s."""
         return max((age for other, age in self.kept.items() if other != text), default=0.0)
 
+    def twice(self, name: str, exchange: Exchange, expected: str, got: str, cause: str) -> Iterator[Case]:
+        """Yield a case of a requirement, by ``got`` if that is not empty: a failure counts from the second one on."""
+        self.misses += bool(got)
+        if not got or self.misses >= _SEEN:
+            yield case(f"soap/{name}", not got, exchange, expected, got, cause)
+
     def lasted(self, age_s: float, text: str) -> Iterator[Case]:
         """Yield the values that should have lasted as long as another one did, once that one was read again."""
         waiting, self.pending = self.pending, []
@@ -320,10 +326,8 @@ class SoapMemory:
                 continue
             past, expected = self._past[act.label, "", name], f"{name} {sent[name][0]!r}, which was asked for"
             holds = is_alike(act.sent[name], sent[name][0], told[name][0])
-            past.misses += not holds
-            if holds or past.misses >= _SEEN:
-                cause = f"{act.label} {name}"
-                yield case("soap/written-is-read", holds, exchange, expected, f"{name} {told[name][0]!r}", cause)
+            got = "" if holds else f"{name} {told[name][0]!r}"
+            yield from past.twice("written-is-read", exchange, expected, got, f"{act.label} {name}")
 
     def _gone(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
         """Judge whether a thing that was removed can still be read; a value of its own may say that it is removed."""
@@ -334,11 +338,8 @@ class SoapMemory:
                 continue
             past, expected = self._past[thing.creator.label, act.label, "gone"], f"a fault for {thing.id!r}"
             expected += f", which was removed {age_s:.1f} s before"
-            is_there = [thing.id] in told.values()
-            past.misses += is_there
-            if not is_there or past.misses >= _SEEN:
-                cause = f"{thing.creator.label} {act.label}"
-                yield case("soap/deleted-is-gone", not is_there, exchange, expected, "its values", cause)
+            got = "its values" if [thing.id] in told.values() else ""
+            yield from past.twice("deleted-is-gone", exchange, expected, got, f"{thing.creator.label} {act.label}")
 
     def _unchanged(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
         """Judge whether a list is as it was, but for what the one request did that came since."""
@@ -360,10 +361,8 @@ class SoapMemory:
         else:
             return
         past = self._past[doer.label, act.label, name]
-        past.misses += bool(odd)
-        if not odd or past.misses >= _SEEN:
-            got, cause = f"a list with or without {', '.join(sorted(odd))}", f"{doer.label} {act.label}"
-            yield case(f"soap/{name}", not odd, exchange, what, got, cause)
+        got = f"a list with or without {', '.join(sorted(odd))}" if odd else ""
+        yield from past.twice(name, exchange, what, got, f"{doer.label} {act.label}")
 
     def _listed(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
         """Judge whether a list contains what was created, and nothing that was removed."""
@@ -384,11 +383,8 @@ class SoapMemory:
                 if len(past.kept) >= _KEPT:
                     yield case(f"soap/{name}", True, exchange, expected)  # noqa: FBT003 - see Case
             elif age_s >= SETTLES_S and len(past.kept) >= _KEPT and (thing.gone or age_s <= past.longest(thing.id)):
-                past.misses += 1
-                if past.misses >= _SEEN:
-                    observed = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
-                    cause = f"{thing.creator.label} {act.label}"
-                    yield case(f"soap/{name}", False, exchange, expected, observed, cause)  # noqa: FBT003 - see Case
+                got = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
+                yield from past.twice(name, exchange, expected, got, f"{thing.creator.label} {act.label}")
 
 
 def _texts(sent: _Texts) -> frozenset[tuple[str, str]]:
