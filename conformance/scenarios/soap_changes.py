@@ -183,6 +183,7 @@ class _Changes:
 
     def _ends(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
         """Write the longest and the shortest values, and none, and read what comes of it."""
+        until = time.monotonic() + _BUDGET_S
         for says, texts in (("the longest values", extreme), ("empty texts and negative numbers", shortest)):
             tried = [node]
             for leaves in (free, *([one] for one in free)):
@@ -192,7 +193,7 @@ class _Changes:
                     is_free = REFERS.search(node.at(path).name) is None
                     is_free = is_free and (simple.builtin in STRINGS or KEEPS.search(act.noun) is not None)
                     made = with_text(made, path, texts(simple, node.at(path).text, is_free))
-                if made in tried:
+                if made in tried or time.monotonic() > until:
                     continue
                 tried.append(made)
                 if self.caller.ask(act, made, f"a message with {says}").succeeded:
@@ -201,7 +202,7 @@ class _Changes:
                         break
         names = {node.at(path).name for path, _ in free}
         for says, made in _without(declared, node):
-            if not self.caller.messages.found.types.invalid(parse(made.written())):
+            if time.monotonic() < until and not self.caller.messages.found.types.invalid(parse(made.written())):
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
                 left = [one for one in simple_leaves(declared, made) if one[0] and made.at(one[0]).text]
                 self._wait(readers, made, [one for one in left if made.at(one[0]).name in names])
