@@ -125,7 +125,7 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
 
 
 def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> None:
-    """Refuse --thresholds, and say what replaces it."""
+    """Refuse --thresholds, and name its replacement."""
     if file is not None:
         raise click.UsageError(f"--thresholds {file}: thresholds are service levels now: {LEVELS_INSTEAD}")
 
@@ -328,7 +328,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
 
 
 def _stopping_of(settings: Settings) -> Iterator[Stopping]:
-    """Yield what stops each robot with the paper's interface over REST, if the run makes it drive."""
+    """Yield the stops for robots with the paper's interface over REST, if the run makes them drive."""
     others = () if settings.against is None else (settings.against.robot,)
     moved = [] if MOVES.isdisjoint(settings.selection.operations) else [settings.robot, *others]
     for robot in moved:
@@ -402,7 +402,7 @@ def _command_line() -> str:
 
 
 def _hold_folder(context: click.Context, folder: Path) -> None:
-    """Make the folder for the result and keep other runs out of it, so that a run does not fail at its end."""
+    """Make the folder for the result, and lock it against other runs before the run starts."""
     try:
         context.with_resource(held(folder))
     except FolderError as error:

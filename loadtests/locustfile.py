@@ -112,7 +112,7 @@ def workload_of(options: Any) -> Workload:
 
 
 class RobotUser(User):
-    """A user of one interface through one client, who calls an operation once a second."""
+    """A user who calls an operation once a second, over one interface with one client."""
 
     abstract = True
     wait_time = constant_throughput(1)

@@ -67,7 +67,7 @@ def _value(words: list[str], option: str) -> str | None:
 
 
 def _said(words: list[str], option: str = "") -> list[str]:
-    """Return the values of an option, given as `--option value` or `--option=value`; without it, all words' values."""
+    """Return the values of an option, given as `--option value` or `--option=value`; without one, of all words."""
     apart = [part for word in words for part in (word.split("=", 1) if word.startswith("--") else [word])]
     pairs = zip(["", *apart], apart, strict=False)
     return [value for name, value in pairs if option in {"", name} and not value.startswith("--")]

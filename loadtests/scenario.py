@@ -1,4 +1,4 @@
-"""What a scenario imports: `from loadtests.scenario import RobotUser` (docs/load.md, "A scenario in Python")."""
+"""Names for scenario files: `from loadtests.scenario import RobotUser` (docs/load.md, "A scenario in Python")."""
 
 from loadtests.clients.scenario import Client, Response, ResponseContext
 from loadtests.measuring.scenario import RobotUser

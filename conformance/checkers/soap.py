@@ -1,4 +1,4 @@
-"""The checkers of SOAP: they judge every response of a run, so that a failure in one of many is noticed."""
+"""The checkers of SOAP judge every response of a run, so that a rare failure is noticed."""
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -53,7 +53,7 @@ class SoapCheckers:
         self._endpoints = endpoints
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
-        """Yield the cases of one exchange; none if it is no call of one of the services."""
+        """Yield the cases of one exchange; none if it is no call of these services."""
         request = attempt.request
         if not isinstance(attempt, Exchange) or request.method != "POST" or request.url not in self._endpoints:
             return
@@ -215,7 +215,7 @@ def _type(response: Response) -> str:
 
 
 def answers_of(*described: Wsdl) -> frozenset[str]:
-    """Return the tags of the response elements of a service, by descriptions of it, as the contract's and its own."""
+    """Return the tags of a service's response elements, by the contract's description and the service's own."""
     found: set[str] = set()
     for description in described:
         try:

@@ -1,4 +1,4 @@
-"""The content that an XML Schema allows, as immutable values; texts of simple types, and elements made of values."""
+"""Contents that an XML Schema allows, as immutable values; texts of simple types, and elements made from values."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def too_large(request: Element | None) -> str:
 
 
 def _least(part: Element | Group) -> int:
-    """Return how many elements a message has in which each occurs as often as it must, and once if it need not."""
+    """Return the number of elements in a message with the least occurrences, and each optional element once."""
     inner = part.type.content if isinstance(part, Element) and isinstance(part.type, Complex) else None
     items = (part.items[:1] if part.model == "choice" else part.items) if isinstance(part, Group) else (inner,)
     own = sum(_least(one) for one in items if one is not None) + isinstance(part, Element)
@@ -189,7 +189,7 @@ def _is_any(declared: Any) -> bool:
 
 
 def _fixed(simple: Simple, value: str | None) -> Simple:
-    """Return a type with the one value that a declaration allows, if it does."""
+    """Return a type with only the fixed value of a declaration, if it has one."""
     return simple if value is None else replace(simple, enumeration=(value,))
 
 

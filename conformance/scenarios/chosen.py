@@ -1,4 +1,4 @@
-"""Lists that choose and order things by a member, and counts of them, before and after one of them gets another value.
+"""Lists that filter and sort by a member, and counts, before and after a thing's member gets another value.
 
 A device may keep an index of its things, or an answer, and forget to renew it; it may compare numbers as texts.
 """

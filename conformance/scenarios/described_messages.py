@@ -179,7 +179,7 @@ class DescribedMessages:
 
 
 def values_in(element: etree._Element) -> dict[str, list[str]]:
-    """Return the texts in a response by what a request may call them: by element or attribute, and with its parent.
+    """Return the texts in a response by names that a request may use: of element or attribute, and with the parent's.
 
     A `Preset` with the attribute `token` gives a `PresetToken`.
     """

@@ -102,7 +102,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
 
 
 def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
-    """Read again what was begun and ended, and try to end a thing that is done."""
+    """Read again the activities that were started and ended, and try to end a finished thing."""
     writer = Writer(api, values)
     for kind in begun:
         ends = [one for one in kind.actions if _ends(one)][:1]
@@ -117,7 +117,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
 
 
 def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> None:
-    """Call operations of a thing, and read it before them and after each, until it is in the state that was told."""
+    """Call operations of a thing, and read it before and after each, until it has the expected state."""
     if not writer.send(kind.read, path).response.ok:
         return
     for step in steps:

@@ -52,7 +52,7 @@ _START_S: Final = 0.5
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a run takes.
+    """The number of requests of a run, and its time.
 
     Attributes:
         requests: how many are sent.
@@ -85,7 +85,7 @@ class Estimate:
 
 
 def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
-    """Return what a run takes.
+    """Return the estimated requests and time of a run.
 
     Args:
         run: the data of the run; its effort knows how fast the device answers, or assumes that it is fast.
@@ -132,7 +132,7 @@ def _members(schema: object) -> int:
 
 
 def _http(operations: Iterable[Operation], effort: Effort) -> tuple[int, int]:
-    """Return how many requests the checks of HTTP send, and how many of them several clients at once."""
+    """Return how many requests the checks of HTTP send, and how many of these come from several clients at once."""
     operations = list(operations)
     reads = min(_READS, sum(one.method == "GET" for one in operations))
     if not reads:
@@ -175,7 +175,7 @@ class TimedAgain:
 
     @property
     def has_grown(self) -> bool:
-        """Whether even the quickest response at the end took clearly longer than the one at the beginning."""
+        """Return whether even the quickest response at the end was clearly slower than at the beginning."""
         before, after = self.first.response.elapsed_ms, min(self.times)
         return after > GROWN_TIMES * before and after - before > GROWN_MS
 

@@ -1,4 +1,4 @@
-"""Operations that the state of things forbade in the survey: others bring the state about, on things made for that."""
+"""Operations that states forbade in the survey: others bring a newly created thing into the right state."""
 
 from __future__ import annotations
 

@@ -159,13 +159,13 @@ class _Rounds:
             self._tidied(made)
 
     def _promised(self) -> str:
-        """Return what the description says of keys: of the operation, of the parameter, or beside "key" in its head."""
+        """Return the description's text on idempotency keys: of the operation, the parameter, or the head."""
         head = str(self.writer.api.run.contract.openapi.get("info", {}).get("description", ""))
         own = [part for part in re.split(r"\n\s*\n", head) if _KEY.search(part)]
         return " ".join((self.operation.text, self.key.says, *own))
 
     def _repeated(self, first: Exchange, again: Exchange, name: str, before: set[str] | None) -> Keyed:
-        """Judge the same request: one that was performed twice has made two things."""
+        """Judge a repeated request: performed twice, it has made two things."""
         expected, shown, fault = f"the response with {name}, or a refusal", again, ""
         second = self._name(again) if again.response.ok else ""
         if second and second != name:
@@ -195,7 +195,7 @@ class _Rounds:
         yield Keyed(self.operation.label, "refused before", taken, expected, fault)
 
     def _later(self, request: Outgoing, first: Exchange, item: Operation, path: str) -> Iterator[Keyed]:
-        """Judge a retry after its thing has changed: the description says that it gets the first response."""
+        """Judge a retry after its thing has changed: by the description it gets the first response."""
         changes = (self.operations.get((method, item.template.rstrip("/"))) for method in ("PUT", "PATCH"))
         written = (self.writer.change(one, item, path, _TURN) for one in changes if one is not None)
         write = next((one for one in written if one is not None), None)
@@ -234,7 +234,7 @@ class _Rounds:
         return found if len(found) == 3 else found[:1]  # noqa: PLR2004 - see above
 
     def _name(self, exchange: Exchange) -> str:
-        """Return how a response names what it made: its location, or its identifier; empty if neither."""
+        """Return the identifier or location of the thing that a response created; empty if it has neither."""
         if self._item is not None:
             if path := located(self.writer.api, self._item, exchange):
                 return path
@@ -250,7 +250,7 @@ class _Rounds:
         return set(read_whole(self.writer, self._lister, self._item, self._lister.template).ids)
 
     def _tidied(self, made: list[Exchange]) -> None:
-        """Delete what was made."""
+        """Delete the things that these exchanges created."""
         names = {self._name(one): None for one in made if one.response.ok}
         for path in names:
             if self._delete is not None and self._item is not None and path.startswith("/"):

@@ -110,7 +110,7 @@ class _Cycle:
         self._changes = [one for one in changes if one is not None]
 
     def run(self) -> list[Life]:
-        """Return what became of the things."""
+        """Create, change and delete things of a collection; return the record of each thing."""
         effort, things = self.writer.api.run.effort, self.living.things
         delete = self.operations.get(("DELETE", self.item))
         count = _KEPT if delete is None else _FEW if effort.name == "quick" or effort.slow else _MANY
@@ -174,7 +174,7 @@ class _Cycle:
             self.living.look(done[-1].sent, done[-1].operation, thing)
 
     def _act(self) -> None:
-        """Call the operations below a thing that answer with it, and read whether it is as they say."""
+        """Call the operations below a thing that respond with it, and read whether it is as in the response."""
         acting = [
             one
             for (method, path), one in self.operations.items()
@@ -228,7 +228,7 @@ class _Cycle:
             living.look(deleted, delete.label, thing)
 
     def _create_again(self, thing: Thing, delete: Operation) -> None:
-        """Create what was deleted once more, by the same request."""
+        """Create a deleted thing again, by the same request."""
         first = thing.life.created
         sent = self.writer.send(self.create, thing.path, read_json(first.request.body).value)
         if sent.response.ok:
@@ -284,7 +284,7 @@ class _Cycle:
                 self._deleted(thing, delete)
 
     def _taken(self, created: Exchange, before: set[str] | None) -> bool:
-        """Register what a POST has created, by the identifiers known before; return whether it is new."""
+        """Register the thing that a POST created, by the identifiers known before; return whether it is new."""
         status = created.response.status
         id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
@@ -369,7 +369,7 @@ class _Cycle:
         return re.fullmatch(template, path.rstrip("/")) is not None
 
     def _absent(self, path: str) -> str:
-        """Return the path of a thing that probably does not exist, beside another one; empty if none can be made."""
+        """Return the path of a thing that probably does not exist, made from another's; empty if impossible."""
         found = path_chosen(self.read, _NEVER)
         above, _, last = path.rstrip("/").rpartition("/")
         return found and f"{above}/{found.rstrip('/').rpartition('/')[2]}{path[len(above) + 1 + len(last) :]}"
@@ -389,5 +389,5 @@ def _is_alike(action: Operation, read: Operation) -> bool:
 
 
 def _end_of(path: str, template: str) -> str:
-    """Return the end of a URL's path that a template has written: as many segments as it has."""
+    """Return the end of a URL's path that fits a template: as many segments as the template has."""
     return "/" + "/".join(path.split("/")[-template.count("/") :])

@@ -1,4 +1,4 @@
-"""Lists of a described API: parts of them by limit, offset, page and cursor, and each value of a filter or sort."""
+"""Lists of a described API, read in parts by limit, offset, page and cursor, and with each filter and sort."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
 
 
 def _pages_of(reader: Reader) -> Iterator[Paged]:
-    """Yield what is seen of a list in parts: as it is, sorted, and filtered."""
+    """Yield the records of reading a list in parts: plain, sorted, and filtered."""
     page, until = reader.page(), reader.until
     for query, by in (({}, ""), *_selections(reader.listing, page)) if page is not None else ():
         if time.monotonic() < until:
@@ -115,7 +115,7 @@ def _pages_of(reader: Reader) -> Iterator[Paged]:
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield values of the sort with their members, and one of a filter that leaves several items."""
+    """Yield values of the sort with their members, and a value of a filter that keeps several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
         ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
@@ -142,7 +142,7 @@ def pages_below(api: RestInterface, values: Values, listing: Listing, path: str)
 
 
 def vary_lists(api: RestInterface, values: Values) -> None:
-    """Send each list values of its filters and sorts, with and without a limit; and read it as it is, at the end."""
+    """Send each list values of its filters and sorts, with and without a limit; read it plain at the end."""
     for listing in lists_of(api):
         api.run.limit.check()
         with suppress(NoAnswerError):
@@ -224,13 +224,13 @@ class Reader:
         return None if page is None else (exchange, replace(page, by=self.by))
 
     def page(self) -> Page | None:
-        """Return the list as it is without optional parameters; None if it is not answered."""
+        """Return the list without optional parameters; None if the device does not return it."""
         part = self.part()
         return None if part is None else part[1]
 
 
 def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
-    """Read what had a wrong total once more, when no change explains it.
+    """Read lists with a wrong total again, if no change explains it.
 
     Args:
         reader: of the list.
@@ -271,7 +271,7 @@ def _is_doubted(listing: Listing, page: Page) -> bool:
 
 
 def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
-    """Yield values of filters and of the sort, every other one with a limit."""
+    """Yield values of filters and of the sort, every second one with a limit."""
     rows: list[dict[str, Any]] = []
     for name, parameter in listing.filters.items():
         rows += [{parameter.name: value} for value in _choices(parameter, name, page)[:most]]
@@ -320,7 +320,7 @@ def _elsewhere(value: Any, *, is_least: bool) -> str | None:
 
 
 def _together(listing: Listing, page: Page) -> dict[str, Any]:
-    """Return values of two filters, each of which excludes an item that the other one leaves; else nothing."""
+    """Return values of two filters, each of which excludes an item that the other keeps; else nothing."""
     items = [members_of(one) for one in page.items]
     for (name, first), (other, second) in combinations(listing.filters.items(), 2):
         for one, two in product(_choices(first, name, page), _choices(second, other, page)):
@@ -348,7 +348,7 @@ class _Parts:
     reader: Reader
 
     def all(self, until: float) -> Iterator[Paged]:
-        """Yield what each way to read the list in parts has shown, until a time on the monotonic clock."""
+        """Yield the records of each way to read the list in parts, until a time on the monotonic clock."""
         whole = self.reader.page()
         fewest = _FEWEST if self.reader.by or whole is None else max(_FEWEST, len(whole.items))
         if whole is None or len(set(whole.identities)) < fewest:
@@ -368,7 +368,7 @@ class _Parts:
                 yield found
 
     def _twice(self, walk: Callable[[Page], Paged | None], whole: Page) -> Paged | None:
-        """Return what a walk has shown; a fault if it was seen twice while the list stayed the same."""
+        """Return the record of a walk; a fault counts if it appears twice while the list stays the same."""
         faults = 0
         for _ in range(_TRIES):
             found = walk(whole)
@@ -399,7 +399,7 @@ class _Parts:
         return self._paged(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
 
     def _exact(self, whole: Page) -> Paged | None:
-        """Read with the limit that is the list's length; no page follows, where the description says how that shows."""
+        """Read with a limit equal to the list's length: no page may follow, if the description says how that shows."""
         listing, count = self.reader.listing, self._count(whole)
         limit, cursor = listing.limit, listing.cursor
         is_said = any(_NEXT.fullmatch(plain_name(name)) and _ENDS.search(text) for name, text in listing.says.items())
@@ -479,7 +479,7 @@ class _Parts:
         return None if cursor is None else self._walk(whole, cursor.name, lambda read, _: {} if not read else None)
 
     def _size(self, whole: Page) -> int:
-        """Return the page size to request, so that there are about three pages; 0 if no size is allowed."""
+        """Return the page size for about three pages; 0 if none is allowed."""
         count = self._count(whole)
         sizes = range((count + 2) // 3, count)
         return next((one for one in sizes if fitting(self.reader.listing.limit, one)), 0)
@@ -494,7 +494,7 @@ class _Parts:
         )
 
     def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
-        """Read page after page, and compare all of them with the list.
+        """Read page after page, and compare them with the whole list.
 
         Args:
             whole: the list.
@@ -547,7 +547,7 @@ def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:
 
 
 def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
-    """Yield what a response names as the beginning of the next page."""
+    """Yield values in a response that name the beginning of the next page."""
     name = listing.cursor.name if listing.cursor is not None else ""
     links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
     texts = [*(one.partition("<")[2].partition(">")[0] for one in links), *_following(page.around, 0, said=False)]

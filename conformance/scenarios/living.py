@@ -1,4 +1,4 @@
-"""What a cycle has created, as it was last read, and looks at it after each request to something else."""
+"""Things that a cycle has created: read them again after each request to something else, and compare."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _RING: Final = 3
 
 
 class Kind(StrEnum):
-    """What a look shows if it is not as expected."""
+    """The rule that a read breaks, if it is not as expected."""
 
     THERE = "there"  # a created thing is lost, not listed, or has another thing's identifier
     KEPT = "kept"  # a written value reads differently later
@@ -104,7 +104,7 @@ class Life:
 
 
 class State(StrEnum):
-    """What is known of a thing."""
+    """What the run knows about a thing's existence."""
 
     ALIVE = "alive"
     GONE = "gone"
@@ -139,7 +139,7 @@ class Thing:
 
     @property
     def id(self) -> str:
-        """What identifies it, in lower case; empty if nothing does."""
+        """Return the thing's identifier in lower case; empty if it has none."""
         return (self.life.found_id or self.life.id).casefold()
 
 
@@ -181,7 +181,7 @@ class Living:
         return [one for one in self.things if one.is_own and one.state is state]
 
     def remember(self, thing: Thing, write: Write | None, operation: Operation) -> None:
-        """Keep what a request has written, as far as it reads as it was written."""
+        """Remember the values that a request has written, as far as they read as written."""
         thing.kept = {}
         thing.last = write.found if write else thing.last
         if write is None or not operation.bodies:
@@ -197,7 +197,7 @@ class Living:
         return list(differences(kept, now, thing.schema, self.read.shape, self.writer.values.collections))
 
     def other(self, thing: Thing, found: Exchange, said: Mapping[str, Any] | None = None) -> list[str]:
-        """Return in what a thing reads otherwise than before, as noun phrases.
+        """Return in which members a thing reads differently than before, as noun phrases.
 
         Args:
             thing: what is known of it.
@@ -220,7 +220,7 @@ class Living:
         kind: Kind | None = None,
         said: Mapping[str, Any] | None = None,
     ) -> None:
-        """Read a thing until it reads as before, and note what does not.
+        """Read a thing until it reads as before, and record the difference if it does not.
 
         Args:
             thing: a living one.
@@ -276,7 +276,7 @@ class Living:
     def look(
         self, after: Exchange, operation: str, own: Thing | None = None, said: Mapping[str, Any] | None = None
     ) -> None:
-        """Read the list, and the other things after a request to one of them, or to none; said: see other()."""
+        """Read the list, and other things after a request to one of them, or to none; ``said`` as in other()."""
         if self.is_over:
             return
         created = own.life.created if own else None
@@ -364,7 +364,7 @@ class Living:
         return read_whole(self.writer, self.lister, self.read, path, few)
 
     def _wrong(self, listing: WholeList) -> list[tuple[Thing, Kind, str, str]]:
-        """Return a list's fault: the thing, the exchange that shows it, what was expected, and what was found."""
+        """Return a list's fault: the thing, the exchange, and expected and found texts."""
         found: list[tuple[Thing, Kind, str, str]] = []
         # A list that has never shown a created thing may leave out such things, if it can leave out any.
         leaves_out = self.lister is None or chooses(self.lister) or not all(listing.ids) or len(listing.ids) >= _MANY
@@ -395,7 +395,7 @@ def alike_members(read: Operation, lister: Operation) -> frozenset[str]:
 
 
 def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[str]) -> list[str]:
-    """Return in what a list shows a thing otherwise than it reads, as noun phrases."""
+    """Return in which members a list shows a thing differently than the thing's own page, as noun phrases."""
     item = next((one for one, key in zip(listing.items, listing.ids, strict=True) if key == id_ and id_), {})
     now = members(found, names)
     return [

@@ -71,7 +71,7 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
 
 
 def _refusals(api: RestInterface) -> list[tuple[Operation, Outgoing]]:
-    """Return requests that the device has refused: one of each status first, those with content before others."""
+    """Return requests that the device refused: one for each status first, those with content before others."""
     by_label = {item.label: item for item in operations_of(api.run.contract)}
     by_status: dict[int, list[tuple[Operation, Outgoing]]] = {}
     for (status, label), request in sorted(api.refused.items(), key=lambda one: not one[1].body):
@@ -84,7 +84,7 @@ def _refusals(api: RestInterface) -> list[tuple[Operation, Outgoing]]:
 def _after(
     surveyor: Surveyor, read: Operation, tried: list[Inputs], refusals: Iterator[tuple[Operation, Outgoing] | None]
 ) -> Inputs | None:
-    """Send a refused request, and read on the same connection; return what was read with, if that was answered 2xx."""
+    """Send a refused request, and read on the same connection; return the read's inputs, if it got 2xx."""
     for inputs in tried:
         refused = next(refusals)
         if refused is not None:
@@ -105,7 +105,7 @@ def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange 
 
 
 def _parts(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange | None) -> None:
-    """Where the device has parts, read some of the last read, and one of another copy; then the whole once more."""
+    """If the device supports ranges, read parts of the last content and of another copy; then the whole."""
     if last is None or len(last.response.body) < _LONG:
         return
     if "206" not in read.responses and (last.response.header("accept-ranges") or "").strip().lower() != "bytes":
@@ -114,7 +114,7 @@ def _parts(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange |
 
 
 def read_parts(surveyor: Surveyor, read: Operation, whole: Outgoing, *, more: bool = True) -> None:
-    """Read a part of a content, its end and one of another copy if there are ``more``, and the whole."""
+    """Read a part of a content and its end, with ``more`` also of another copy, and the whole."""
     for fields in _PARTS if more else _PARTS[:1]:
         part = replace(whole, headers=(*whole.headers, *fields))
         surveyor.send(read, Variation(Kind.ODD, "", "", Inputs()), part, fresh=False)

@@ -1,4 +1,4 @@
-"""What other checks than the survey sent and received of a described API.
+"""Exchanges that other checks than the survey had with a described API.
 
 A fault in one response of a hundred may meet none of the survey's requests, so its rules judge these as well.
 """
@@ -166,7 +166,7 @@ def _has_few(schema: object) -> bool:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
-    """Read again what was created or deleted, and return what other checks have sent and received."""
+    """Read created or deleted things again, and return the exchanges of other checks."""
     with suppress(NoAnswerError, TimeIsOverError):
         things = dict(islice(other_exchanges.things.items(), _MOST_THINGS))
         sent = _read(api, things)

@@ -1,4 +1,4 @@
-"""Requests that get to what they are for: with values that must be new, and with the present entity tag."""
+"""Make requests succeed: with new values for unique members, and with the current entity tag."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Reaching:
         return found
 
     def refused(self, status: int, operation: Operation, request: Outgoing) -> None:
-        """Keep a refused request; send the first ones that a state forbade again, if the description says what stays.
+        """Keep a refused request; send the first ones refused by a state again, if the description says what remains.
 
         Before and after each, all that can be read without input is read, which a checker judges.
         """

@@ -1,4 +1,4 @@
-"""Send to a thing what the device should refuse, and read the thing and its list: a refused request changes nothing."""
+"""Send requests to a thing that the device should refuse, and read the thing and its list unchanged."""
 
 from __future__ import annotations
 

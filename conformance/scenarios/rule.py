@@ -12,7 +12,7 @@ from conformance.verdict.evidence import Case, Judge
 
 @dataclass(frozen=True)
 class NotTested:
-    """Outcome of a rule: the trace does not show whether the device meets the requirement; ``reason`` says why."""
+    """Outcome of a rule: the trace does not show whether the device meets the requirement; ``reason`` explains it."""
 
     reason: str
 
@@ -26,7 +26,7 @@ class NotSeen:
 
 @dataclass(frozen=True)
 class NotClaimed:
-    """Outcome of a rule: the requirement does not apply to this device; ``reason`` says why."""
+    """Outcome of a rule: the requirement does not apply to this device; ``reason`` explains it."""
 
     reason: str
 

@@ -87,7 +87,7 @@ class _Resource:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def safe_reads(api: RestInterface, values: Values) -> tuple[Watched, ...]:
-    """Read what clients write before and after all safe requests, and again without them where it has changed."""
+    """Read writable resources before and after all safe requests, and again without them if they changed."""
     watch = _Watch(Writer(api, values))
     api.run.limit.check()
     with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
@@ -138,7 +138,7 @@ class _Watch:
         )
 
     def play(self) -> list[Watched]:
-        """Return what became of each resource."""
+        """Return the record of each resource."""
         try:
             self.resources = [one for one in self.resources if self._settled(one)]
             # An earlier safe request may already have undone a change, so write something just before them.
@@ -174,7 +174,7 @@ class _Watch:
         return bool(one.was)
 
     def _changed(self, one: _Resource) -> None:
-        """Write other values to a resource that always exists; if it does not show them, watch it as it is."""
+        """Write other values to a permanent resource; if it does not show them, watch it unchanged."""
         if one.write is None or one.path or one.last is None:
             return
         schema = one.write.bodies[next(iter(one.write.bodies))].schema
@@ -194,7 +194,7 @@ class _Watch:
         return self.writer.send(one.read, one.path)
 
     def _safe(self, methods: Sequence[str]) -> Iterator[Outgoing]:
-        """Yield safe requests: for each operation that reads, on what this run created if possible."""
+        """Yield safe requests: for each reading operation, on a thing that this run created if possible."""
         made = {one.read.template.rstrip("/"): one.path for one in self.resources if one.path}
         for (method, template), read in self._operations.items():
             if method != "GET":
@@ -217,7 +217,7 @@ class _Watch:
         return last
 
     def _wrong(self, one: _Resource) -> str:
-        """Read a resource; return what is not as it should be, as a noun phrase."""
+        """Read a resource; return its difference from the expected state, as a noun phrase."""
         one.last = self._read(one)
         if one.last.response.status in ABSENT:
             return one.last.came
@@ -257,7 +257,7 @@ class _Watch:
         return None
 
     def _restored(self, one: _Resource) -> bool:
-        """Write a resource as it was, or create another one in its place; return whether it reads so."""
+        """Write a resource's earlier values, or create another in its place; return whether it reads so."""
         if one.path and one.last is not None and one.last.response.status in ABSENT:
             create = self._operations["POST", collection_of(one.read.template.rstrip("/"))]
             one.path = created_path(Surveyor(self.writer.api, self.writer.values), create, one.read)

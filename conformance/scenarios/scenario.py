@@ -10,7 +10,7 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 
 
 class NotPossibleError(Exception):
-    """Raised when a scenario cannot be played on this device; the message says why. Its rules are then not tested."""
+    """Raised when a scenario cannot be played on this device, with the reason. Its rules are then not tested."""
 
 
 class NoOccasionError(NotPossibleError):
@@ -18,11 +18,11 @@ class NoOccasionError(NotPossibleError):
 
 
 class NotSeenError(NotPossibleError):
-    """Raised when the device's state did not allow what the scenario needs. Its rules have then seen nothing."""
+    """Raised when the device's state did not allow the scenario. Its rules then have no record to judge."""
 
 
 class NotDeclaredError(NotPossibleError):
-    """Raised when the statement does not declare what the scenario needs. What no other check judges is not claimed."""
+    """Raised when the statement lacks a declaration for the scenario. Requirements only it tests are not claimed."""
 
 
 @dataclass(frozen=True)

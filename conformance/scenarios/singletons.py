@@ -140,7 +140,7 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
 
 
 def _lost(writer: Writer, read: Operation, write: Operation, done: Write) -> dict[str, Any]:
-    """Return what reads otherwise than it was written, by each member that was sent."""
+    """Return the members that read differently than written, for each one that was sent."""
     body, schema = _body(done), write.bodies[done.sent.request.media_type].schema
     now, collections = members(done.found, body), writer.values.collections
     found = {name: differences({name: one}, now, schema, read.shape, collections) for name, one in body.items()}

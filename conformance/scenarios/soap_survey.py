@@ -63,11 +63,11 @@ def requests_of(effort: Effort) -> int:
 
 
 class NotSoapError(ValueError):
-    """Raised for content that is no message of the port's SOAP version; the message says why."""
+    """Raised for content that is no message of the port's SOAP version; the message explains why."""
 
 
 class Kind(StrEnum):
-    """What a message shows."""
+    """Kind of a message, by what its response shows."""
 
     USUAL = "usual"
     TRIED = "tried"
@@ -189,7 +189,7 @@ class Caller:
         return len(self.messages.invented(declared, node)) if declared and node else 0
 
     def learn(self, probe: SoapProbe, node: Node | None) -> None:
-        """Keep the values in a success of a message; what is no message teaches nothing."""
+        """Keep the values in a message's successful response; other content has none."""
         act = self.acts[probe.operation]
         self.accepted[probe.operation] = node
         with contextlib.suppress(NotSoapError):
@@ -272,7 +272,7 @@ class Caller:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.READING)
 def wsdl_faults(run: Run) -> tuple[str, ...]:
-    """Return what is wrong with the WSDL itself; nothing is called."""
+    """Return the faults of the WSDL itself; nothing is called."""
     found = services_of(run.contract)
     if found is None:
         raise NotPossibleError("the device has no WSDL")
@@ -408,7 +408,7 @@ def full_message(caller: Caller, act: Act, declared: Element | None, node: Node 
 
 
 def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
-    """Read at once the thing that an operation made or is about: a response may break its schema in one state only."""
+    """Read the thing that an operation created or concerns: its response may break the schema in one state only."""
     probe = caller.probes[-1]
     if probe.operation != act.label or not probe.succeeded or act.role not in {Role.OTHER, Role.ENDS, Role.CREATES}:
         return
@@ -435,7 +435,7 @@ def _about_others(caller: Caller, act: Act, node: Node | None) -> None:
 
 
 def _ask_for_nothing(caller: Caller, act: Act, declared: Element | None, node: Node | None) -> None:
-    """Name a thing that is not there, so that a declared fault is seen."""
+    """Send a message for a missing thing, to see a declared fault."""
     if not act.operation.faults or act.role not in {Role.READS, *LAST} or declared is None or node is None:
         return
     for path, simple in simple_leaves(declared, node):

@@ -1,4 +1,4 @@
-"""The stages of a run in their order, and what scenarios need and leave."""
+"""Stages of a run in their order, and the states that scenarios need and leave."""
 
 from enum import StrEnum
 from typing import Final
@@ -42,7 +42,7 @@ class Leaves(StrEnum):
 
 
 class Need(StrEnum):
-    """What a scenario needs to be played."""
+    """A thing that a scenario needs before it can be played."""
 
     REST = "rest"
     PUBLISHERS = "publishers"

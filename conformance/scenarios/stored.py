@@ -24,7 +24,7 @@ _MOST = 256 * 1024 * 1024
 
 
 class TracesError(ValueError):
-    """Raised for an invalid file of traces; the message says why."""
+    """Raised for an invalid file of traces; the message explains why."""
 
 
 def write_traces(recordings: Recordings, folder: Path) -> Path | None:

@@ -196,7 +196,7 @@ class Surveyor:
 
     @property
     def trace(self) -> Survey:
-        """What was recorded so far."""
+        """Return the record so far."""
         return Survey(tuple(self.probes), elsewhere=self.elsewhere, paged=tuple(self.paged))
 
     def send(
@@ -285,7 +285,7 @@ class Surveyor:
         return Probe(*given, validity=own.verdict, why=own.why, invents=invents)
 
     def _recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
-        """Send a request whose exchange becomes a probe, so that no checker judges it as well.
+        """Send a request whose exchange becomes a probe and that no checker judges.
 
         Raises:
             NoAnswerError: no HTTP response was received.
@@ -323,7 +323,7 @@ class Surveyor:
                 return
 
     def _candidates(self, operation: Operation) -> Iterator[Inputs]:
-        """Yield inputs of the usual request, at last with what the device demanded: a condition, or a new thing."""
+        """Yield inputs of the usual request; last, those with a demanded condition or a new thing."""
         tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
         yield from tried
         if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
@@ -391,7 +391,7 @@ class Surveyor:
         self._end(operation, usual)
 
     def _end(self, operation: Operation, usual: Inputs) -> None:
-        """Send as many references as a list may have, the usual request with a charset, and as it was at first."""
+        """Send as many references as a list may have, the usual request with a charset, and again unchanged."""
         is_usable = operation.label not in self.given_up
         for fewer, most in most_references(operation, usual, self.values) if is_usable else ():
             # If the device takes all but one, and takes that one alone, it knows each of them.
@@ -468,7 +468,7 @@ class Surveyor:
 
 
 def _is_near(template: str, other: str) -> bool:
-    """Return whether one path is below the other one, or in the same folder."""
+    """Return whether one path is below the other, or both have the same parent."""
     above = template.rstrip("/").rpartition("/")[0]
     return other.startswith(f"{template}/") or (bool(above) and f"{other}/".startswith(f"{above}/"))
 

@@ -60,7 +60,7 @@ class Table:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
 def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
-    """Read each list that is declared as CSV and as JSON; what differs counts if it differs again."""
+    """Read each list that has CSV and JSON in both formats; a difference counts if it appears twice."""
     found, operations = list[Table](), callable_operations(api)
     gets = [one for (method, _), one in operations.items() if method == "GET"]
     reads = [one for one in gets if _CSV in one.formats and any(map(is_json, one.formats))]
@@ -128,7 +128,7 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
 
 
 def _chosen(api: RestInterface, values: Values, read: Operation) -> Table | None:
-    """Read a list by one of its filters as JSON and as CSV; None if JSON shows that it does not leave others out."""
+    """Read a filtered list as JSON and as CSV; None if JSON does not show that the filter excludes items."""
     listing, json_type = listing_of(read), next(filter(is_json, read.formats))
 
     def ask(media_type: str, **query: Any) -> Exchange:
@@ -171,7 +171,7 @@ def _columns(head: list[str], items: list[dict[str, Any]]) -> dict[str, int]:
 def _differences(
     rows: list[list[str]], items: list[dict[str, Any]], columns: dict[str, int], *, is_paged: bool
 ) -> Iterator[str]:
-    """Yield what a table has otherwise than JSON: the number of its rows, and numbers and identifiers in them."""
+    """Yield differences of a table from JSON: number of rows, and numbers and identifiers in them."""
     if len(rows) != len(items):
         if not is_paged:
             yield f"{len(rows)} rows"

@@ -111,7 +111,7 @@ def _next(lister: Operation, exchange: Exchange, page: Page, count: int, number:
 
 
 def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
-    """Return whether a page has as many items as a limit allows, said or not."""
+    """Return whether a page has exactly as many items as a declared or usual limit."""
     count, listing = len(page.items), listing_of(lister)
     said = [one for part in page.around for name, one in part.items() if plain_name(name) in _LIMITS]
     most = listing.most({name: str(one) for name, one in sent.items()}) if listing is not None else 0

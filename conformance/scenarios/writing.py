@@ -1,4 +1,4 @@
-"""Write to a thing by PUT or PATCH, and read it until it shows what was written."""
+"""Write to a thing by PUT or PATCH, and read it until the written values appear."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ class Writer:
         before: Exchange | None = None,
         fresh: bool = False,
     ) -> Write:
-        """Read a thing until it shows what a request has written; before: an earlier read; fresh: new connections."""
+        """Read a thing until it shows written values; before: an earlier read; fresh: new connections."""
         found = self.settled(
             lambda: self.send(read, path, fresh=fresh),
             lambda exchange: self.differing(operation, read, sent, exchange, before),

@@ -25,7 +25,7 @@ class Pair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a load test may do to the device.
+    """Limits of a load test on the device.
 
     Attributes:
         max_rate: maximum requests per second.
@@ -53,7 +53,7 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ServiceLevel(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What an operation has to keep to.
+    """The limits that an operation must keep.
 
     Attributes:
         p50_ms, p90_ms, p95_ms, p99_ms, p999_ms: limits on quantiles of the response time, ms.

@@ -32,7 +32,7 @@ def names_operation(call: str, label: str) -> bool:
 
 
 def covers(call: str, sent: str) -> bool:
-    """Return whether a call, with any values for the names in its path, is "METHOD PATH" as it is sent."""
+    """Return whether a call, with any values in its path, is the sent "METHOD PATH"."""
     pattern = "[^/]+".join(map(re.escape, NAME.split(call.partition("?")[0])[::2]))
     return re.fullmatch(pattern, sent.partition("?")[0]) is not None
 

@@ -56,7 +56,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bound: bool = True
 
     def __post_init__(self) -> None:
-        """Check the limits, and the unit of what turns.
+        """Check the limits, and the unit of an angle.
 
         Raises:
             ValueError: the first limit is not below the second, or a whole turn is not known in this unit.
@@ -79,19 +79,19 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return math.remainder(one - other, _TURNS[self.unit]) if self.angle else one - other
 
     def moved(self, one: float, other: float) -> float:
-        """Return how far it has moved between two readings: an angle may begin anew after a whole turn."""
+        """Return how far the axis moved between two readings: an angle may begin anew after a whole turn."""
         return abs(math.remainder(one - other, _TURNS.get(self.unit or "none", math.inf)))
 
     def radians(self, position: float) -> float:
-        """Return a position of what turns in rad."""
+        """Return an angle in rad."""
         return position * math.tau / _TURNS[self.unit]
 
     def of_radians(self, angle: float) -> float:
-        """Return the position of what turns, in its unit, for an angle in rad."""
+        """Return an angle, given in rad, in the axis's unit."""
         return angle * _TURNS[self.unit] / math.tau
 
     def near(self, position: float, other: float) -> float:
-        """Return the position, for angles with whole turns added so that it is near another one."""
+        """Return the position; an angle gets whole turns added to be near another one."""
         return other + self.apart(position, other) if self.angle else position
 
 
@@ -194,7 +194,7 @@ class Speed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Way(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Another way to give the device a velocity. What its template does not name stays as it was.
+    """Another operation that commands a velocity. Axes that its template does not name keep their velocity.
 
     Attributes:
         send: the operation.
@@ -271,7 +271,7 @@ class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     within_s: Positive = 2.0
 
     def shown(self, value: Any) -> Any:
-        """Return what is read once a value was sent."""
+        """Return the reading that means a sent value."""
         return self.shows.get(str(value), value)
 
 
@@ -290,7 +290,7 @@ class Stop(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Lease(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a client must hold while it commands the device. Its value is {lease} in templates.
+    """The lease that a client needs to command the device. Its value is {lease} in templates.
 
     Attributes:
         acquire: the operation that gives it.
@@ -334,7 +334,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Failed(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"is_not": "not"}):
-    """How a response of 200 says that its request failed.
+    """The member of a 2xx response that reports a failed request.
 
     Attributes:
         at: where the response says it.

@@ -34,7 +34,7 @@ _PATIENT_S: Final = 30.0
 
 
 class Failure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the body of a 2xx response says that its request failed, or that its message is too old.
+    """The member of a 2xx response that reports a failed request, or a message that is too old.
 
     Attributes:
         at: where.
@@ -68,7 +68,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def within_s(self) -> float:
-        """The time for a response, and for what it stands for, s."""
+        """Return the time limit for a response and its effect, s."""
         return self.timeout_s or _USUAL_S
 
     @property
@@ -179,7 +179,7 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An operation that lists what is on the graph.
+    """An operation that lists names on the graph.
 
     Attributes:
         lists: what.
@@ -247,7 +247,7 @@ class RosMap(_Forms, frozen=True):
 
     @property
     def described(self) -> tuple[str, ...]:
-        """Those of them that a description has: without their queries. OpenAPI has no WebSocket."""
+        """Return the operations in a form that a description has: without queries. OpenAPI has no WebSocket."""
         found = self.operations.items()
         sockets = {call for call, one in found if isinstance(one, Reads) and one.stream == "websocket"}
         return tuple(call.partition("?")[0] for call in self.calls if call not in sockets)
@@ -259,7 +259,7 @@ class RosMap(_Forms, frozen=True):
 
 
 class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The table ``[ros.rosbridge]``: the types of what is used over it, by name."""
+    """The table ``[ros.rosbridge]``: by name, the types of topics, services and actions used over it."""
 
     url: Annotated[str, Meta(pattern=r"^wss?://\S+$")]
     subscribe: dict[Topic, MessageType] = {}
@@ -295,7 +295,7 @@ class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class _Ros(_Forms, frozen=True, forbid_unknown_fields=True):
-    """The table ``[ros]`` as it is written; its operations are of several kinds."""
+    """The table ``[ros]`` as written; its operations are of several kinds."""
 
     operations: dict[str, dict[str, Any]] = {}
     rosbridge: _Rosbridge | None = None

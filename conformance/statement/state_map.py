@@ -56,7 +56,7 @@ class Operation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename=
 
 
 class Change(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What becomes of a state by itself.
+    """A change of state without an operation.
 
     Attributes:
         to: the states that may follow.

@@ -32,7 +32,7 @@ _PROOF: Final = re.compile(
 
 
 def connection_of(where: Endpoints) -> Connection:
-    """Return connection settings with the statement's deadline, credentials and rate limit, logged in if it says how.
+    """Return connection settings with the statement's deadline, credentials and rate limit, logged in if declared.
 
     Raises:
         OSError: a file with a credential cannot be read.
@@ -63,7 +63,7 @@ def connection_of(where: Endpoints) -> Connection:
 
 
 def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
-    """Return endpoints whose API key goes where the description says, unless the user says where.
+    """Return endpoints whose API key goes to the description's place, unless the user names another.
 
     Args:
         where: the endpoints.
@@ -130,7 +130,7 @@ def _logged_in(auth: Auth, base_url: str, connection: Connection) -> Credential:
 
 
 def _keep_parts(content: bytes) -> None:
-    """Mask the parts of a login's request or response that prove who somebody is, by their names: JSON or a form."""
+    """Mask the secret parts of a login's request or response, by their names: JSON or a form."""
     waiting: list[tuple[str, Any]] = [("", read_json(content).value), *parse_qsl(content.decode("utf-8", "replace"))]
     while waiting:
         name, value = waiting.pop()

@@ -40,7 +40,7 @@ def is_wsdl(source: str) -> bool:
 
 
 class Loader:
-    """Loads the description that the user named, and what it refers to: from the user's servers and its own folder.
+    """Loads a description and the files it refers to, from the user's servers and its own folder only.
 
     Args:
         connection: deadline, credentials and TLS.
@@ -80,7 +80,7 @@ def trusting(connection: Connection, *named: str | None) -> Trust:
 
 
 def _trust_in(source: str, connection: Connection, *api: str | None) -> tuple[Trust, tuple[str, ...]]:
-    """Return the servers that get the credentials, and the description's URL if its server is none of them.
+    """Return the servers that get the credentials; and the description's URL, if its server does not get them.
 
     Args:
         source: URL or file of the description.

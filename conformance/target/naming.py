@@ -1,4 +1,4 @@
-"""What ``roaas certify`` judges: the arguments and options as a statement and a contract."""
+"""The target of ``roaas certify``: arguments and options as a statement and a contract."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class DeviceOptions:
 
     @property
     def moves(self) -> bool:
-        """Whether a motion map is found in the run, so that no statement needs to have one."""
+        """Return whether the run finds its motion map by driving, so that the statement needs none."""
         return False
 
     @classmethod
@@ -114,7 +114,7 @@ _NAMES: Final = (
 
 
 def targets_or_roaas_toml(targets: tuple[str, ...], options: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the arguments of a command, or ./roaas.toml if it names no device; say so on stderr."""
+    """Return a command's arguments, or ./roaas.toml if they name no device, which is printed on stderr."""
     if targets or any(options.get(name) for name in _NAMES) or not USUAL_STATEMENT.is_file():
         return targets
     click.echo(f"statement: {USUAL_STATEMENT}", err=True)
@@ -160,7 +160,7 @@ def _no_file(target: str) -> str:
 
 
 def what_is_judged(source: str | None, statement: Path | None, options: DeviceOptions) -> Judged:
-    """Return what a device is judged by.
+    """Return the statement and contract by which a device is judged.
 
     Raises:
         DescriptionError, StatementError, ContractError: one of them cannot be used.
@@ -187,7 +187,7 @@ def what_is_judged(source: str | None, statement: Path | None, options: DeviceOp
 
 
 def _described(source: str, api: Api | None, statement: Path | None, options: DeviceOptions) -> Judged:
-    """Return what a device is judged by that is judged by its own description.
+    """Return the statement and contract of a device that is judged by its own description.
 
     Raises:
         DescriptionError, StatementError, ContractError: one of them cannot be used.
@@ -345,7 +345,7 @@ def _claims(options: DeviceOptions, contract: Contract) -> tuple[str, ...]:
 
 
 def lock_result_folder(out: Path) -> None:
-    """Make the folder for the results and keep other runs out of it, until the command ends.
+    """Make the folder for results, and lock it against other runs until the command ends.
 
     Raises:
         click.UsageError: it cannot take the results.

@@ -1,4 +1,4 @@
-"""Content codings (RFC 9110 8.4.1): the content of a response as it was before the server coded it."""
+"""Content codings (RFC 9110 8.4.1): the content of a response before the server compressed it."""
 
 import zlib
 from typing import Final, NamedTuple
@@ -43,7 +43,7 @@ def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Conten
 
 
 def _unpacked(octets: bytes, bits: int) -> tuple[bytes | None, str]:
-    """Return what was packed, or None if it is too much or none; and what is wrong with it, or an empty text."""
+    """Return decompressed content, or None if it is too large or not compressed; and the error or an empty text."""
     left, found = octets, bytearray()
     for _ in range(_MEMBERS):  # several members of gzip are one content (RFC 1952 2.2)
         if not left:

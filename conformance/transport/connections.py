@@ -47,7 +47,7 @@ _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)  # Linux alone has it
 
 
 class NoConnectionError(OSError):
-    """Raised when no connection can be opened; the message says why."""
+    """Raised when no connection can be opened; the message explains why."""
 
 
 class ClosedError(Exception):
@@ -394,7 +394,7 @@ class ClientCertificate(NamedTuple):
 
 
 def explained(text: str) -> str:
-    """Return the text of an error of TLS, with what the user can do about it where that is known."""
+    """Return a TLS error's text, with the user's remedy if it is known."""
     if any(said in text for said in ("WRONG_VERSION_NUMBER", "RECORD_LAYER_FAILURE", "PACKET_LENGTH_TOO_LONG")):
         return "this port does not speak TLS; is the address http://?"
     if "self-signed certificate" in text or "unable to get local issuer" in text:

@@ -1,4 +1,4 @@
-"""Credentials that requests carry: where each goes, and what findings show in place of its secret.
+"""Credentials of requests: where each is sent, and which variable replaces its secret in findings.
 
 A secret never leaves this module but in a request: ``str()`` and ``repr()`` of a credential show none, and a result has
 the name of a shell variable (``$ROAAS_TOKEN``) where the secret was.
@@ -99,7 +99,7 @@ class Credential:
 
     @property
     def sent(self) -> str:
-        """The secret as it stands in a request."""
+        """Return the secret in the form in which a request carries it."""
         if self.kind is Kind.BASIC:
             return base64.b64encode(self.secret.encode()).decode()
         return quote(self.secret, safe="") if self.kind is Kind.QUERY else _NEARLY[self.near][0](self.secret)
@@ -150,7 +150,7 @@ class Credential:
 
     @property
     def places(self) -> tuple[tuple[str, str], ...]:
-        """Where it goes, as a description names that: header, query or cookie, and its name there."""
+        """Return the credential's places as descriptions name them: header, query or cookie, and its name."""
         if self.kind in {Kind.QUERY, Kind.COOKIE}:
             return ((str(self.kind), self.name),)
         if self.header.lower() == "cookie":
@@ -159,7 +159,7 @@ class Credential:
 
     @cached_property
     def digest(self) -> DigestUser:
-        """The user of a ``digest`` credential, who keeps the device's challenge."""
+        """Return the user of a ``digest`` credential, who keeps the device's challenge."""
         # Imported late: requests takes a twentieth of a second.
         from conformance.transport.digest import DigestUser  # noqa: PLC0415
 
@@ -237,7 +237,7 @@ class Credentials:
         return target + "".join(f"{'&' if '?' in target or number else '?'}{one}" for number, one in enumerate(queries))
 
     def hidden(self, text: str) -> str:
-        """Return a text with variables in place of secrets, for whatever a robot repeats of them."""
+        """Return a text with variables in place of secrets, in whatever form a robot repeats them."""
         if any(item.kind is Kind.DIGEST for item in self.items):
             text = _ANSWER.sub(r"\1$ROAAS_DIGEST", text)
         for item in self.items:
@@ -352,14 +352,14 @@ class UsernameToken:
         return _text(digest), _text(nonce), created
 
     def revealed(self, octets: bytes) -> bytes:
-        """Return a request with a fresh token where hidden() has left variables; its length stays as it was."""
+        """Return a request with a fresh token in place of the variables of hidden(); its length stays the same."""
         for variable, text in zip(_VARIABLES, self.fresh(), strict=True):
             octets = octets.replace(variable, text.encode())
         return octets
 
 
 def hidden(octets: bytes) -> bytes:
-    """Return a request with variables in place of what is fresh in each token."""
+    """Return a request with variables in place of the texts that differ in each token."""
     return _TOKEN.sub(b"".join(b"\\%d%b" % (part, name) for part, name in enumerate(_VARIABLES, 1)), octets, count=1)
 
 

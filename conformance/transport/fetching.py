@@ -1,4 +1,4 @@
-"""Fetch what is not judged: descriptions, and the schemas and files that they refer to.
+"""Fetch files that are not judged: descriptions, and the schemas and files they refer to.
 
 One httpx client, which takes its transport from here: a redirect is a request like any other, and goes to no server
 that the user did not name. Credentials are added in the transport, so that none follows a redirect elsewhere. Proxies
@@ -139,7 +139,7 @@ class Fetcher:
             self._connection.recorder.record(Passage(request, *link, None, problem, heard=Heard.NEVER))
 
     def _hint(self, url: str, status: int) -> str:
-        """Return what a status suggests about the way to the device, or the option for the demanded credentials."""
+        """Return a hint by a status on the way to the device, or on the option for the demanded credentials."""
         if status in {httpx.codes.BAD_GATEWAY, httpx.codes.SERVICE_UNAVAILABLE, httpx.codes.GATEWAY_TIMEOUT}:
             return ": a proxy answers, and the device behind it does not"
         if status not in {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}:
@@ -166,7 +166,7 @@ class _Guard(httpx.BaseTransport):
         self._connection, self._trust, self._public = connection, trust, public
 
     def place(self, url: str) -> tuple[str, Credentials]:
-        """Return the URL as it is sent, and the credentials for its server.
+        """Return the URL to request, and the credentials for its server.
 
         Raises:
             ElsewhereError: the user named no such server.

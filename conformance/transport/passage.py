@@ -1,4 +1,4 @@
-"""Base of what records a run as it happens: each request over a connection, and observations beside it.
+"""Base class of recorders: of requests over connections, and of observations beside them.
 
 Every client calls the recorder of its connection settings, which copies of these settings share: those of concurrent
 clients, of the stop at the end, and of raw sockets. So nothing that is sent is hidden from the history.
@@ -75,7 +75,7 @@ class Recorder:
         """Record that a response was none of the device's to this request: a gateway's, or the challenge before it."""
 
     def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
-        """Record what an eye saw, and when, by its own reading of the machine's monotonic clock, s."""
+        """Record an eye's observation and its time by the machine's monotonic clock, s."""
 
     def eye(self, eye: str, state: EyeState) -> None:
         """Record that an eye sees from now on, or does no longer."""

@@ -1,4 +1,4 @@
-"""What a description may reach: the servers that the user named, and the files of its own folder.
+"""What a description may reach: the user's servers, and files in its own folder.
 
 A description decides neither where credentials go nor what is read. Names are compared, not addresses: 127.0.0.1 and
 localhost are two servers. A request to a named server always goes to the name as the user wrote it.
@@ -29,7 +29,7 @@ class ElsewhereError(ValueError):
 
 
 class UnreachableError(Exception):
-    """Raised when the server of a description does not respond; the message says why."""
+    """Raised when a description's server does not respond; the message explains why."""
 
 
 class Origin(NamedTuple):

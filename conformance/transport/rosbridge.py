@@ -61,7 +61,7 @@ class BridgeClient(HttpClient):
         authorized: bool = True,  # noqa: ARG002 - the handshake has the credentials
         timeout_s: float | None = None,
     ) -> Exchange:
-        """Send an operation, and return what came of it; its status is the suite's own.
+        """Send an operation, and return its outcome as an exchange; the suite makes up the status.
 
         Raises:
             NoAnswerError: there is no connection, or no response.
@@ -121,7 +121,7 @@ class BridgeClient(HttpClient):
         return (status, last["_octets"]) if last else (None, b"")
 
     def _told(self, link: Stream, refused: HTTPStatus, within_s: float = 0.0) -> tuple[HTTPStatus | None, bytes]:
-        """Return whether what was sent last was refused, by a status message of the level "error".
+        """Return whether the last message was refused, by a status message of the level "error".
 
         With a time, s, it has to be known; without, silence tells that it was not.
         """
@@ -141,7 +141,7 @@ class BridgeClient(HttpClient):
         link.send(json.dumps(message))
 
     def _until(self, link: Stream, ends: Callable[[dict[str, Any]], bool], within_s: float) -> list[dict[str, Any]]:
-        """Return the messages that come until one of them ends the wait; note what they say of goals."""
+        """Return messages until one of them ends the wait; record the states of goals in them."""
         until, found = time.monotonic() + within_s, list[dict[str, Any]]()
         while True:
             for message in link.heard(1, max(0.0, until - time.monotonic())):

@@ -1,4 +1,4 @@
-"""Shell commands that send a request again: curl, or Python where curl cannot send it as it was.
+"""Shell commands that send a request again: curl, or Python where curl would change it.
 
 A command is one line, so that it survives terminals, tables and pages. Variables of credentials (``$ROAAS_TOKEN``) are
 expanded wherever they stand, in base64 too.
@@ -90,7 +90,7 @@ def bytes_command(url: str, octets: bytes) -> str:
 
 
 def _curl_can(method: str, url: str, headers: Sequence[tuple[str, str]], body: bytes) -> bool:
-    """Return whether curl sends a request as it was."""
+    """Return whether curl sends a request unchanged."""
     names = [name.lower() for name, _ in headers]
     return (
         bool(_NAME.fullmatch(method) and _TARGET.fullmatch(url))

@@ -92,12 +92,12 @@ class Stream:
         threading.Thread(target=self._listen, name="stream", daemon=True).start()
 
     def send(self, text: str) -> None:
-        """Send a message over a WebSocket. Never raises: that the stream has ended, `ended` says."""
+        """Send a message over a WebSocket. Never raises: the attribute `ended` tells that the stream is over."""
         with suppress(Exception):
             self._send(text)
 
     def heard(self, count: int = 0, within_s: float = 0.0) -> list[Message]:
-        """Return what came since the last call; wait until so much has come, or nothing comes any more."""
+        """Return messages since the last call; wait for ``count`` of them, or until no more can come."""
         with self._news:
             self._news.wait_for(lambda: len(self._came) >= count or self.ended, within_s)
             return [self._came.popleft() for _ in range(len(self._came))]

@@ -36,7 +36,7 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Accepted(NamedTuple):
-    """What a baseline does to a run.
+    """The effects of a baseline on a run.
 
     Attributes:
         until: last day on which it accepts all failures; empty if it does not accept all.
@@ -101,7 +101,7 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
 
 
 def stale_entries(verdicts: Iterable[Verdict], baseline: Iterable[Expectation]) -> tuple[str, ...]:
-    """Return the ids of baseline entries whose requirement passes although they say that it always fails."""
+    """Return the ids of baseline entries whose requirement passes although the entry expects a failure."""
     passed = {verdict.requirement.id for verdict in verdicts if verdict.value is Value.PASS}
     return tuple(entry.requirement for entry in baseline if entry.requirement in passed and not entry.intermittent)
 

@@ -34,7 +34,7 @@ _FEW = 5
 
 @dataclass(frozen=True)
 class Cause:
-    """A finding, with the requirements that are not tested because of it.
+    """A finding, and the requirements that could not be tested because of it.
 
     Attributes:
         finding: the finding that is reported.
@@ -129,7 +129,7 @@ def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
 
 
 def _kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
-    """Return the findings that stay with a requirement, because no other one has their cause."""
+    """Return the findings that stay with a requirement, because no other finding has their cause."""
     return {
         key: finding
         for key, finding in evidence.findings.items()

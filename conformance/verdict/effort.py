@@ -151,7 +151,7 @@ class Effort:
         return _spaced(items, count if self.slow else len(items))
 
     def alternatives(self, items: Sequence[_Item], count: int) -> list[_Item]:
-        """Return values of one kind: as subsample(), and at quick effort every other one."""
+        """Return values of one kind: as subsample(), and at quick effort every second one."""
         return _spaced(items, count if self.slow else max(count, math.ceil(len(items) * _KEPT.get(self.name, 1.0))))
 
     def draw(self, items: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
@@ -163,7 +163,7 @@ class Effort:
         return [items[index] for index in sorted(chooser.sample(range(len(items)), count))]
 
     def draw_first(self, items: Sequence[_Item], others: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
-        """Return what draw() returns of the items, filled up with some of the others if these are fewer."""
+        """Return draw() of the items, filled up with others if there are too few."""
         chosen = self.draw(items, standard, seed)
         left = self.cases(standard) - len(chosen)
         chooser = random.Random(zlib.crc32(seed.encode()))  # noqa: S311 - no secret

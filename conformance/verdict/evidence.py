@@ -401,7 +401,7 @@ class Judge:
 
     @property
     def faults(self) -> dict[str, list[str]]:
-        """Return each error of the suite with what it kept from being judged, and the requirements concerned."""
+        """Return each suite error with what could not be judged because of it, and the requirements concerned."""
         found = self._faults.items()
         return {f"{listed(list(met), _NAMED)}: not judged: {error}": sorted(ids) for error, (met, ids) in found}
 
@@ -410,7 +410,7 @@ class Judge:
         self._say(requirement, remark, lambda evidence: evidence.notes)
 
     def not_seen(self, requirement: str, reason: str) -> None:
-        """Record what the device's state kept it from showing; if nothing else is judged, that is the verdict."""
+        """Record what the device's state did not allow to test; if nothing else is judged, that is the verdict."""
         self._say(requirement, reason, lambda evidence: evidence.unseen)
 
     def unclaimed(self, requirement: str, reason: str) -> None:
@@ -442,7 +442,7 @@ class Judge:
         }
 
     def cases(self, requirement: str) -> int:
-        """Return the number of cases of a requirement or a part of it; 0 if the contract does not have it."""
+        """Return the number of cases of a requirement or a part of it; 0 if the contract lacks it."""
         evidence = self.of(requirement)
         if evidence is None:
             return 0
@@ -460,7 +460,7 @@ class Judge:
 
 
 def occasion_of(attempt: Attempt) -> str:
-    """Return how a request was made: "PUT XML", "SOAP"; without a body the format is that of the response."""
+    """Return the form of a request: "PUT XML", "SOAP"; without a body, by the response's format."""
     request = attempt.request
     if request.raw is not None:
         return "raw bytes"
@@ -481,7 +481,7 @@ def _occasion(method: str, media_type: str) -> str:
 
 
 def _likeness(kind: CauseKind, exchange: Attempt | None) -> str:
-    """Return what two failures of the same cause have in common, if the check named no cause.
+    """Return the common part of two failures with the same cause, if the check named no cause.
 
     A server error is known by its method and what its response says: one fault behind many paths is one finding.
     """
@@ -496,7 +496,7 @@ _SHOWN: Final = 100
 
 
 class CheckerListener(Listener):
-    """Calls checkers with every exchange. What they judge holds for every response, errors included.
+    """Calls checkers with every exchange, whichever check sent it, errors included.
 
     Args:
         judge: records their cases.

@@ -1,4 +1,4 @@
-"""Findings and their text: what the suite did, what it expected by which rule, and what it got."""
+"""Findings and their text: the suite's request, the expected and the actual response, and the rule."""
 
 import re
 from collections.abc import Sequence
@@ -124,7 +124,7 @@ class Finding:
 
     @property
     def text(self) -> str:
-        """Return the finding as text: what the suite did, what it expected, what it got, and how often."""
+        """Return the finding as text: request, expected, actual, and how often."""
         rule = ", ".join(filter(None, (self.requirement, self.source)))
         did = f"Sent {_described(self.exchange.request)}." if self.exchange else f"Tested {self.subject}."
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
@@ -182,7 +182,7 @@ def kind_of(exchange: Attempt | None, found: str = "") -> CauseKind:
 
 
 def likeness(exchange: Exchange) -> str:
-    """Return what responses of one fault have in common: status, media type, text without numbers and path."""
+    """Return the common part of responses with the same fault: status, media type, text without numbers and path."""
     response, path = exchange.response, exchange.request.target.partition("?")[0]
     said = response.body[:_SHOWN_BODY].decode("latin-1")
     said = said.replace(path, "#") if len(path) > 1 else said
@@ -206,7 +206,7 @@ def causes_of(kind: CauseKind, exchange: Attempt | None) -> set[str]:
 
 
 def subject_of(exchange: Attempt | None, check_name: str) -> str:
-    """Return what was tested: method and target of the request, or the check's name if none was sent."""
+    """Return the tested thing: method and target of the request, or the check's name if none was sent."""
     if exchange is None:
         return f"by the check {check_name}" if check_name else "the robot"
     request = exchange.request
@@ -214,7 +214,7 @@ def subject_of(exchange: Attempt | None, check_name: str) -> str:
 
 
 def observed_in(exchange: Attempt | None, found: str) -> str:
-    """Return a description of the response, with what a check found in it."""
+    """Return a description of the response, with the fault that a check found in it."""
     if exchange is None:
         return found or "something else"
     if isinstance(exchange, Unanswered):

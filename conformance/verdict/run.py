@@ -154,7 +154,7 @@ class Run:
 
     @property
     def scored(self) -> frozenset[str] | None:
-        """The requirements that count: those of the frozen set, some of them by an alias; None: all."""
+        """Return the requirements that count: those of the frozen set, some by an alias; None: all."""
         if self.requirement_set is None:
             return None
         frozen, ledger = self.requirement_set.requirements.keys(), self.contract.ledger.values()

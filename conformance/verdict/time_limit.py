@@ -1,4 +1,4 @@
-"""The time limit of a run (``--minutes``): what is sent within it, and what was left out."""
+"""The time limit of a run (``--minutes``): requests within it, and requests left out."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class TimeLimit:
         self._began, self._lifted = time.monotonic(), False
 
     def end(self) -> None:
-        """Allow requests again: the run's last ones stop the device, and repeat what failed."""
+        """Allow requests again: the last ones stop the device and repeat failures."""
         self._lifted = True
 
     @property

@@ -49,7 +49,7 @@ class Overall(StrEnum):
 
 
 class View(StrEnum):
-    """What observed a class: the web services alone, or ROS too."""
+    """How a class was observed: by the web services alone, or by ROS too."""
 
     BLACK_BOX = "black box"  # observed through the web services only
     ON_ROS = "seen on ROS"  # also observed by a ROS probe
@@ -181,7 +181,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
 
 
 def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str, View]:
-    """Return what observed each claimed class that a ROS probe could judge further.
+    """Return how each class was observed that a ROS probe could judge further.
 
     Args:
         verdicts: of the run.
@@ -202,7 +202,7 @@ def views(verdicts: Iterable[Verdict], acting: Container[str] = ()) -> dict[str,
 
 
 def is_unjudged(verdict: Verdict) -> bool:
-    """Return whether a requirement was not judged whose class is inconclusive without it."""
+    """Return whether a requirement was not judged, and its class is inconclusive without it."""
     return verdict.value is Value.SKIP and not verdict.evidence.is_unseen and holds_back(verdict.requirement)
 
 

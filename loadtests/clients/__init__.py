@@ -1,1 +1,1 @@
-"""What sends requests: the wire client, the library clients, and the requests themselves."""
+"""Clients that send requests: the wire client, the library clients, and the requests themselves."""

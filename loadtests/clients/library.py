@@ -33,7 +33,7 @@ TOO_LONG: Final = f"the response is longer than {_MOST} bytes"
 
 
 class _Limited(io.RawIOBase):
-    """What a server sends for one response, as long as it is within the limit."""
+    """A response's content, read up to the limit."""
 
     def __init__(self, whole: Any) -> None:
         self._raw = whole.detach()
@@ -167,7 +167,7 @@ def new_session(robot: Robot, sent: Sent | None = None) -> requests.Session:
 
 
 def request_error(error: requests.RequestException, where: str, timeout_s: float) -> CallError:  # noqa: PLR0911 - one for each kind
-    """Return a CallError, with one of its kinds, for an exception of `requests`."""
+    """Return a CallError with its kind for an exception of `requests`."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, OSError) and not isinstance(cause, requests.RequestException):
@@ -212,7 +212,7 @@ class _TimedTransport(Transport):
 
 
 class _Documents(Transport):
-    """zeep's transport for a WSDL and what it refers to, which are read from the robot's servers alone."""
+    """zeep's transport for a WSDL and the documents it refers to, read from the robot's servers only."""
 
     def __init__(self, load: Callable[[str], bytes]) -> None:
         super().__init__()  # type: ignore[no-untyped-call]  # as above

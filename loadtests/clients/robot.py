@@ -75,7 +75,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Secrets:
-    """What a robot's requests prove who sends them with: the bearer token, other credentials, WS-Security's user.
+    """Credentials of a robot's requests: the bearer token, others, and WS-Security's user.
 
     Attributes:
         trust: the servers to which they may go; None: to those of the robot.
@@ -171,7 +171,7 @@ class Robot:
 
     @cached_property
     def digest(self) -> Credentials | None:
-        """Return what answers the robot's challenges, for all connections; None without digest authentication."""
+        """Return the user for the robot's digest challenges, shared by all connections; None without digest."""
         found = tuple(item for item in self.credentials if item.kind is Kind.DIGEST)
         return Credentials(found) if found else None
 
@@ -246,7 +246,7 @@ def as_http(address: str) -> str:
 
 
 def without_secrets(robot: Robot) -> Robot:
-    """Return a robot as it is sent to workers, each of which has secrets of its own."""
+    """Return a robot as workers get it: without secrets, because each worker has its own."""
     user = robot.username_token and replace(robot.username_token, password="")
     return replace(robot, token=None, credentials=(), username_token=user)
 

@@ -258,7 +258,7 @@ class Bridge:
             yield from waiting
 
     def _fail(self, failure: CallError) -> None:
-        """Fail all waiting requests: a status or message without an id could concern any of them."""
+        """Fail all waiting requests, because a message without an id may belong to any of them."""
         for waiter in list(self._waiters()):
             waiter.set_exception(failure)
 

@@ -34,7 +34,7 @@ class ScenarioError(Exception):
 
 
 class Route(NamedTuple):
-    """An operation: its number in the plan, what its paths look like, and its good responses."""
+    """An operation: its number in the plan, the form of its paths, and its good responses."""
 
     number: int
     operation: Described
@@ -107,7 +107,7 @@ class Record(Protocol):
     busy: int
 
     def turn(self) -> None:
-        """Wait until the next request may start, if a limit on the rate says so."""
+        """Wait until the next request may start, if the rate is limited."""
 
     def segment_at(self, moment_ns: int) -> int | None:
         """Return the number of the segment at a moment; None outside the plan, where nothing is recorded."""
@@ -169,7 +169,7 @@ class ResponseContext(Response):
         self._sent = sent
 
     def success(self) -> None:
-        """Count it as a success, whatever the description says."""
+        """Count the request as a success, whatever the description says."""
         self.error = None
 
     def failure(self, reason: object) -> None:

@@ -37,7 +37,7 @@ now_ns = time.monotonic_ns  # CLOCK_MONOTONIC, the clock of timerfd
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request as bytes, and its good responses: the bytes that their bodies contain, or what is declared."""
+    """A request as bytes, and its good responses: bytes that bodies must contain, or declared responses."""
 
     octets: bytes
     expects: bytes | Declared | Reply = b""
@@ -264,7 +264,7 @@ class Connection:
     # What llhttp calls.
 
     def on_message_begin(self) -> None:
-        """Note what follows a complete response: it must not be taken for a part of it, or for the next one."""
+        """Mark that another message follows a complete response: it belongs neither to it nor to the next request."""
         self._excess = self._complete
 
     def on_header(self, name: bytes, value: bytes) -> None:

@@ -22,7 +22,7 @@ def trust_of(robot: Robot) -> Trust:
 
 
 def loader(location: str, robot: Robot) -> Callable[[str], bytes]:
-    """Return a function that reads a WSDL, and what it refers to: on the robot's servers, or in the WSDL's folder.
+    """Return a function that reads a WSDL and its imports, from the robot's servers or the WSDL's folder.
 
     The function raises WsdlError if there is no such document, or it is elsewhere, and CallError if its server does not
     respond.
@@ -120,7 +120,7 @@ def _with_addresses(robot: Robot, remarks: list[str]) -> Robot:
 
 
 def _followed(declared: str, location: str, trust: Trust) -> str:
-    """Return the address as it is used: a WSDL from a server names no other server, unless that is trusted."""
+    """Return the address to use: a WSDL from a server may name another server only if that is trusted."""
     if trust.trusts(declared):
         return trust.place(declared)
     return moved(declared, declared, server_of(trust.place(location))) if "://" in location else declared

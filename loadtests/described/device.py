@@ -1,4 +1,4 @@
-"""A device with a description: what it is called by, what may be called, and with which credentials."""
+"""A device with a description: its address, the operations that may be called, and the credentials."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -63,7 +63,7 @@ def secrets_of(options: Mapping[str, str | None]) -> Secrets:
 
 @dataclass(frozen=True)
 class Named:
-    """What a command names.
+    """The arguments and options of a command that name a device.
 
     Attributes:
         source: URL or file of the description; None for the paper's robot.
@@ -77,13 +77,13 @@ class Named:
 
     @property
     def shown(self) -> str:
-        """What the result calls the descriptions: URLs, or the names of files."""
+        """Return the descriptions as the result names them: URLs, or names of files."""
         sources = filter(None, (self.source, self.wsdl))
         return " and ".join(one if is_url(one) else Path(one).name for one in sources)
 
     @classmethod
     def of(cls, targets: tuple[str, ...], options: Mapping[str, Any]) -> Self:
-        """Return what the arguments and options of a command name.
+        """Return the device that a command's arguments and options name.
 
         Raises:
             SettingsError: two descriptions of one kind or two statements are named.
@@ -153,7 +153,7 @@ class Device:
 
     @classmethod
     def _opened(cls, run: Run, connection: Connection, remarks: tuple[str, ...]) -> Self:
-        """Return a device while the folder of its contract is there."""
+        """Return a device while its contract's folder exists."""
         # xmlschema and lxml take a third of a second, which the paper's robot need not pay.
         from conformance.scenarios.described_messages import DescribedMessages  # noqa: PLC0415
 
@@ -190,7 +190,7 @@ class Device:
             raise CallError("refused", str(error)) from None
 
     def name_of(self, operation: Operation) -> str:
-        """Return what the result calls an operation: method and path, or the name of a WSDL's if one port has it."""
+        """Return an operation's name in the result: method and path, or a WSDL operation's name if it is unique."""
         if self.messages is None or sum(each.id == operation.id for each in operations_of(self.contract)) > 1:
             return operation.label
         return operation.id
@@ -203,7 +203,7 @@ class Device:
         )
 
     def half(self, name: str) -> str:
-        """Return this device's operation of a pair in the statement's [load.pairs]; any other name as it is."""
+        """Return this device's operation of a pair in [load.pairs]; any other name unchanged."""
         pair = self.statement.load.pairs.get(name)
         return name if pair is None else pair.rest if self.messages is None else pair.soap
 

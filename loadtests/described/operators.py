@@ -241,7 +241,7 @@ class Stopping:
 
     @classmethod
     def of_papers_robot(cls, robot: Robot) -> Self:
-        """Return what stops a robot with the paper's interface: its goal is cancelled, and it gets velocity 0."""
+        """Return the stop of a robot with the paper's interface: its goal is cancelled, and velocity 0 sent."""
         contract = Contract.load()
         statement = empty_statement(contract)
         endpoints = msgspec.structs.replace(statement.endpoints, rest=robot.rest)

@@ -1,4 +1,4 @@
-"""What a run measures: operations of one description, or pairs of operations of an OpenAPI description and a WSDL."""
+"""The operations that a run measures: of one description, or pairs of an OpenAPI description and a WSDL."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ _ALONE = "to measure one interface alone, add --interface rest or --interface so
 
 @dataclass(frozen=True)
 class Choice:
-    """What to measure.
+    """The operations to measure.
 
     Attributes:
         devices: the device by each of its descriptions.
@@ -43,7 +43,7 @@ class Choice:
 
     @classmethod
     def of(cls, devices: tuple[Device, ...], named: Iterable[str]) -> Self:
-        """Return what the options name, or else the statement; of two descriptions, pairs.
+        """Return the operations that the options name, or else the statement; with two descriptions, pairs.
 
         Raises:
             SettingsError: a name means nothing, an operation may not be called, or the statement has no pair.
@@ -135,7 +135,7 @@ class Choice:
 
 
 def _only(device: Device, name: str) -> Operation:
-    """Return the one operation that a pair names for a device.
+    """Return the operation that a pair names for a device.
 
     Raises:
         SettingsError: it names none or several, or it may not be called.
@@ -162,7 +162,7 @@ def streams_to_hear(device: Device, options: Mapping[str, Any]) -> Streams:
 
 
 def _streams_of(device: Device, names: Iterable[str]) -> tuple[Stream, ...]:
-    """Return what --stream names: URLs of WebSockets, with a topic those of a rosbridge; and operations."""
+    """Return the streams of --stream: WebSocket URLs, topics of a rosbridge, and operations."""
     found = []
     for name in names:
         if name.startswith(("ws://", "wss://")):

@@ -146,7 +146,7 @@ def _described_of(device: Device, operations: Collection[Operation]) -> tuple[De
 
 
 def _listing(device: Device, operations: Collection[Operation]) -> list[Operation]:
-    """Return the operations that may list what others have in their paths: GET of the path before a parameter."""
+    """Return operations that may list values for others' paths: GET of the path before a parameter."""
     before = {
         each.template.split(f"{{{item.name}}}", 1)[0].rstrip("/")
         for each in operations

@@ -158,7 +158,7 @@ class Described:
 
     @property
     def stopping(self) -> tuple[Stopping, ...]:
-        """What stops each device, if the run calls what may change something."""
+        """Return the stops of each device, if the run calls operations that may change something."""
         return self._stopping
 
 

@@ -54,11 +54,11 @@ class Run:
 
     @property
     def _promise(self) -> str:
-        """Return what says how the robot responds."""
+        """Return the sentence on how the robot responds."""
         return "the contract" if self.settings.description is None else "its description"
 
     def interrupt(self) -> None:
-        """End the run on a signal, or when its parent process ends, and keep what was measured."""
+        """End the run on a signal, or when its parent process ends, and keep the measurements."""
         self.outcome.interrupted = True
 
     # Before the measurement.
@@ -113,7 +113,7 @@ class Run:
             self.plan = replace(self.plan, least_block_s=SHORT_BLOCK_S)
 
     def _reach(self) -> None:
-        """Open a connection to the robot: what else to send, the scenario alone knows.
+        """Open a connection to the robot; only the scenario knows which requests to send.
 
         Raises:
             RunAborted: nothing listens there.
@@ -195,7 +195,7 @@ class Run:
         return self.outcome.interrupted or self.outcome.dead_at is not None or faults
 
     def _repeat(self, plan: Plan, executor: Executor) -> Plan:
-        """Carry out the comparison as often as the settings say; return the last plan."""
+        """Carry out the comparison for each repeat; return the last plan."""
         repeats = self.settings.repeats
         for number in range(repeats.number):
             if number:
@@ -247,7 +247,7 @@ def _begin(run: Run) -> Path | None:
 
 
 def _complain(run: Run, message: str) -> None:
-    """Say what went wrong, also where progress is not wanted."""
+    """Print an error, even if progress is switched off."""
     run.progress.end()
     sys.stderr.write(f"roaas load: {message}\n")
     sys.stderr.flush()

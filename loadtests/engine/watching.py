@@ -1,4 +1,4 @@
-"""What happens while a plan is carried out: progress on standard error, and what ends the run before its time."""
+"""Watch a plan: print progress on standard error, and end the run early if needed."""
 
 import math
 import os
@@ -24,7 +24,7 @@ _LOOKS_S = 0.2
 
 
 def tell_plan(plan: Plan, pacing: str, tell: Callable[[str], None]) -> None:
-    """Say what will be measured, and how."""
+    """Print what will be measured, and how."""
     load = f"{plan.load.rate:g} requests/s" if plan.open_model else f"{plan.load.users} users"
     if plan.load.stages:
         load = f"{len(plan.load.stages)} stages of up to {load}"
@@ -86,7 +86,7 @@ _QUANTILES = (("p50", 0.5), ("p90", 0.9), ("p95", 0.95), ("p99", 0.99))
 
 
 class Progress:
-    """Says what happens.
+    """Prints the progress of a run.
 
     Args:
         mode: `auto` renews one line on a terminal and writes few lines elsewhere; `lines` writes one a second; `none`
@@ -108,7 +108,7 @@ class Progress:
             sys.stderr.flush()
 
     def look(self, recorder: Recorder, elapsed_s: float, length_s: float) -> None:
-        """Say how far the run is, and its figures so far, if the next line is due."""
+        """Print how far the run is, and its figures so far, if the next line is due."""
         now = time.monotonic()
         if self._silent or now < self._due:
             return

@@ -1,1 +1,1 @@
-"""What carries a run out: users, executors on this machine and on others, preflight and environment."""
+"""Carry out a run: users, executors on this machine and others, preflight and environment."""

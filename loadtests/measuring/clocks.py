@@ -1,4 +1,4 @@
-"""What clocks differ by: the robot's by its HTTP responses, workers' by messages over their channel to the master.
+"""Differences of clocks: the robot's by its HTTP responses, workers' by messages to the master.
 
 An exchange gives the offset as in NTP (RFC 5905, section 8), with one time of the worker instead of two, because the
 worker responds at once: the worker's clock minus the middle between sending and receiving. Of several exchanges the one
@@ -196,7 +196,7 @@ class RobotClock:
         self.low_s = max(self.low_s, stamp.seconds - stamp.digit_s - received_s)
 
     def told(self, stamp: Stamp, sent_s: float, received_s: float) -> None:
-        """Take the time at which the robot made a response, as the response tells it."""
+        """Record the time in a response at which the robot made it."""
         self.data(stamp, received_s)
         self.high_s = min(self.high_s, stamp.seconds + stamp.digit_s - sent_s)
 

@@ -64,7 +64,7 @@ class Findings:
 
 
 def preflight(robot: Robot, names: list[SeriesName], seed: int) -> Findings:
-    """Call each series once, and compare what the interfaces send and receive."""
+    """Call each series once, and compare the interfaces' requests and responses."""
     findings = Findings()
     answers: dict[tuple[str, str], Answer] = {}
     for name in names:

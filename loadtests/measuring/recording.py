@@ -1,4 +1,4 @@
-"""What each process records while it carries out a plan: requests, failures, and its own processor time."""
+"""Records of each process during a plan: requests, failures, and its own processor time."""
 
 import gc
 import time
@@ -19,7 +19,7 @@ AFTER_ERROR_S = 0.02  # closed model: users of a dead robot would spin on refuse
 
 
 class LocustFeed:
-    """Adds our requests to the statistics of a Locust environment, so that its web UI shows what our histograms hold.
+    """Copies our requests into a Locust environment's statistics, for its web UI.
 
     Locust itself rounds to milliseconds, and its request event costs some 8 us. Here whole buffers of successful
     requests go in at once, with the histogram's microseconds as keys. Failures, which are rare, go through the event,

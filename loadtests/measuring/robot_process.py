@@ -1,4 +1,4 @@
-"""What the figures depend on besides the robot; and the robot's process, if it is on this machine.
+"""Conditions of a measurement besides the robot; and the robot's process, if it is on this machine.
 
 The process has a command line and processor time, and can be restarted. Other processes of the robot, such as a
 simulation behind its web services, are not included.
@@ -148,7 +148,7 @@ def _run(command: str) -> None:
 
 
 def _until_ready(look: Callable[[], Findings], stopped: Callable[[], bool]) -> None:
-    """Repeat the calls before a run until all of them succeed, or `stopped` returns True."""
+    """Repeat the calls before a run until all succeed, or `stopped` returns True."""
     deadline = time.monotonic() + _READY_S
     while True:
         findings = look()

@@ -191,7 +191,7 @@ class ScenarioSession(Recording):
         return self.first + bisect_right(self._starts, at) - 1
 
     def turn(self) -> None:
-        """Wait until the next request may start, if a limit on the rate says so."""
+        """Wait until the next request may start, if the rate is limited."""
         if not self._interval_ns:
             return
         now = now_ns()

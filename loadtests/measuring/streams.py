@@ -41,7 +41,7 @@ _POLLS = 20.0
 
 @dataclass
 class Heard:
-    """What arrived over one stream, or by polling one operation.
+    """Messages of one stream, or responses of one polled operation.
 
     Attributes:
         kind: `sse`, `websocket`, `rosbridge` or `polling`.
@@ -86,7 +86,7 @@ def hear(robot: Robot, settings: Settings, stopped: Callable[[], bool], tell: Ca
 def listen(
     robot: Robot, wanted: Streams, polled: str | None, seconds: float, rate: float | None, stopped: Callable[[], bool]
 ) -> list[Heard]:
-    """Listen to all streams at once, and poll an operation meanwhile; never raises for what the robot does.
+    """Listen to all streams at once, and poll an operation meanwhile; never raises for the robot's faults.
 
     Args:
         robot: addresses and credentials.
@@ -239,7 +239,7 @@ class _Messages:
         self._pieces: list[bytes] = []
 
     def receive(self, event: object) -> None:
-        """Take what the protocol has received: subscribe once it is open, then collect messages."""
+        """Handle the protocol's events: subscribe once it is open, then collect messages."""
         if isinstance(event, Response) and self._topic:
             subscribe = {"op": "subscribe", "id": "roaas", "topic": self._topic}
             self._protocol.send_text(msgspec.json.encode(subscribe))

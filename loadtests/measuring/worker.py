@@ -46,7 +46,7 @@ _LOOK_S = 0.5
 
 
 class LeftBehind:
-    """The reports of a worker, kept so that the worker can write them to a file if the master dies."""
+    """A worker's reports, kept to be written to a file if the master dies."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -100,7 +100,7 @@ class LeftBehind:
 
 
 class _Told(msgspec.Struct, frozen=True):
-    """What a master on this machine writes to the standard input of its workers."""
+    """The message of a master on this machine to its workers' standard input."""
 
     secrets: tuple[Secrets, ...] = ()
     folder: str = "."

@@ -263,7 +263,7 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
 
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:
-    """Return the `streams`: what came over each stream, and by polling beside them."""
+    """Return the `streams` of the result: each stream's messages, and the polled responses beside them."""
     here, found = same_machine(outcome.robots[0]), []
     for one in outcome.heard:
         offset = None if one.clock is None else SHARED if here else one.clock.offset

@@ -24,7 +24,7 @@ _US_PER_MS = 1000.0
 
 
 def write(folder: Path, result: dict[str, Any]) -> Path:
-    """Write everything into a folder, which is made if need be; returns latency.json's path."""
+    """Write all files into a folder, created if needed; return latency.json's path."""
     folder.mkdir(parents=True, exist_ok=True)
     taken: Counter[str] = Counter()
     for series in result["series"]:
@@ -53,7 +53,7 @@ def with_unstopped(result: CommandResult, why: str) -> CommandResult:
 
 
 def with_operators(result: CommandResult, found: dict[str, Any], code: int) -> CommandResult:
-    """Write into latency.json what stops did beside other operators; the code counts where the run itself passed."""
+    """Write the stops beside other operators into latency.json; their exit code counts if the run itself passed."""
     if result.file is None:
         return result
     document = json.loads(result.file.read_text(encoding="utf-8"))
@@ -97,7 +97,7 @@ _PATTERN = "20*.json"
 
 
 class BaselineError(ValueError):
-    """Raised for an unusable baseline; the message says what to do."""
+    """Raised for an unusable baseline; the message names the remedy."""
 
 
 def folder_of(baselines: Path, name: str) -> Path:

@@ -1,4 +1,4 @@
-"""The results of a run, collected while it runs; latency.json is made from them. It loads Locust; `files` does not."""
+"""Results of a run, collected during it, from which latency.json is made. Loads Locust; `files` does not."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,7 +25,7 @@ class RunAborted(Exception):  # noqa: N818 -- an outcome, with its exit code
 
 @dataclass
 class Carried:
-    """A plan, and how many seconds of it were carried out."""
+    """A plan, and for how many seconds it was carried out."""
 
     plan: Plan
     elapsed_s: float = 0.0

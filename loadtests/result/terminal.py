@@ -56,7 +56,7 @@ def summary(document: dict[str, Any]) -> str:
 
 
 def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any]) -> list[str]:
-    """Return what became of the requests as a table."""
+    """Return the numbers of requests by their outcome, as a table."""
     offered, achieved, seconds = counts["asked_rate"], counts["achieved_rate"] or 0.0, counts["seconds"]
     kinds = ", ".join(f"{number:,} {kind}" for kind, number in counts["failed"].items())
     asked = f"{offered:,.1f}/s for {seconds:.1f} s" if offered else "by users that wait"
@@ -79,7 +79,7 @@ def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any]) -> list[str]:
 
 
 def _stages(stages: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what each stage of a changing load showed."""
+    """Return each stage of a changing load with its figures."""
     lines = []
     for each in stages:
         times = ", ".join(
@@ -128,7 +128,7 @@ def _knees(document: dict[str, Any]) -> list[str]:
 
 
 def _against(compared: dict[str, Any] | None) -> list[str]:
-    """Return what the comparison with another robot found, a line for each judged figure."""
+    """Return the comparison with another robot, one line for each judged figure."""
     if compared is None:
         return []
     lines = []

@@ -68,7 +68,7 @@ class Pacer:
         return len(self._idle)
 
     def start(self, schedule: Schedule, origin_ns: int, *, open_model: bool, interval_ns: int = 0) -> None:
-        """Begin a schedule, whose offsets count from `origin_ns` (monotonic); the one before it must be over.
+        """Begin a schedule with offsets from `origin_ns` (monotonic); the earlier schedule must be over.
 
         In the closed model `interval_ns` is the least time between two starts: a ceiling on the rate.
         """

@@ -1,4 +1,4 @@
-"""What a run does when: segments of one client on one interface, a schedule that the seed fixes.
+"""The plan of a run: segments, each of one client on one interface, in an order fixed by the seed.
 
 A fair comparison: REST and SOAP take turns in short blocks, in quartets REST-SOAP-SOAP-REST or the reverse at random.
 The machine's speed drifts within a second: the sooner one follows the other, the more they share of it. But a block has
@@ -227,11 +227,11 @@ class Plan:
         )
 
     def again(self) -> Self:
-        """Return the next repeat, after this one, with its random order drawn anew."""
+        """Return the next repeat, with a new random order."""
         return replace(self._after(), repeat=self.repeat + 1)
 
     def more(self) -> Self:
-        """Return the next part of the same repeat, without a warm-up, with its random order drawn anew."""
+        """Return the next part of the same repeat, without a warm-up, with a new random order."""
         return replace(self._after(), part=self.part + 1, load=replace(self.load, warmup_s=0.0))
 
     def _after(self) -> Self:
@@ -283,7 +283,7 @@ class Plan:
         return placed
 
     def _round(self, number: int, *, swapped: bool) -> list[Segment]:
-        """Return the blocks of all sides in order and then in reverse: four blocks of two sides, six of three.
+        """Return a round's blocks: each interface (or robot) once, and then again in reverse order.
 
         Of five rounds the second goes to the library clients, the third and the fifth to the A/A control.
         """

@@ -1,4 +1,4 @@
-"""The paper's robot as what a run calls: its addresses, interfaces and operations, from options and statement."""
+"""The paper's robot as a target: its addresses, interfaces and operations, from options and statement."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from loadtests.settings.settings import CliOptions, Selection, SettingsError, Ta
 
 
 def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:
-    """Return the paper's robot as what is called, and the robot to compare with.
+    """Return the paper's robot as a target, and the robot to compare with.
 
     Raises:
         SettingsError: an address cannot be used, or options ask for what the robot does not have or may not do.

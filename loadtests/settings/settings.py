@@ -26,7 +26,7 @@ _STAGE = re.compile(r"(\d+(?:\.\d+)?):(\d+(?:\.\d+)?)(ms|s|m|h)")
 
 @dataclass(frozen=True)
 class Selection:
-    """What to measure; in the options, an empty field means everything.
+    """Operations to measure; in the options, an empty field means all.
 
     `weights` say how often each operation is called beside the others; empty where all are called equally often.
     """
@@ -67,7 +67,7 @@ class Repeats:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the statement allows, or the default for operations that move the robot: requests per second, seconds."""
+    """Limits for operations that move the robot, from the statement or by default: requests per second, seconds."""
 
     max_rate: float | None
     max_duration_s: float | None
@@ -147,7 +147,7 @@ class Against:
 
 @dataclass(frozen=True)
 class Target:
-    """What a run calls.
+    """The target of a run.
 
     Attributes:
         robot: with the addresses of the selected interfaces only.
@@ -191,7 +191,7 @@ class Target:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(Target):
-    """The settings of a run, complete: what it calls, and how.
+    """The complete settings of a run: its target and its method.
 
     Attributes:
         load: its rate is None in the closed model.
@@ -217,7 +217,7 @@ class Settings(Target):
 
 
 class SettingsError(ValueError):
-    """Settings that are impossible or not allowed; the message says what to change."""
+    """Settings that are impossible or not allowed; the message names the remedy."""
 
 
 @dataclass(frozen=True)

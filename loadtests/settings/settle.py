@@ -27,7 +27,7 @@ _DEFAULT_LIMIT = "the default limit for operations that move the robot; the stat
 
 
 def contradiction(options: CliOptions) -> str | None:
-    """Return what is wrong with the options and what to change; None if they are valid."""
+    """Return the contradiction in the options and its remedy; None if they are valid."""
     if options.rate is not None and options.users is not None:
         return "--rate (open model) and --users (closed model) exclude each other"
     if options.users is not None and options.knee:
@@ -50,7 +50,7 @@ def contradiction(options: CliOptions) -> str | None:
 
 
 def _in_stages(options: CliOptions) -> str | None:
-    """Return what is wrong with the stages."""
+    """Return the fault of the stages."""
     if not options.stages:
         return None
     given = {"rate": options.rate, "users": options.users, "duration": options.duration_s}
@@ -62,7 +62,7 @@ def _in_stages(options: CliOptions) -> str | None:
 
 
 def _restarting(options: CliOptions) -> str | None:
-    """Return what is wrong with the command that restarts the robot."""
+    """Return the fault of the command that restarts the robot."""
     command = options.repeats.restart_command
     if command is None:
         return None
@@ -180,7 +180,7 @@ def _compared(settings: Settings, options: CliOptions, other: RobotStatement, ta
 
 
 def _looks(options: CliOptions, load: Load, settings: Settings, other: _Allowed) -> tuple[int, ...]:
-    """Return after how many durations a comparison is judged: once, where somebody has said how long it shall take."""
+    """Return after how many durations a comparison is judged: once, if the user set the duration."""
     if options.duration_s is not None or options.repeats.number > 1:
         return (1,)
     longest_s = min(settings.limits.max_duration_s or math.inf, other.duration_s or math.inf)

@@ -59,7 +59,7 @@ class Against(msgspec.Struct, kw_only=True):
 
 @dataclass(frozen=True)
 class Judge:
-    """What makes a change count.
+    """The tolerance and controls by which a change counts.
 
     Attributes:
         tolerance: by which share this robot may be slower, 0.05 for 5 %.

@@ -52,7 +52,7 @@ class Counts(msgspec.Struct, kw_only=True):
 
 
 def counts(measured: Measured, carried: Iterable[tuple[Plan, float]]) -> Counts:
-    """Return what became of the requests.
+    """Return the numbers of requests by their outcome.
 
     Args:
         measured: the records.

@@ -141,7 +141,7 @@ def _one_series(measured: Measured, name: SeriesName, request: int | None, respo
 
 
 def _lower_bounds(found: Figures, whole: Cell) -> list[str]:
-    """Return which figures of the service time stand for requests without a response, so that they are lower bounds."""
+    """Return the service-time figures that rest on unanswered requests, so that they are lower bounds."""
     if not whole.failed_service.total:
         return []
     share = whole.service.total / (whole.service.total + whole.failed_service.total)

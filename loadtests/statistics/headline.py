@@ -30,7 +30,7 @@ _NOTHING = "No series has enough successful requests for a figure."
 
 @dataclass(frozen=True)
 class Found:
-    """The results of a run from which the headline is made.
+    """Results of a run from which the headline is made.
 
     Attributes:
         plan: the plan of the run.
@@ -181,7 +181,7 @@ def _tail(entry: SoapOverRest) -> str:
 
 
 def _other_robot(found: Found, compared: Against) -> str:
-    """Return the change that the verdict rests on: of those that decided it, the one with the highest upper bound."""
+    """Return the change that decides the verdict: of several, the one with the highest upper bound."""
     deciding = [change for change in compared.changes if change.ci95 and change.verdict == compared.verdict]
     if not deciding:
         return "No figure of the two robots has an interval: measure longer."

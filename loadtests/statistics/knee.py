@@ -37,7 +37,7 @@ _MISSES, _MOST_TRIALS = 2, 5  # of one rate: misses in which the generator was o
 
 @dataclass(frozen=True)
 class Criterion:
-    """What a step has to meet.
+    """The limits that a step must meet.
 
     Attributes:
         limits: values in ms that quantiles of the response time have to be below, by quantile.
@@ -87,7 +87,7 @@ class Step(msgspec.Struct, kw_only=True):
 
     @property
     def limited_by_generator(self) -> bool:
-        """Return whether the generator was too busy, or itself too late, for the step to say anything of the robot."""
+        """Return whether the generator was too busy or too late for the step to judge the robot."""
         return (self.cpu_share or 0.0) > BUSY or 2 * (self.lag_p99_ms or 0.0) > (self.p99_ms or math.inf)
 
 
@@ -148,7 +148,7 @@ class Search:
 
     @property
     def kept(self) -> float | None:
-        """Return the highest rate that has met the criterion so far: what missed below it missed by chance."""
+        """Return the highest rate that has met the criterion so far: misses below it were chance."""
         return max((rate for rate, trial in self.results.items() if trial.meets), default=None)
 
     @property

@@ -1,4 +1,4 @@
-"""What was recorded, by series: sums over blocks, and the units that intervals are resampled from.
+"""Recorded figures by series: sums over blocks, and the units from which intervals are resampled.
 
 A request that failed, or that never started, counts in every figure: with the time until it was given up, and with no
 less than the slowest response of its series. Otherwise a robot that hangs on its slow requests would look fast.
@@ -27,7 +27,7 @@ def counted(cell: Cell, time: str, floor_ns: int | None = None) -> Histogram:
 
 
 class Side(NamedTuple):
-    """One of two things compared: a phase, a series, and its label in that phase (`a` or `b` in the A/A control)."""
+    """One of two compared sides: a phase, a series, and its label in that phase (`a` or `b` in the A/A control)."""
 
     phase: str
     name: SeriesName

@@ -116,7 +116,7 @@ def growth(parts: Sequence[tuple[float, Histogram]]) -> dict[str, Any] | None:
 
 
 def add_growth(measured: Measured, entries: Sequence[Series]) -> list[str]:
-    """Add to each series how its median changes over the run, if the load does not; return what is worth a remark."""
+    """Add to each series how its median changes over a run with a constant load; return remarks."""
     said = []
     for entry in entries if not measured.plan.load.stages else ():
         found = growth([(one.start_s, counted(one.cell, "response")) for one in measured.blocks(entry.name, "duel")])

@@ -1,4 +1,4 @@
-"""Report that a robot got more requests than it answers: what it answered, what waited, or that it is dead.
+"""Report a robot that gets more requests than it answers: answered and waiting requests, or that it is dead.
 
 Two things can be at their end, the robot or the generator. The generator is where it used up its processor, or saw
 late that a request was due; then the run is not valid (`verdict.invalid_because`). Otherwise requests that wait for a
@@ -40,7 +40,7 @@ class Overload(msgspec.Struct, kw_only=True):
     waiting_at_end: int
 
     def sentence(self) -> str:
-        """Return what happened, as a sentence without its full stop."""
+        """Return the overload as a sentence without its full stop."""
         said = f"the robot answered {self.answered_rate:,.0f}/s of {self.offered_rate:,.0f}/s offered"
         if self.busy_from_s is not None:
             said += f"; all {self.connections} connections were busy from second {self.busy_from_s:.0f} on"

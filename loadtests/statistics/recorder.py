@@ -1,4 +1,4 @@
-"""Records what happened, in memory that does not grow with the number of requests.
+"""Record requests and failures, in memory that does not grow with their number.
 
 A request is nine integers appended to a buffer; NumPy bins the buffer in the quiet gap between blocks. A cell holds
 the histograms of one operation in one segment of the plan (a block): the statistics resample blocks, and a series is

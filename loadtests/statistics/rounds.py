@@ -1,4 +1,4 @@
-"""What is resampled: rounds of neighbouring pairs of blocks, long enough to be independent of one another.
+"""Units of resampling: rounds of neighbouring pairs of blocks, long enough to be independent.
 
 Consecutive requests are not independent, and blocks are not either: a stall or a drift affects several. Resampling
 dependent parts makes intervals too narrow (Carlstein 1986). The smallest unit is the pair of neighbouring blocks. Units

@@ -159,7 +159,7 @@ def _dispersions(table: Floats, share: float) -> Iterator[float]:
 
 
 def _outcome(interval: Interval | None, allowed: float, rate: float | None, at_rate: float | None) -> tuple[str, str]:
-    """Return the outcome, and what to add to its reason."""
+    """Return the outcome, and an addition to its reason."""
     if interval is None or rate is None:
         return NOT_KNOWN, ""
     if interval[1] <= allowed:

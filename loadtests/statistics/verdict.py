@@ -74,7 +74,7 @@ def _lag_limits(service: Histogram) -> Figures:
 def invalid_because(
     figures: GeneratorFigures, counts: Counts, plan: Plan, pacing: str, spoilt: Sequence[str]
 ) -> tuple[list[str], list[str]]:
-    """Return the reasons why the figures say nothing about the robot, and notes.
+    """Return the reasons why the figures do not describe the robot, and notes.
 
     Args:
         figures: on the load generator.

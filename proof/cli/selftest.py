@@ -136,7 +136,7 @@ def selftest(context: click.Context, /, **options: Any) -> None:
 
 
 def _read(paths: Iterable[Path]) -> dict[str, Table]:
-    """Return what stored results show.
+    """Return the tables of stored results.
 
     Raises:
         click.UsageError: a file cannot be read.
@@ -150,7 +150,7 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
 
 
 def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Path]) -> bool:
-    """Print what is worse in later results than in earlier ones; return whether anything is."""
+    """Print requirements and devices that are worse than in earlier results; return whether any is."""
     from proof.selftest.against import lost  # noqa: PLC0415 - see _by_hand()
 
     said = lost(before, _read(results), contract.renamed)

@@ -38,7 +38,7 @@ def unwanted(where: Where) -> Where:
 
 
 def soap(*operations: str) -> Where:
-    """Return a condition for SOAP requests that name one of the operations, or any without arguments."""
+    """Return a condition for SOAP requests that name one of the operations, or any if none is given."""
     names = "|".join(operations) or r"[\w.-]+"
     pattern = re.compile(rb"<(?:[\w.-]+:)?(?:%s)[\s/>]" % names.encode())
 

@@ -148,7 +148,7 @@ class HangUpError(Exception):
 
 
 class Change(Protocol):
-    """What a proxy does to each request and response. Each run has an instance of its own, which may keep state."""
+    """A proxy's changes of requests and responses. Each run has its own instance, which may keep state."""
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         """Return the response to a request. ``forward`` sends a request to the device, any number of times.
@@ -159,7 +159,7 @@ class Change(Protocol):
 
 
 class IncompleteRequest(Protocol):
-    """What a mutant does with a request that its client never completed."""
+    """A mutant's reaction to a request that its client never completed."""
 
     def __call__(self, side: str, octets: bytes, forward: Forward) -> None:
         """Take the bytes that were received before the client disconnected."""

@@ -1,4 +1,4 @@
-"""What a contract pack declares for `roaas selftest`: good devices, mutants, and facts about both.
+"""A contract pack's declarations for `roaas selftest`: good devices, mutants, and facts about both.
 
 The pack's plugin module names the module that declares it: ``SELFTEST = "lamp_contract.selftest"``. The default is
 ``selftest.py`` beside ``pack.toml``. That module has a value ``SELFTEST``. A small pack declares how its device
@@ -172,7 +172,7 @@ class SelfTest:
 
 @cache
 def self_test_of(contract: Contract) -> SelfTest:
-    """Return what a pack declares for its self-test, or the defaults.
+    """Return a pack's declarations for its self-test, or the defaults.
 
     Raises:
         ContractError: its module cannot be imported, or has no ``SELFTEST``.
@@ -228,7 +228,7 @@ def check_installed(*modules: str) -> None:
 
 
 def built(*sources: Path) -> Path:
-    """Build a Go program from source files, unless it is newer than all of them, and return its path.
+    """Build a Go program, unless the built file is newer than all source files, and return its path.
 
     Raises:
         NotInstalledError: Go is not installed, or the build fails.

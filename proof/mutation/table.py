@@ -1,4 +1,4 @@
-"""Mutants by hand, and the tables of them: each row has a name, a requirement that kills it, a fault and a change.
+"""Mutants written by hand, in tables: each row has a name, a requirement that kills it, a fault and a change.
 
 A mutant is a good device with one change between it and its clients.
 
@@ -100,7 +100,7 @@ class Table:
 
 
 class Row:
-    """One row. Calling one of its methods gives it the change."""
+    """One row. Calling a method of it sets the change."""
 
     def __init__(self, name: str, says: str, kills: tuple[str, ...], settings: dict[str, Any]) -> None:
         self._parts = {"name": name, "says": says, "catches": kills, **settings}

@@ -1,4 +1,4 @@
-"""Compare a self-test with earlier ones: what notices each mutant, and which good devices are blamed.
+"""Compare a self-test with earlier ones: which requirements notice each mutant, and which good devices fail.
 
 Several earlier runs give each kill a probability. A mutant is lost if all of them killed it and a later one did not; if
 some of them did, and now fewer than chance leaves; or if a requirement that noticed it in all of them, or one that it
@@ -84,7 +84,7 @@ def _chance(kills: int, runs: int, probability: float) -> float:
 
 
 def read(paths: Iterable[Path]) -> dict[str, Table]:
-    """Return what stored runs show: of one yardstick, or of the selftest.json of each run; either may be gzipped.
+    """Return the tables of stored runs: of a yardstick, or of each run's selftest.json; either may be gzipped.
 
     Raises:
         OSError: a file cannot be read.

@@ -1,4 +1,4 @@
-"""Run one certification of a self-test in a process of its own, so that it leaves no state for the next one."""
+"""Run one certification of a self-test in its own process, so that no state reaches the next one."""
 
 import contextlib
 import io
@@ -190,7 +190,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
 
 
 class _EnoughKnown(Judge):
-    """A judge that starts no further check after one of the job's ``enough`` requirements has failed."""
+    """A judge that starts no further check once one of the job's ``enough`` requirements has failed."""
 
     def __init__(self, run: Run, enough: frozenset[str]) -> None:
         super().__init__(run.contract.ledger)

@@ -66,7 +66,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class ToolResult:
-    """What a tool reports of one mutant.
+    """A tool's report on one mutant.
 
     Attributes:
         mutant: the mutant's name.
@@ -81,7 +81,7 @@ class ToolResult:
 
 @dataclass
 class Comparison:
-    """What one tool reports of all mutants.
+    """A tool's report on all mutants.
 
     Attributes:
         tool: its name.
@@ -114,7 +114,7 @@ def schemathesis() -> Tool | None:
 
 
 def specmatic() -> Tool | None:
-    """Return Specmatic (its command, or the package from PyPI and a Java to run it), or None where it is not there."""
+    """Return Specmatic (its command, or the PyPI package and a Java), or None if it is not installed."""
     package, java, command = importlib.util.find_spec("specmatic"), shutil.which("java"), shutil.which("specmatic")
     if command:
         words: tuple[str, ...] = (command,)

@@ -24,7 +24,7 @@ _DOMAINS = 102
 
 
 class RobotError(Exception):
-    """A device does not start; the message tells the user what to do."""
+    """A device does not start; the message names the user's remedy."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ _CEILING = 100.0
 
 @dataclass(frozen=True)
 class Variant:
-    """One variant: what stands between a good device and its clients.
+    """One variant: a link, proxy or option between a good device and its clients.
 
     Attributes:
         name: its name.

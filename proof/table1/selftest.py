@@ -1,4 +1,4 @@
-"""The self-test of this pack: its good robots, its mutants, and what only the contract knows of both."""
+"""The self-test of this pack: its good robots, its mutants, and facts about both that the contract has."""
 
 import contextlib
 import sys

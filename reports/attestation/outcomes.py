@@ -31,7 +31,7 @@ _NAMED = 3
 
 
 class Entry(msgspec.Struct, frozen=True):
-    """What the ledger of the installed suite says of one requirement.
+    """The installed suite's ledger entry on one requirement.
 
     Attributes:
         level: MUST, SHOULD or MAY.
@@ -67,7 +67,7 @@ def named(names: Collection[str]) -> str:
 
 
 def contradictions(run: Run) -> list[str]:
-    """Return what a run says of itself that cannot all be true, in words; empty if there is nothing."""
+    """Return contradictions in a run's result, in words; empty if there are none."""
     listed = list(outcomes_of(run))
     verdicts = {id_: verdict for id_, _, verdict in listed}
     found = [
@@ -98,7 +98,7 @@ def contradictions(run: Run) -> list[str]:
 
 
 def _beyond(run: Run, extent: Extent, claimed: set[str]) -> Iterator[str]:
-    """Yield what a run found beyond what it tested, in words."""
+    """Yield findings of a run on things that it did not test, in words."""
     if unclaimed := sorted(claimed - {*extent.claims}):
         yield f"{named(unclaimed)} has a verdict, but was not claimed"
     if not extent.requests and any(verdict == "pass" for _, _, verdict in outcomes_of(run)):
@@ -108,7 +108,7 @@ def _beyond(run: Run, extent: Extent, claimed: set[str]) -> Iterator[str]:
 
 
 def statement_contradictions(statement: Statement) -> list[str]:
-    """Return what a signed statement says that cannot all be true, in words; empty if there is nothing."""
+    """Return contradictions in a signed statement, in words; empty if there are none."""
     predicate, run = statement.predicate, statement.predicate.roaas
     found = contradictions(run)
     if sorted(predicate.properties) != sorted(PROPERTY + property_name(name) for name in passed(run)):

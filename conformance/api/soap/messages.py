@@ -1,4 +1,4 @@
-"""Messages made from a schema: an ordinary one, and strategies for all valid ones."""
+"""Make messages from a schema: one ordinary message, and strategies for all valid ones."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Roles of a WSDL's operations, by names and messages: which one reads what another one writes."""
+"""Roles of a WSDL's operations, by names and messages: GetGain reads what SetGain writes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _LONGEST: Final = 65_536
 
 
 class Role(StrEnum):
-    """What an operation does to the state of a device, by the verb of its name."""
+    """What an operation does to the state of a device, by the verb in its name."""
 
     READS = "reads"
     WRITES = "writes"
@@ -80,7 +80,7 @@ class Act:
 
     @property
     def makes(self) -> dict[str, Simple]:
-        """The values in the response by which a device may identify what it has made."""
+        """Return the values in the response by which a device may identify a created thing."""
         is_one = self.role is not Role.READS and self.role not in LAST
         return {name: one for name, one in self.told.items() if is_one and name not in self.needs and _is_id(name, one)}
 
@@ -116,13 +116,13 @@ class Act:
 
 
 def role_of(name: str) -> Role:
-    """Return what an operation does by its name."""
+    """Return an operation's role by its name."""
     verb = next(iter(_WORD.findall(name)), "")
     return _ROLES.get(verb.lower(), Role.OTHER)
 
 
 def acts_of(found: Wsdl) -> list[Act]:
-    """Return the operations of a WSDL whose messages can be made."""
+    """Return the operations of a WSDL for which messages can be made."""
     return [_act(found, port, operation) for port, operation in each(found.ports) if not found.remark(operation)]
 
 

@@ -41,7 +41,7 @@ Attempts = Callable[[], Iterable[Tried]]
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.STANDSTILL)
 def attempts_at_rest(mapped: MappedDevice) -> Quiet:
-    """At rest, send what must move nothing, and watch. If the device moves, try each again alone, and then nothing."""
+    """Send requests to a device at rest that must not move it, and watch. If it moves, try each again alone."""
     _settle(mapped)
     return tried_at_rest(mapped, list(_tries(mapped)), partial(_settle, mapped), _effect_s(mapped))
 
@@ -125,7 +125,7 @@ def _quiet(
 
 
 def _glance(mapped: MappedDevice) -> list[Reading]:
-    """Read the device once, and where it seems to move, as often as it takes to tell."""
+    """Read the device once; if it seems to move, read again until that is certain."""
     seen = [mapped.read(at_once=True)]
     while len(seen) < SEVERAL and fastest(seen[-1:] * SEVERAL, mapped.motion, rested=True):
         seen.append(mapped.read())
@@ -224,7 +224,7 @@ class _Sender:
 
 
 def vanished(mapped: MappedDevice, made: Outgoing, what: str) -> Iterator[Tried]:
-    """Send parts of a request, and close their connections; ``what`` it commands, as a noun phrase."""
+    """Send parts of a request and close the connections; ``what``: the commanded move as a noun phrase."""
     begun = []
     for share, lacking, _ in _PARTS:
         body, promised = made.body[: int(share * len(made.body))], None if lacking is None else len(made.body) + lacking

@@ -70,7 +70,7 @@ class JsonBinding:
 
     @classmethod
     def of(cls, contract: Contract) -> JsonBinding:
-        """Return how requests are made by a description, without a device."""
+        """Return the binding of a description, without a device."""
         return cls(None, contract)
 
     @property
@@ -192,7 +192,7 @@ class SoapBinding:
         return port, operation, node_of(declared, body)
 
     def content(self, octets: bytes) -> Any:
-        """Return what the first element of the Body holds, without the names of namespaces."""
+        """Return the content of the Body's first element, without namespaces in its names."""
         try:
             parts = [one for one in elements(parse(octets)) if local(str(one.tag)) == "Body"]
         except NotXmlError:

@@ -265,7 +265,7 @@ class MappedDevice:
         return self._sent(made, wanted, authorized=authorized, fresh=fresh)
 
     def has_failed(self, exchange: Exchange) -> bool:
-        """Return whether the content of a 2xx says that its request failed, as the map has it."""
+        """Return whether the content of a 2xx reports a failed request, by the map's `failed`."""
         failed = self.motion.failed
         if failed is None or not exchange.response.ok:
             return False
@@ -294,7 +294,7 @@ class MappedDevice:
         return self._sent(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
     def halt(self) -> Command | None:
-        """Send the stop, and velocity 0 as well if it is refused: a stop that names a move is refused if none goes on.
+        """Send the stop; if the device refuses it, send velocity 0 too: a stop for a move may be refused without one.
 
         Returns:
             The stop; None: there is none that can be sent.
@@ -393,7 +393,7 @@ class MappedDevice:
             raise NotPossibleError("the device does not come back to the position from which the suite begins")
 
     def leave_at_rest(self) -> str:
-        """Stop what goes on, see that the device rests, and give it back; return why it may still move, or nothing."""
+        """Stop the device, see that it rests, and release it; return why it may still move, or an empty text."""
         problem = self._left_at_rest()
         try:
             self.ready.end()
@@ -432,7 +432,7 @@ class MappedDevice:
         return f"{attempt.request.method} {urlsplit(attempt.request.url).path}"
 
     def come_to_rest(self, *, stop: bool = True, within_s: float | None = None) -> None:
-        """Stop what goes on, unless that is done already, and wait until the device rests.
+        """Stop the device, unless that is done already, and wait until it rests.
 
         Args:
             stop: whether to stop it.

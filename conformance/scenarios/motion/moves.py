@@ -42,7 +42,7 @@ _BEYOND: Final = (0.05, 0.5)
 
 
 def recorded(made: Iterable[_Part]) -> tuple[_Part, ...]:
-    """Return legs or drives as they are made.
+    """Return the legs or drives of a generator, keeping those made before an error.
 
     Raises:
         PartialTraceError: there was no response; what was recorded before is kept.
@@ -84,7 +84,7 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
-    """Send the device beyond its limits, where the map says that it goes as far as it can."""
+    """Send the device beyond its limits, if the map declares that it clamps targets."""
     if mapped.moves.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that targets beyond the limits are clamped")
     mapped.bring_home()
@@ -95,7 +95,7 @@ def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
 
 
 def beyond(axes: Mapping[str, Axis | Speed]) -> Iterator[tuple[str, float, float]]:
-    """Yield axes, their limits, and targets or velocities beyond these; nothing is beyond what turns freely."""
+    """Yield axes, their limits, and targets or velocities beyond them; an axis that turns freely has none."""
     for name, axis in axes.items():
         if isinstance(axis, Axis) and axis.angle:
             continue

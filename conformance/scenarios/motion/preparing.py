@@ -1,4 +1,4 @@
-"""What a device needs before and after motion: a lease that is renewed, and commands such as enable and home."""
+"""Steps before and after motion: acquiring and renewing a lease, and commands such as enable and home."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Preparation:
         self._is_silent = False
 
     def lost(self, exchange: Exchange) -> bool:
-        """Return whether a response shows that the lease has ended, so that a silent client cannot have renewed it."""
+        """Return whether a response shows that the lease has ended, which a silent client cannot have renewed."""
         lease = self._motion.lease
         wants = exchange.response.status in WANTS_LEASE and not self._busy
         if not (lease and wants and self._clock.now() > self._kept_s + lease.every_s):

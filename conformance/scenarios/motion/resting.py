@@ -18,7 +18,7 @@ _OF_POSITION: Final = 0.2
 
 
 def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
-    """Return what readings of a device at rest show, or at least the noise that its map declares."""
+    """Return the noise of a device at rest, measured or at least as its map declares."""
     axes = {
         name: Noise.of([one.values[name] for one in readings if one.values], axis.noise)
         for name, axis in motion.state.axes.items()
@@ -51,7 +51,7 @@ def fastest(readings: Sequence[Reading], motion: MotionMap, *, rested: bool = Fa
 
 
 def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
-    """Return what moves on and on, however slowly; empty if nothing does, or readings do not show it."""
+    """Return the axes that keep moving, however slowly, as text; empty if none, or if it cannot be told."""
     declared = motion.velocity.axes if motion.velocity else {}
     for name, noise in resting.speeds.items():
         most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)

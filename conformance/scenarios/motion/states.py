@@ -1,4 +1,4 @@
-"""Scenarios on what a device shows by other operations, and on switches with states in place of positions."""
+"""Scenarios on further operations that return a device's position, and on switches."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ _ABOUT: Final[dict[Angle, str]] = {"roll": "x", "pitch": "y", "yaw": "z"}
 
 
 class NoValueError(LookupError):
-    """Raised when a template names an unknown value; the message says which."""
+    """Raised when a template names an unknown value; the message names it."""
 
 
 def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:

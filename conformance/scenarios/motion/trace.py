@@ -41,7 +41,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Resting:
-    """What a device at rest shows before anything moves it, by axis and by velocity."""
+    """Noise of a device at rest before any move, by axis and by velocity."""
 
     axes: dict[str, Noise] = field(default_factory=dict)
     speeds: dict[str, Noise] = field(default_factory=dict)
@@ -152,7 +152,7 @@ class Drive:
 
     @property
     def named(self) -> str:
-        """The drive as a noun phrase, with what it was slowed to."""
+        """Return the drive as a noun phrase, with the velocity to which it was slowed."""
         return self.what + self.slowed
 
     @property
@@ -165,7 +165,7 @@ class Drive:
         return self.commands[0].answered + settle_s if self.since is None else self.since
 
     def was_kept(self, hold_s: float | None) -> bool:
-        """Return whether each command met the device within its hold time after the one before; no hold time: always.
+        """Return whether each command arrived within the hold time of the one before; without a hold time, True.
 
         Over a slow link it may rest in between, rightly.
         """
@@ -175,7 +175,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Told:
-    """What several operations show of one position, or of one velocity.
+    """Values of one position or velocity that several operations return.
 
     Attributes:
         when: at rest, or what it drives at.
@@ -190,7 +190,7 @@ class Told:
 
 @dataclass(frozen=True)
 class Switched:
-    """A value that a switch was set to, and what was read.
+    """A switch's commanded value, and the readings after it.
 
     Attributes:
         switch: its name.
@@ -227,7 +227,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class Quiet:
-    """Attempts that must move nothing, made at rest, and the readings after them.
+    """Attempts at rest that must not move the device, and the readings after them.
 
     Attributes:
         where: where the device was, by axis.

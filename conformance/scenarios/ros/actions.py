@@ -39,7 +39,7 @@ _LATE_S: Final = 1.0
 
 
 class Course(StrEnum):
-    """What the action server does with a goal."""
+    """How the action server handles a goal."""
 
     REACHED = "whose server is found"
     SUCCEEDS = "that succeeds"
@@ -107,7 +107,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Goals:
-    """Goals, and the definitions of what an action is made of, by operation and part."""
+    """Goals, and definitions of the parts of an action, by operation and part."""
 
     probes: tuple[Goal, ...]
     definitions: dict[str, Definition]
@@ -115,7 +115,7 @@ class Goals:
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
 def action_goals(gateway: Gateway) -> Goals:
-    """Serve actions, send them goals of each course through the gateway, and read what becomes of them."""
+    """Serve actions, send them goals of each course through the gateway, and read the goals' states."""
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     probes: list[Goal] = []
@@ -255,6 +255,6 @@ class _Sender:
 
 
 def is_end(body: Acts, word: str) -> bool:
-    """Return whether a word of a goal's state says that it has ended."""
+    """Return whether a word for a goal's state means that it has ended."""
     state = body.state
     return state is not None and word in {*state.succeeded, *state.aborted, *state.canceled, *state.rejected}

@@ -1,4 +1,4 @@
-"""The definition of a ROS message: its fields, theirs, and what they may hold (design.ros2.org, IDL and interfaces)."""
+"""Definitions of ROS messages: fields, inner fields, and allowed values (design.ros2.org, IDL and interfaces)."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def value_at(message: Any, pointer: str, missing: Any = None) -> Any:
 
 
 def put_at(message: Any, pointer: str, value: Any) -> Any:
-    """Return a message with a value at a JSON pointer; missing objects are made, and arrays filled up."""
+    """Return a message with a value at a JSON pointer; missing objects and array items are created."""
     step, _, rest = pointer[1:].partition("/")
     if not pointer:
         return value

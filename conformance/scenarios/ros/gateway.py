@@ -97,7 +97,7 @@ class Gateway:
             WALL_CLOCK.sleep(PACE_S)
 
     def kill(self) -> None:
-        """Kill the robot's end, so that its nodes leave the graph without a word; another one starts when needed."""
+        """Kill the suite's ROS process, so that its nodes leave the graph abruptly; the next use starts another."""
         if self._robot is not None:
             self._robot.kill()
             self._robot = None
@@ -152,7 +152,7 @@ class Gateway:
         return found
 
     def maker(self, definition: Definition) -> Maker:
-        """Return what makes messages of a type, for this run."""
+        """Return this run's generator for messages of a type."""
         return Maker(definition, self.run.seed, self.binding.syntax == "XML")
 
     def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:

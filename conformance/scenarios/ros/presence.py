@@ -103,7 +103,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
 # Late, because a killed publisher stays on the graph until its lease ends, and a gateway may count it.
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def publishers_end(gateway: Gateway) -> Publishers:
-    """Publish on all topics at once, fall silent, publish again, leave, come back, be killed, and begin anew."""
+    """Publish on all topics, pause, publish again, leave, return, be killed, and start again."""
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
@@ -143,7 +143,7 @@ class _Topics:
         self._makers = {body.type: gateway.maker(self._definitions[call]) for call, body in self._reads.items()}
 
     def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
-        """Publish on all topics, and yield what the gateway returns of each."""
+        """Publish on all topics, and yield the gateway's response for each."""
         before = {call: content_of(self._gateway.read(call, body), body) for call, body in self._reads.items()}
         values: dict[str, Any] = {}
         for body in self._reads.values():
@@ -197,7 +197,7 @@ class _Topics:
         WALL_CLOCK.sleep(_LATE_S)
 
     def aged(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
-        """End publishing, and yield what the gateway returns when the last messages are too old."""
+        """Stop publishing, and yield the gateway's responses when the last messages are too old."""
         judged = {call: body for call, body in self._reads.items() if body.max_age_s is not None}
         first = {call: self._gateway.read(call, body) for call, body in judged.items()}
         end()

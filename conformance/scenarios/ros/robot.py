@@ -18,7 +18,7 @@ _NS: Final = 1_000_000_000
 
 @dataclass(frozen=True)
 class Heard:
-    """What the robot received.
+    """A message, request or goal that the robot received.
 
     Attributes:
         at: when, s of the monotonic clock.
@@ -85,7 +85,7 @@ class Robot(RosProcess):
         return Published(sent[0] / _NS if sent else time.monotonic(), not said["best_effort"])
 
     def heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
-        """Return what a topic, service or action received since the last call; wait until there is enough.
+        """Return what a topic, service or action received since the last call; wait for ``count`` of it.
 
         Raises:
             ProbeError: see tell().

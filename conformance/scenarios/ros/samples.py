@@ -42,7 +42,7 @@ _GENTLY: Final = 50
 
 
 class Kind(StrEnum):
-    """What a message is for."""
+    """The purpose of a sample message."""
 
     USUAL = "usual"
     DEFAULT = "default"

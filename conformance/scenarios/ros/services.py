@@ -47,7 +47,7 @@ _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 
 
 class Server(StrEnum):
-    """What a server does with a call."""
+    """How a server handles a call."""
 
     MISSING = "which is not there"
     RESPONDS = "which responds at once"
@@ -103,7 +103,7 @@ class Called:
 
     @property
     def succeeded(self) -> bool:
-        """Whether the gateway says that the service responded."""
+        """Return whether the gateway reports that the service responded."""
         return succeeded(self.attempt, self.body)
 
     @property
@@ -149,7 +149,7 @@ class Crowd:
 
 @dataclass(frozen=True)
 class Services:
-    """Calls, and the definitions of what was responded, by operation."""
+    """Calls, and definitions of their responses, by operation."""
 
     probes: tuple[Called, ...]
     responses: dict[str, Definition]

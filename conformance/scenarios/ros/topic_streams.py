@@ -1,4 +1,4 @@
-"""The scenario on streams: messages that are published in a row, and what comes of them over a gateway's streams."""
+"""The scenario on streams: publish messages in a row, and record those that arrive over a gateway's streams."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def topic_streams(gateway: Gateway, effort: Effort) -> tuple[Streamed, ...]:
 
 
 def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Streamed]:
-    """Yield what came over the streams of two clients, which are opened and closed for it."""
+    """Yield the messages of the streams of two clients, which are opened and closed for this."""
     definition = gateway.definition(body.type)
     maker, streams = gateway.maker(definition), [gateway.stream(call, body) for _ in range(2)]
     robot, clock = gateway.robot, WALL_CLOCK
@@ -142,7 +142,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
 
 
 def _came(stream: Stream, number: int, body: Reads) -> list[Message]:
-    """Return what comes until there are so many messages, or surely no more, and a moment after that."""
+    """Return messages until the expected number, or no more can come, and those of a moment after."""
     found: list[Message] = []
     while len(found) < number and (more := stream.heard(1, body.within_s)):
         found += more

@@ -1,4 +1,4 @@
-"""Scenarios beside a real robot: compare a gateway's responses on topics with what the suite hears."""
+"""Scenarios beside a real robot: compare a gateway's responses with messages that the suite receives on ROS."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _COMES_S: Final = 0.5
 
 @dataclass(frozen=True)
 class Look:
-    """One read: when it was requested, and what it returned."""
+    """One read: the time of its request, and the response."""
 
     sent: float
     exchange: Exchange

@@ -112,13 +112,13 @@ def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> fr
 
 
 def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:
-    """Return the messages of an operation, each after the one before it, on which a condition may depend."""
+    """Return an operation's messages, each after the message on which a condition may depend."""
     concerned = {number for number, (request, _) in enumerate(messages) if exchange.concerns(request)}
     return [message for number, message in enumerate(messages) if number in concerned or number + 1 in concerned]
 
 
 def _shown(mutant: GeneratedMutant) -> GeneratedMutant:
-    """Return what messages show of a fault: without its condition, where messages alone do not decide that."""
+    """Return a fault without its condition, if messages alone do not decide whether the condition holds."""
     _, _, condition = mutant.operator.partition("@")
     return mutant.always if mutant.always is not None and condition in _OF_TIME else mutant
 

@@ -226,7 +226,7 @@ class FieldOperator:
 
 
 def _put(value_of: Callable[[Schema, Any], Any]) -> Callable[[Place, Schema], Edit]:
-    """Return an edit that puts in a value made from the schema and the present value, or None to alter nothing."""
+    """Return an edit that inserts a value made from the schema and the present value; None alters nothing."""
 
     def make(_place: Place, schema: Schema) -> Edit:
         flatter = flat(schema)

@@ -99,7 +99,7 @@ def _body(request: Request) -> Any:
 
 
 def _value(schema: Schema, text: str) -> Any:
-    """Return what the text of a parameter stands for."""
+    """Return the value of a parameter's text."""
     kinds = kinds_of(schema)
     if kinds & {"integer", "number"} and _NUMBER.fullmatch(text):
         number = float(text)

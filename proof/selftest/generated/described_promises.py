@@ -1,4 +1,4 @@
-"""Mutants of what one exchange promises for the next: keys, conditions, refusals, safe methods, parts, lists, files."""
+"""Mutants that break what one exchange promises for the next: keys, conditions, refusals, safe methods, files."""
 
 import json
 import math
@@ -27,7 +27,7 @@ _TRIED, _DECIMALS = 3, 2
 
 @dataclass
 class _Past:
-    """What a mutant remembers of the exchanges before.
+    """A mutant's memory of earlier exchanges.
 
     Attributes:
         tags: the entity tags that each path has had.
@@ -45,7 +45,7 @@ _Act = Callable[[Request, Forward, _Past], tuple[Response, bool]]
 
 
 def of_promises(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants of an operation that break what an earlier exchange has promised."""
+    """Yield mutants of an operation that break a promise of an earlier exchange."""
     for name, says, act in _rows(operation):
         make = _changing(exchange, act)
         yield GeneratedMutant(
@@ -128,7 +128,7 @@ def _of_values(operation: Operation) -> Iterator[_Row]:
 
 
 def _changing(exchange: Exchange, act: _Act) -> Callable[[Tally], Change]:
-    """Return a change that does something with an operation's requests, knowing what was sent and seen before."""
+    """Return a change that acts on an operation's requests, knowing earlier exchanges."""
 
     def make(tally: Tally) -> Change:
         past = _Past()
@@ -194,7 +194,7 @@ def _without(name: str) -> _Act:
 
 
 def _reverting(method: str) -> _Act:
-    """Return an act that writes what some resource had first again."""
+    """Return an act that restores a resource's first value."""
 
     def act(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
         response = forward(request)
@@ -384,7 +384,7 @@ def _other_numbers(answer: Response) -> None:
 
 
 def _members(body: bytes, names: set[str], edit: Callable[[Any], Any]) -> bytes:
-    """Return a JSON body with other values of some members; another body as it is."""
+    """Return a JSON body with other values of some members; any other body unchanged."""
     value = _json_of(body)
     if not isinstance(value, dict) or names.isdisjoint(value):
         return body

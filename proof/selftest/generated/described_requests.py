@@ -1,4 +1,4 @@
-"""Mutants that treat requests otherwise than the description says: they take, refuse or crash at some values."""
+"""Mutants that treat requests otherwise than described: they accept, refuse or crash at some values."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -96,7 +96,7 @@ def _forwarding(
 
 
 def strict(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
-    """Yield mutants that refuse what the description allows."""
+    """Yield mutants that refuse values that the description allows."""
     refusal = _refusal(operation)
     for item in inputs_of(operation):
         schema = item.schema
@@ -125,7 +125,7 @@ Answer = Callable[[Response], Response]
 
 
 def _refusal(operation: Operation) -> Answer:
-    """Return what makes a response a refusal as the description has it: 422 or 400, whichever is declared."""
+    """Return the refusal that the description declares: 422 or 400."""
     status = next((code for code in (422, 400) if operation.response_key(code) is not None), 422)
     content = operation.declared(status) or {}
     name, schema = next(((name, schema) for name, schema in content.items() if is_json(name)), ("application/json", {}))

@@ -178,7 +178,7 @@ def _note(result: GeneratedResult, outcome: Outcome, by: tuple[str, ...]) -> Non
 
 
 def _attempts(contract: Contract, mutant: GeneratedMutant, claimed: tuple[str, ...]) -> Iterator[Attempt]:
-    """Yield what to judge a mutant by: first the requirements that name its operation, then whole classes.
+    """Yield classes and requirements to judge a mutant by: first those for its operation, then whole classes.
 
     The classes of a device that claims no contract are judged all at once: any may notice its mutants.
     """

@@ -171,7 +171,7 @@ def _cells(rate: Rate) -> str:
 
 
 def only_theirs(results: Iterable[GeneratedResult], compared: Iterable[Comparison]) -> list[str]:
-    """Return the mutants that another tool kills and this suite does not, with what it reports."""
+    """Return the mutants that another tool kills and this suite does not, with the tool's report."""
     ours = {one.mutant.name for one in results if one.outcome == KILLED}
     return [
         f"{one.tool} alone: {name}: {', '.join(findings)}"

@@ -32,7 +32,7 @@ BODIES: dict[str, Callable[[bytes], bytes]] = {
 
 
 def neighbours(exchange: Exchange, status: int) -> tuple[int, ...]:
-    """Return the statuses to replace a status with: adjacent codes, others of the operation, one of the other class."""
+    """Return statuses to replace a status by: adjacent codes, others of the operation, one of another class."""
     soap_statuses = (200, 202, 204, 400, 404, 405, 415, 500)
     others = {status - 1, status + 1, *(exchange.statuses if exchange.side == "rest" else soap_statuses)}
     others |= {500, 404} if status in _SUCCESS else {200, 500}
@@ -63,7 +63,7 @@ def _set(name: str, value: Callable[[str], str]) -> Callable[[Response], None]:
 
 
 def _other_charset(value: str) -> str:
-    """Return a media type with another charset; JSON has none, so that it would have no effect (RFC 8259 11)."""
+    """Return a media type with another charset; not for JSON, where a charset has no effect (RFC 8259 11)."""
     media_type = value.partition(";")[0]
     return value if media_type.endswith("json") else f"{media_type}; charset=utf-16"
 

@@ -94,7 +94,7 @@ def rates_by(results: Iterable[GeneratedResult], key: str) -> dict[str, Rate]:
 
 
 def group_of(result: GeneratedResult, key: str) -> str:
-    """Return what a result counts for.
+    """Return the group in which a result is counted.
 
     Args:
         result: the result.

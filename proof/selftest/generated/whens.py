@@ -29,7 +29,7 @@ _SMALL: Final = 0.1
 
 @dataclass(frozen=True)
 class Seen:
-    """What a fault knows when a request arrives.
+    """A fault's knowledge when a request arrives.
 
     Attributes:
         request: the request.

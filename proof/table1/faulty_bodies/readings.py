@@ -58,7 +58,7 @@ class _Late(Body):
         self._read: deque[tuple[float, _Message]] = deque()
 
     def _of_then(self, message: _Message) -> _Message:
-        """Store the current message, and return the one of some time ago."""
+        """Store the current message, and return an older one."""
         now = time.time()
         self._read.append((now, message))
         while len(self._read) > 1 and self._read[1][0] < now - self.late_s:
@@ -94,7 +94,7 @@ class _CommandedVelocity(Body):
 
 
 class _ScaledBack(Body):
-    """Moves a third farther than its velocity says, backwards."""
+    """Moves backwards by a third more than its velocity."""
 
     def _advance(self) -> None:
         x, y = self._state.x, self._state.y
@@ -105,7 +105,7 @@ class _ScaledBack(Body):
 
 
 class _ScaledYaw(Body):
-    """Turns a quarter farther than its velocity says."""
+    """Turns by a quarter more than its velocity."""
 
     def _advance(self) -> None:
         yaw = self._state.yaw

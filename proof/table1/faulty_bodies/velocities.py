@@ -82,7 +82,7 @@ class _SlowReversal(Body):
 
 
 class _DeadBase(Body):
-    """A body that ignores velocities, and whose statement has limits so low that rest is "near" each of them."""
+    """A body that ignores velocities, with a statement whose limits are so low that rest is "near" each of them."""
 
     def __post_init__(self) -> None:
         """Lower the limits of the build to those of the statement."""
@@ -96,12 +96,12 @@ class _DeadBase(Body):
 
 
 class _AxesIgnored(Body):
-    """A body that accepts a velocity along each of six axes, as its statement says, and moves along two of them."""
+    """A body that accepts velocities along six axes, as its statement declares, and moves along two."""
 
     further_axes = 0.3
 
     def __post_init__(self) -> None:
-        """Lower the limit of turning to that of the further axes, as the statement has one figure for all of them."""
+        """Lower the limit of turning to that of the other axes, because the statement has one figure for all."""
         self.build = replace(self.build, angular_rad_s=self.further_axes, turn_rad_s=0.29)
         super().__post_init__()
 

@@ -1,4 +1,4 @@
-"""What robots on Python's web frameworks share: the handlers of `plain`, found by the framework's own router."""
+"""Shared by robots on Python's web frameworks: the handlers of `plain`, found by the framework's router."""
 
 import socket
 from collections.abc import Iterable

@@ -38,7 +38,7 @@ class Crowd:
 
 
 def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth: int = 1) -> Make:
-    """Return a change that lets ``act`` answer every nth request that is concurrent with another one of ``where``.
+    """Return a change that lets ``act`` answer every nth request which is concurrent with another of ``where``.
 
     Each request is held back a moment, so that others can come.
     """

@@ -31,7 +31,7 @@ class Remembering:
         self.lock = threading.Lock()
 
     def __call__(self, request: Request, forward: Forward) -> Response:
-        """Forward a request, and take note of it."""
+        """Forward a request, and remember it."""
         self.asked = time.monotonic()
         response = forward(request)
         if _PUT_GOAL(request) and success(response):

@@ -123,7 +123,7 @@ def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
 
 
 def _acting(pattern: bytes) -> Callable[[], Change]:
-    """Return a change that takes what malformed requests hide as a Content-Length, and loses the place."""
+    """Return a change that reads the hidden part of malformed requests as a Content-Length, and so loses its place."""
 
     def change(request: Request, forward: Forward) -> Response:
         mended = _mended(pattern)(request)
@@ -136,7 +136,7 @@ def _acting(pattern: bytes) -> Callable[[], Change]:
 
 
 def _ignoring(pattern: bytes) -> Callable[[], Change]:
-    """Return a change that ignores what is malformed."""
+    """Return a change that ignores the malformed part of requests."""
     return lambda: lambda request, forward: forward(_mended(pattern)(request) or request)
 
 

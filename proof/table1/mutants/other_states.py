@@ -1,4 +1,4 @@
-"""Mutants that refuse a request as they should, and break something only in another state than the one before."""
+"""Mutants that refuse a request rightly, but break something in another state later."""
 
 import contextlib
 import json

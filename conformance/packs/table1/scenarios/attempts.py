@@ -1,4 +1,4 @@
-"""What must leave the robot at rest: refused velocities, incomplete requests, PUTs answered 406, a cancelled goal."""
+"""Requests that must not move a robot at rest: refused velocities, cut requests, 406, a cancelled goal."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -19,11 +19,11 @@ class Soap(soap.Soap):
     folder, files = Path(__file__).parent, {"wsdl": "wsdl", "xsd=1": "xsd"}
 
     def malformed(self, problem: str) -> Answer:
-        """Return a fault for what is no XML."""
+        """Return a fault for content that is no XML."""
         return self.fault("Client", problem)
 
     def no_goal(self) -> list[Any]:
-        """Say by a fault that there is no goal.
+        """Return a fault which says that there is no goal.
 
         Raises:
             FaultError: always.

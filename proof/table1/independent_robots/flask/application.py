@@ -48,7 +48,7 @@ def _one_host() -> None:
 
 @application.before_request
 def _whole() -> None:
-    """Reject a request whose client vanished before its content was complete: WSGI servers hand on what there is."""
+    """Reject a request whose client vanished before its end: WSGI servers pass on incomplete content."""
     request = flask.request
     if request.content_length is not None and len(request.get_data()) < request.content_length:
         raise BadRequest("the content ends before its Content-Length")

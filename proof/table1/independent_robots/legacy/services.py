@@ -140,7 +140,7 @@ class _Handler(WSGIRequestHandler):
     timeout = 20
 
     def get_environ(self) -> dict[str, Any]:
-        """Add the target as it was sent, because WSGI's PATH_INFO has lost its escapes."""
+        """Add the unchanged target, because WSGI's PATH_INFO has lost its escapes."""
         return {**super().get_environ(), "TARGET": self.path}
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's own name

@@ -43,7 +43,7 @@ DELIVERY = (
 
 
 class Rest:
-    """The REST interface of one body. What another robot does in its own way, it overrides.
+    """The REST interface of one body. Other robots override what they do differently.
 
     Attributes:
         resources: by path without parameters and by method, a function of headers, body and target that returns the
@@ -331,7 +331,7 @@ def plan_value(body: Body, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def accept_of(headers: Message) -> str | None:
-    """Return what the client accepts; None: it does not say."""
+    """Return the client's Accept; None if there is none."""
     fields = headers.get_all("Accept")
     return None if fields is None else ", ".join(fields)
 

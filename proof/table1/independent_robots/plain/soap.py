@@ -26,7 +26,7 @@ class FaultError(Exception):
 
 
 class Soap:
-    """The SOAP interface of one body. What another robot does in its own way, it overrides.
+    """The SOAP interface of one body. Other robots override what they do differently.
 
     Attributes:
         base: URL of this server, for the WSDL's address.
@@ -65,7 +65,7 @@ class Soap:
         return self.enveloped(200, content)
 
     def malformed(self, _problem: str) -> Answer:
-        """Return the response to what is no XML."""
+        """Return the response to content that is no XML."""
         return Answer(400)
 
     def no_goal(self) -> list[Any]:
