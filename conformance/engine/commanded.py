@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.openapi import Operation, is_json
+from conformance.engine.map_text import inline
 
 _LASTS: Final = re.compile(r"duration|seconds|timeout|time|hold|ttl", re.IGNORECASE)
 _TURNS: Final = re.compile(
@@ -22,6 +23,28 @@ NO_AXIS: Final = re.compile(
     re.IGNORECASE,
 )
 _ID: Final = re.compile(r"[a-z0-9]I[dD]$")
+# Operations that command velocities; numbers that are velocities; numbers that only say how a move is made.
+_DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
+FAST: Final = re.compile(r"speed|velocit|(?:^|_)vel(?:_|$)|throttle", re.IGNORECASE)
+_HOW: Final = re.compile(r"accel|decel|jerk|torque|force|effort|ramp", re.IGNORECASE)
+_TWIST: Final = re.compile(r"(?:linear|angular)[/_]?[xyz]$", re.IGNORECASE)
+# Greatest values of what is a share.
+_SHARES: Final = frozenset({1.0, 100.0})
+_RELATIVE: Final = re.compile(r"relative|distance|delta|offset|step", re.IGNORECASE)
+_UNITS: Final = {
+    "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
+    "deg": r"_deg(?:rees)?(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",
+}  # fmt: skip
+# What the name of a way, a position or a velocity has beside the name of its axis.
+_BESIDE: Final = re.compile(
+    r"(?:^|_)(?:position|pos|distance|delta|offset|relative|target|velocity|vel|speed|mm|cm|m|deg|degrees|rad|s)(?=_|$)",
+    re.IGNORECASE,
+)
+# Words of an enumeration that say the sign of a number, the positive one first.
+_OPPOSITES: Final = (
+    ("forward", "backward"), ("forward", "back"), ("forwards", "backwards"), ("forward", "reverse"), ("ahead", "back"),
+    ("up", "down"), ("left", "right"), ("in", "out"), ("ccw", "cw"), ("positive", "negative"), ("plus", "minus"),
+)  # fmt: skip
 _DEPTH: Final = 6
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
 # The share of the declared limit at which a robot is driven; without limits, rad and m.
@@ -37,18 +60,44 @@ class Commanded:
         place: its JSON pointer in the body; of a path parameter its name in braces.
         schema: of the number.
         turns: whether its names say that it is an angle, or turns the device.
+        direction: where the body says its sign, and what it says there if it is positive or negative; None: the number
+            has a sign.
     """
 
     name: str
     place: str
     schema: Schema
     turns: bool
+    direction: tuple[str, str, str] | None = None
 
     @property
     def declared(self) -> tuple[float, float] | None:
         """The least and the greatest value by the schema; None: it does not declare both."""
-        least, most = _bound(self.schema, "minimum"), _bound(self.schema, "maximum")
-        return (float(least), float(most)) if least is not None and most is not None and least < most else None
+        found = bounds_of(self.schema)
+        return (-found[1], found[1]) if found and self.direction else found
+
+    @property
+    def has_unit(self) -> bool:
+        """Whether it is known in which unit it is: a share of the greatest, percent and counts are in none."""
+        if self.declared and self.declared[1] in _SHARES:
+            return bool(unit_of(self.place, {}))
+        if unit_of(self.place, self.schema) or _TWIST.search(self.place):
+            return True
+        return bool(self.declared) and self.schema.get("type") != "integer"
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether its name says that it is a way, and no position."""
+        return bool(_RELATIVE.search(self.place))
+
+    @property
+    def templates(self) -> dict[str, Any]:
+        """What a body has for it, by JSON pointer."""
+        if self.direction is None:
+            return {self.place: f"{{{self.name}}}"}
+        at, positive, negative = self.direction
+        signs = {"sign_of": self.name, "positive": positive, "negative": negative}
+        return {self.place: f"{{{self.name}:size}}", at: signs}
 
     @property
     def little(self) -> float:
@@ -67,6 +116,31 @@ class Commanded:
         return self.declared
 
 
+def bounds_of(schema: Schema) -> tuple[float, float] | None:
+    """Return the least and the greatest number of a schema; None: it does not declare both."""
+    least, most = _bound(schema, "minimum"), _bound(schema, "maximum")
+    return (float(least), float(most)) if least is not None and most is not None and least < most else None
+
+
+def unit_of(place: str, schema: Schema) -> str:
+    """Return the unit of a number that its name or its description says; empty: neither does."""
+    said = (place, str(schema.get("description", "")))
+    return next((unit for text in said for unit, words in _UNITS.items() if re.search(words, text)), "")
+
+
+def direction_line(number: Commanded) -> str:
+    """Return the line of a map that says where a body has the sign of a number."""
+    given = dict(zip(("at", "positive", "negative"), number.direction or (), strict=True))
+    return f"direction = {inline({**given, 'of': number.name})}"
+
+
+def is_velocity(operation: Operation, numbers: Sequence[Commanded]) -> bool:
+    """Return whether an operation commands velocities, by its name or by those of its numbers; else positions."""
+    return bool(_DRIVES.search(f"{operation.template} {operation.id}")) or all(
+        FAST.search(one.place) for one in numbers
+    )
+
+
 def _bound(schema: Schema, word: str) -> float | None:
     for part in parts_of(schema):
         for key in (word, f"exclusive{word.capitalize()}"):
@@ -77,19 +151,41 @@ def _bound(schema: Schema, word: str) -> float | None:
 
 
 def commanded_by(operation: Operation) -> list[Commanded]:
-    """Return the numbers that a request commands, without durations, ids and times."""
+    """Return the numbers that a request commands, without durations, ids, times, and how fast a move is made."""
+    schema = body_schema(operation) or {}
+    inside = [(at, at, part) for at, part in numbers_in(schema) if is_axis(at.rpartition("/")[2])]
     found = [
         (f"{{{one.name}}}", one.name, one.schema)
         for one in operation.parameters
         if f"{{{one.name}}}" in operation.template and is_numeric(one.schema) and is_axis(one.name)
+        # Beside numbers in a body, a whole number in the path is an id.
+        if not (inside and one.schema.get("type") == "integer")
     ]
-    schema = body_schema(operation)
-    found += [(at, at, part) for at, part in numbers_in(schema or {}) if is_axis(at.rpartition("/")[2])]
+    found += inside
+    velocities = _DRIVES.search(f"{operation.template} {operation.id}")
+    found = [one for one in found if not (_HOW.search(one[1]) or (not velocities and FAST.search(one[1])))] or found
     names = unique_names([at for at, _, _ in found])
+    signs = _signs(schema) if len(found) == 1 else None
     return [
-        Commanded(names[at], at, part, bool(_TURNS.search(f"{said} {operation.template if not at else ''}")))
+        Commanded(names[at], at, part, bool(_TURNS.search(f"{said} {operation.template if not at else ''}")), signs)
         for at, said, part in found
     ]
+
+
+def _signs(schema: Schema) -> tuple[str, str, str] | None:
+    """Return where a body says in a word which way to go, and the words for both ways."""
+    for part in parts_of(schema):
+        for name, member in part.get("properties", {}).items():
+            words = {str(one).lower(): str(one) for one in member.get("enum", ())} if isinstance(member, dict) else {}
+            for positive, negative in _OPPOSITES:
+                if {positive, negative} <= words.keys():
+                    return f"/{name}", words[positive], words[negative]
+    return None
+
+
+def axis_of(place: str) -> str:
+    """Return what a number is called, without its unit and without words for a position or a velocity."""
+    return _BESIDE.sub("", place.rpartition("/")[2]).strip("_").lower()
 
 
 def is_axis(name: str) -> bool:

@@ -17,7 +17,7 @@ from typing import Any, Final
 from conformance.api.call_rules import CallRules, harmful_words, matches
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import Operation, is_json
-from conformance.engine.commanded import Commanded, body_schema, commanded_by, numbers_in, template_of
+from conformance.engine.commanded import Commanded, body_schema, commanded_by, is_velocity, numbers_in, template_of
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock
@@ -35,7 +35,6 @@ _STATE: Final = re.compile(
 #: Names of values that repeat commands, which are no measurement.
 ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
 _STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
-_DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
 #: A robot is kept this near to its place, m; a fast one as near as it gets in this time, s.
 ROOM_M, ROOM_S = 0.5, 1.5
 #: Statuses by which an operation declares that it refuses an invalid request.
@@ -111,16 +110,19 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
         for one in chosen.parameters
         if f"{{{one.name}}}" in chosen.template and f"{{{one.name}}}" not in {number.place for number in numbers}
     ]:
-        raise NotPossibleError(f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}")
+        raise NotPossibleError(
+            f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}, "
+            f"as in {drive.replace(f'{{{missing[0]}}}', '1')!r}"
+        )
     reads = [_with_values(_named(operations, read, "--read"), read)[0]] if read else []
-    is_velocity = bool(_DRIVES.search(f"{chosen.template} {chosen.id}"))
     # A position is read by its name; a number called as a velocity may only repeat what was commanded.
-    named_alike = () if is_velocity else numbers
+    drives = is_velocity(chosen, numbers)
+    named_alike = () if drives else numbers
     names = frozenset(one.place.strip("{}").rpartition("/")[2].lower() for one in named_alike)
     reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    return Plan(chosen, tuple(numbers), tuple(reads), is_velocity, _stop(operations, chosen), named)
+    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(operations, chosen), named)
 
 
 def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, str]]:
@@ -207,7 +209,7 @@ class Finder(ABC):
         self._api, self._binding, self._plan, self._clock = api, binding, plan, clock
         self._looks, self._turn = Looks(), 0
         schema = body_schema(plan.drive)
-        named = {one.place: f"{{{one.name}}}" for one in plan.numbers}
+        named = {place: value for one in plan.numbers for place, value in one.templates.items()}
         self._body = template_of(schema, named) if schema is not None else None
         self._reads = list(plan.reads)
         self._found = Found()

@@ -4,21 +4,39 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
 
 from conformance.contract.toml_file import basic_string
-from conformance.documents.json_schema import Schema, is_numeric
-from conformance.documents.openapi import Operation, is_json
-from conformance.engine.commanded import commanded_by, is_axis
+from conformance.documents.json_schema import Schema
+from conformance.documents.openapi import Operation
+from conformance.engine.commanded import (
+    Commanded,
+    axis_of,
+    body_schema,
+    bounds_of,
+    commanded_by,
+    direction_line,
+    is_velocity,
+    numbers_in,
+    parts_of,
+    template_of,
+    unit_of,
+)
 from conformance.engine.map_text import inline, key
 
 _GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
-_DRIVES: Final = re.compile(r"velocity|cmd_?vel|twist|drive|jog", re.IGNORECASE)
 _STOPS: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
-_LASTS: Final = re.compile(r"duration|seconds", re.IGNORECASE)
 _STAMP: Final = re.compile(r"stamp|timestamp", re.IGNORECASE)
-_DEPTH: Final = 6
+_MEASURED: Final = re.compile(r"twist|velocit|speed", re.IGNORECASE)
+
+
+class _Pair(NamedTuple):
+    """What is sent and where it is read: the numbers that are commanded, by their places in the state."""
+
+    state: Operation
+    sent: Operation
+    places: Mapping[str, Commanded]
 
 
 def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
@@ -27,39 +45,56 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     What is sent and what is read are taken for one axis if they have the same name.
     """
     reading = [item for item in operations if item.method == "GET" and not item.parameter("path") and item.shape]
-    sending = [(item, body) for item in operations if (body := body_of(item)) is not None and _acts(item)]
-    goes = _best(reading, [one for one in sending if _GOES.search(one[0].label)])
-    drives = next((one for one in sending if _DRIVES.search(one[0].label) and dict(_numbers(one[1]))), None)
-    if goes is None:
+    sending = [(item, numbers) for item in operations if _acts(item) and (numbers := commanded_by(item))]
+    goes = _best(reading, [one for one in sending if not is_velocity(*one) and _GOES.search(one[0].label)], _position)
+    drives = _best(reading, [one for one in sending if is_velocity(*one)], _velocity)
+    first = goes or drives
+    if first is None:
         return
-    state, (move, body), axes = goes
-    read = dict(_numbers(state.shape or {}))
+    # One reading tells all of a map.
+    drives = drives if drives and drives.state is first.state else None
+    schemas = dict(numbers_in(first.state.shape or {}))
+    driven = {at: one for at, one in (drives.places if drives else {}).items() if not _MEASURED.search(at)}
+    axes = {at: one.name for at, one in {**driven, **(goes.places if goes else {})}.items()}
     yield "[motion.state]"
-    yield f"read = {basic_string(state.label)}"
-    yield from (f"stamp = {basic_string(at)}" for at in _stamps(state.shape or {}))
+    yield f"read = {basic_string(first.state.label)}"
+    yield from (f"stamp = {basic_string(at)}" for at in _stamps(first.state.shape or {}))
     yield ""
     yield "[motion.state.axes]  # limits and units: yours"
-    sent = {at.rpartition("/")[2]: schema for at, schema in _numbers(body)}
-    for name in axes:
-        at = next(at for at in read if at.rpartition("/")[2] == name)
-        least, most = sent[name].get("minimum", -0.1), sent[name].get("maximum", 0.1)
-        yield f'{key(name)} = {{ at = {basic_string(at)}, unit = "", limits = [{least}, {most}] }}'
-    yield ""
-    yield "[motion.goto]"
-    yield f"send = {basic_string(move.label)}"
-    yield f"body = {inline(_template(body, set(axes)))}"
-    yield "tolerance = 0.05"
-    yield from _stop(operations, move)
-    if drives is not None:
-        yield from _velocity(*drives)
+    for at, name in axes.items():
+        number = goes.places.get(at) if goes else None
+        least, most = (number and not number.is_relative and number.declared) or bounds_of(schemas[at]) or (-0.1, 0.1)
+        own = "" if goes else ", tolerance = 0.05"
+        unit = basic_string(unit_of(at, schemas[at]))
+        yield f"{key(name)} = {{ at = {basic_string(at)}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
+    if goes:
+        yield ""
+        yield "[motion.goto]"
+        yield from _sent(goes)
+        if any(one.is_relative for one in goes.places.values()):
+            yield "relative = true"
+        yield "tolerance = 0.05"
+        yield from _stop(operations, goes.sent)
+    if drives:
+        yield ""
+        yield "[motion.velocity]"
+        yield from _sent(drives)
+        yield "tolerance = 0.05"
+        yield "# hold_s = 0.5  # so long after the last command it goes on"
+        yield ""
+        yield "[motion.velocity.axes]  # of: the axis that it changes, by scale at velocity 1"
+        for at, one in drives.places.items():
+            least, most = one.declared or (-0.1, 0.1)
+            where = f"of = {basic_string(axes[at])}" if at in axes else f"at = {basic_string(at)}"
+            yield f"{key(one.name)} = {{ limits = [{least:g}, {most:g}], {where} }}"
 
 
 def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
     """Yield a sentence on each operation that may move the device, where no map is proposed."""
     for one in operations:
-        if one.safe or not (_GOES.search(one.label) or _DRIVES.search(one.label)):
+        numbers = [] if one.safe else commanded_by(one)
+        if one.safe or not (_GOES.search(one.label) or (numbers and is_velocity(one, numbers))):
             continue
-        numbers = commanded_by(one)
         if one.never or not numbers:
             yield f"{one.label}: {'it must never be called' if one.never else 'it takes no numbers'}."
             continue
@@ -67,18 +102,13 @@ def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
         yield f"{one.label}: no GET tells numbers called {named}; --drive '{one.label}' finds what shows them."
 
 
-def _velocity(drive: Operation, body: Schema) -> Iterator[str]:
-    names = {name for at, _ in _numbers(body) if is_axis(name := at.rpartition("/")[2])}
-    yield ""
-    yield "[motion.velocity]"
-    yield f"send = {basic_string(drive.label)}"
-    yield f"body = {inline(_template(body, names))}"
-    yield "tolerance = 0.05"
-    yield "# hold_s = 0.5  # so long after the last command it goes on"
-    yield ""
-    yield "[motion.velocity.axes]  # at: where the state has it; or of: the axis that it changes"
-    for name in sorted(names):
-        yield f'{key(name)} = {{ limits = [-0.1, 0.1], at = "/" }}'
+def _sent(pair: _Pair) -> Iterator[str]:
+    """Yield how an operation is sent."""
+    yield f"send = {basic_string(pair.sent.label)}"
+    schema, numbers = body_schema(pair.sent), list(pair.places.values())
+    if schema is not None:
+        yield f"body = {inline(template_of(schema, {one.place: f'{{{one.name}}}' for one in numbers}))}"
+    yield from (direction_line(one) for one in numbers if one.direction)
 
 
 def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
@@ -89,92 +119,44 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
         yield ""
         yield "[motion.stop]"
         yield f"send = {basic_string(found.label)}"
-        body = body_of(found)
+        body = body_schema(found)
         if body is not None:
-            yield f"body = {inline(_template(body, set()))}  # an id of the move: " + '"{goto:/id}"'
+            yield f"body = {inline(template_of(body, {}))}  # an id of the move: " + '"{goto:/id}"'
         yield "rests_within_s = 0.5"
 
 
 def _acts(operation: Operation) -> bool:
-    return not operation.safe and not operation.never and "{" not in operation.template
-
-
-def body_of(operation: Operation) -> Schema | None:
-    """Return the schema of the JSON body that an operation accepts, or None."""
-    return next((one.schema for name, one in operation.bodies.items() if is_json(name)), None)
+    return not operation.safe and not operation.never and not operation.parameter("path")
 
 
 def _best(
-    reading: Sequence[Operation], sending: Sequence[tuple[Operation, Schema]]
-) -> tuple[Operation, tuple[Operation, Schema], list[str]] | None:
-    """Return the two operations that have the most names of numbers in common, and these names."""
+    reading: Sequence[Operation],
+    sending: Sequence[tuple[Operation, Sequence[Commanded]]],
+    place_of: Callable[[Commanded, Sequence[str]], str | None],
+) -> _Pair | None:
+    """Return the two operations of which most of what one commands is in the response of the other."""
     found = []
     for state in reading:
-        names = {at.rpartition("/")[2] for at, _ in _numbers(state.shape or {})}
-        for one in sending:
-            sent = dict.fromkeys(at.rpartition("/")[2] for at, _ in _numbers(one[1]))
-            found.append((state, one, [name for name in sent if name in names and is_axis(name)]))
-    best = max(found, key=lambda one: len(one[2]), default=None)
-    return best if best and best[2] else None
+        told = [at for at, _ in numbers_in(state.shape or {})]
+        for sent, numbers in sending:
+            places = {at: one for one in numbers if (at := place_of(one, told)) is not None}
+            found.append(_Pair(state, sent, places))
+    best = max(found, key=lambda one: len(one.places), default=None)
+    return best if best and best.places else None
 
 
-def parts_of(schema: Schema) -> Iterator[Schema]:
-    """Yield a schema and its alternatives."""
-    yield schema
-    for word in ("allOf", "anyOf", "oneOf"):
-        for part in schema.get(word, ()):
-            if isinstance(part, dict):
-                yield from parts_of(part)
+def _position(number: Commanded, told: Sequence[str]) -> str | None:
+    """Return where a state tells the position of what is commanded."""
+    return next((at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place)), None)
 
 
-def _numbers(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:
-    """Yield the JSON pointers of the numbers in an object, with their schemas."""
-    for part in parts_of(schema) if depth else ():
-        for name, member in part.get("properties", {}).items():
-            place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
-            if isinstance(member, dict) and is_numeric(member):
-                yield place, member
-            elif isinstance(member, dict):
-                yield from _numbers(member, place, depth - 1)
+def _velocity(number: Commanded, told: Sequence[str]) -> str | None:
+    """Return where a state tells a velocity, or else the position that it changes."""
+    measured = (at for at in told if _MEASURED.search(at) and f"{at}/".endswith(f"{number.place}/"))
+    changed = (at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place))
+    return next(measured, None) or (next(changed, None) if axis_of(number.place).strip("xyz") else None)
 
 
 def _stamps(schema: Schema) -> list[str]:
     found = [f"/{name}" for part in parts_of(schema) for name in part.get("properties", {}) if _STAMP.search(name)]
     return found[:1]
-
-
-def _template(schema: Schema, axes: set[str], depth: int = _DEPTH) -> dict[str, Any]:
-    """Return a body with a name for each axis, and a value for what else is required."""
-    made: dict[str, Any] = {}
-    for part in _chosen(schema, axes) if depth else ():
-        required = part.get("required", ())
-        for name, member in part.get("properties", {}).items():
-            if not isinstance(member, dict) or name in made:
-                continue
-            if name in axes:
-                made[name] = f"{{{name}}}"
-            elif is_numeric(member) and _LASTS.search(name):
-                made[name] = "{seconds}"
-            elif inner := _template(member, axes, depth - 1):
-                made[name] = inner
-            elif name in required:
-                made[name] = member.get("default", 0.0 if is_numeric(member) else "")
-    return made if _names(made) or not axes else {}
-
-
-def _chosen(schema: Schema, axes: set[str]) -> Iterator[Schema]:
-    """Yield a schema's parts, and of its alternatives the one with the most axes."""
-    yield schema
-    for part in schema.get("allOf", ()):
-        yield from _chosen(part, axes)
-    for word in ("anyOf", "oneOf"):
-        ranked = sorted(
-            (part for part in schema.get(word, ()) if isinstance(part, dict)),
-            key=lambda part: sum(at.rpartition("/")[2] in axes for at, _ in _numbers(part)),
-        )
-        if ranked:
-            yield from _chosen(ranked[-1], axes)
-
-
-def _names(made: dict[str, Any]) -> bool:
-    return any(_names(one) if isinstance(one, dict) else "{" in str(one) for one in made.values())

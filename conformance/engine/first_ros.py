@@ -17,7 +17,7 @@ from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
-from conformance.engine.first_motion import body_of, parts_of
+from conformance.engine.commanded import body_schema, parts_of
 from conformance.engine.map_text import inline
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import FLOATS, INTEGERS, LONG, Definition, Shape, value_at
@@ -190,7 +190,7 @@ def proposed_ros_map(
 
 
 def _why_not(one: Operation, graph: Graph) -> str:
-    schema = one.shape if one.method == "GET" else body_of(one)
+    schema = one.shape if one.method == "GET" else body_schema(one)
     if "{" in one.template:
         return "its path has a parameter: write an operation for each value, as in GET /topics/odom"
     if one.method != "GET" and one.method not in _SENDS:
@@ -207,7 +207,7 @@ def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = N
     A declared 404 may be for anything: `absent` is a status that it returned, for want of a message, as it seems.
     """
     reads = one.method == "GET"
-    fits = graph.fitting(one.shape if reads else body_of(one), graph.topics)
+    fits = graph.fitting(one.shape if reads else body_schema(one), graph.topics)
     # Some fields of any message may be some of an operation, if not its name says so.
     fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared(one, name)}
     name, guess = _best(one, fits, written if reads else ())
@@ -239,7 +239,7 @@ def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -
 
 def _call(one: Operation, graph: Graph) -> _Proposal | None:
     """Return the proposal that an operation calls a service."""
-    requests = graph.fitting(body_of(one), graph.services, "#Request")
+    requests = graph.fitting(body_schema(one), graph.services, "#Request")
     responses = graph.fitting(one.shape, {name: graph.services[name] for name in requests}, "#Response")
     name, guess = _best(one, {name: fit for name, fit in responses.items() if not fit.fields})
     if not name:
@@ -251,7 +251,7 @@ def _call(one: Operation, graph: Graph) -> _Proposal | None:
 
 def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followers: set[str]) -> _Proposal | None:
     """Return the proposal that an operation sends goals to an action; those that follow a goal go to ``followers``."""
-    fits = graph.fitting(body_of(one), graph.actions, "#Goal")
+    fits = graph.fitting(body_schema(one), graph.actions, "#Goal")
     name, guess = _best(one, fits)
     id_ = next((at for at, _ in _leaves(one.shape or {}) if re.search(r"[/_]u?u?id$", at)), None)
     if not name or id_ is None:

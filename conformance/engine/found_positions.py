@@ -7,13 +7,24 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from conformance.engine.commanded import Commanded, body_schema, parts_of, template_of
+from conformance.engine.commanded import (
+    FAST,
+    Commanded,
+    axis_of,
+    body_schema,
+    bounds_of,
+    numbers_in,
+    parts_of,
+    template_of,
+    unit_of,
+)
 from conformance.engine.driven_numbers import ANGLE
 from conformance.engine.finding import ECHO, REFUSED, Finder, Found
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
+from conformance.transport.exchange import Exchange
 
 # How long the device is watched before and after a little move, and how long it has for that, s.
 _BEFORE_S, _MOVES_S = 0.25, 3.0
@@ -21,6 +32,8 @@ _BEFORE_S, _MOVES_S = 0.25, 3.0
 _BUDGET_S: Final = 16.0
 # Shares of a small move that are tried; share by which an axis may miss its target, or another one may move along.
 _PARTS, _FOLLOWS = (0.2, 1.0), 0.15
+# No angle is limited to so many rad; the status of a move that must wait for another one.
+_RAD, _CONFLICT = 7.0, 409
 
 
 @dataclass(frozen=True)
@@ -62,6 +75,9 @@ class PositionFinder(Finder):
                 "give --read, or write a map (docs/motion.md)"
             )
         self._reads = [one for one in self._reads if one.label == read]
+        self._relative = all(one.is_relative for one in self._plan.numbers if one.name in counts[read])
+        schemas = dict(numbers_in(self._reads[0].shape or {}))
+        self._schemas = {name: schemas.get(place, {}) for name, place in counts[read].items()}
         # What else the operation may take is left out, so that it stays where it is.
         schema = body_schema(self._plan.drive)
         named = {one.place: f"{{{one.name}}}" for one in self._plan.numbers if one.name in counts[read]}
@@ -82,7 +98,8 @@ class PositionFinder(Finder):
                     if found is not None:
                         moved[number.name] = found
         finally:
-            self._command(start)
+            if not self._relative:
+                self._command(start)
         if not moved and self._refused:
             raise NotPossibleError(self._refused[0])
         if not moved:
@@ -103,6 +120,7 @@ class PositionFinder(Finder):
             words = number.place.strip("{}").split("/")
             own = words[-1].lower()
             same = [one for one in places if one.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
+            same = same or [one for one in places if not FAST.search(one) and axis_of(one) == axis_of(own)]
             if own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
                 same += [one for one in places if one.lower() in {"", "/value", f"/{own}/value"}]
             # Of several, the one whose path has most in common with that of what is commanded.
@@ -119,7 +137,8 @@ class PositionFinder(Finder):
             little = part * number.little
             tries: list[Moved] = []
             for way in (little, -little) if part == _PARTS[-1] else (little,):
-                if number.declared and not number.declared[0] <= start[number.name] + way <= number.declared[1]:
+                limits = self._limits(number)
+                if limits and not limits[0] <= start[number.name] + way <= limits[1]:
                     continue
                 one = self._moved(number, places, start, way)
                 if isinstance(one, str):
@@ -141,6 +160,20 @@ class PositionFinder(Finder):
             self._found.notes.append(f"{number.name} stays where it is: {why}.")
         return found
 
+    def _limits(self, number: Commanded) -> tuple[float, float] | None:
+        """Return the limits of a position that are declared, where it is read or where it is commanded; or None."""
+        return bounds_of(self._schemas[number.name]) or (None if self._relative else number.declared)
+
+    def _sent_by(self, start: Mapping[str, float], name: str, way: float) -> Exchange:
+        """Send one axis farther by a way; a device that is still busy with its last move gets time to end that."""
+        values = {name: way} if self._relative else {**start, name: start[name] + way}
+        until = self._clock.now() + _MOVES_S
+        while True:
+            exchange = self._command(values)
+            if exchange.response.status != _CONFLICT or not self._relative or self._clock.now() > until:
+                return exchange
+            self._look()
+
     def _moved(
         self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float], way: float
     ) -> Moved | str:
@@ -149,7 +182,7 @@ class PositionFinder(Finder):
         rested = self._clock.now()
         self._watch(_BEFORE_S)
         sigma = Noise.of([value for _, value in self._looks.samples(read, place, rested)]).sigma
-        exchange = self._command({**start, number.name: goal})
+        exchange = self._sent_by(start, number.name, way)
         sent = self._clock.now()
         if not exchange.response.ok:
             said = exchange.response.body[:300].decode("utf-8", "replace")
@@ -170,7 +203,7 @@ class PositionFinder(Finder):
             name: median(value for _, value in self._looks.samples(read, at, sent)[-SEVERAL:])
             for name, at in places.items()
         }
-        self._command(start)
+        self._sent_by(start, number.name, -way if self._relative else 0.0)
         self._watch(max(_BEFORE_S, took_s))
         if abs(ends[number.name] - goal) > near:
             return f"sent to {goal:.4g}, it came to {ends[number.name]:.4g}"
@@ -192,13 +225,14 @@ class PositionFinder(Finder):
         for name, found in moved.items():
             number, here = numbers[name], start[name]
             near = (here + min(0.0, *found.ways), here + max(0.0, *found.ways))
-            limits = [round(one, 4) for one in number.declared or near]
+            declared = self._limits(number)
+            limits = [round(one, 4) for one in declared or near]
             widest = max(widest, (limits[1] - limits[0]) / found.way)
             pointer, _, angle = found.place.partition(ANGLE)
-            given: dict[str, Any] = {"at": pointer, "unit": "rad" if number.turns else "", "limits": limits}
+            given: dict[str, Any] = {"at": pointer, "unit": self._unit(number, found), "limits": limits}
             given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
-            given |= ({"angle": angle} if angle else {}) | ({} if number.declared else {"bound": False})
-            source = "as declared" if number.declared else "none are declared; so far it was seen to go"
+            given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
+            source = "as declared" if declared else "none are declared; so far it was seen to go"
             yield f"{key(name)} = {inline(given)}  # limits: {source}"
         yield ""
         yield "[motion.goto]"
@@ -209,6 +243,9 @@ class PositionFinder(Finder):
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in moved}
             yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}'}))}"
+        if self._relative:
+            yield "relative = true"
+            yield 'while_moving = "refused"  # no second move is sent before the first one has ended'
         slowest = max(one.took_s for one in moved.values())
         if lasts:
             settle_s = max(0.5, slowest - self.seconds + 0.3)
@@ -218,9 +255,15 @@ class PositionFinder(Finder):
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
         off = max(max(2 * one.off, 8 * one.sigma) for one in moved.values())
         yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
-        if REFUSED & self._plan.drive.responses.keys() and all(one.declared for one in numbers.values()):
+        if REFUSED & self._plan.drive.responses.keys() and all(map(self._limits, numbers.values())):
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
         yield from self._stop_lines()
+
+    def _unit(self, number: Commanded, found: Moved) -> str:
+        """Return the unit of an axis by its name or description; of what turns, rad, which a turn of 7 is not."""
+        declared = self._limits(number) or (0.0, 0.0)
+        said = unit_of(found.place, self._schemas[number.name]) or unit_of(number.place, number.schema)
+        return said or ("rad" if number.turns and max(map(abs, declared)) < _RAD else "")
 
     def _stop_lines(self) -> Iterator[str]:
         """Yield the stop beside the operation that moves the device, if its parameters are known."""

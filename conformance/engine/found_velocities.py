@@ -7,7 +7,15 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from conformance.engine.commanded import Commanded, is_axis, unique_names
+from conformance.engine.commanded import (
+    Commanded,
+    bounds_of,
+    direction_line,
+    is_axis,
+    numbers_in,
+    unique_names,
+    unit_of,
+)
 from conformance.engine.driven_numbers import ANGLE
 from conformance.engine.finding import ECHO, REFUSED, ROOM_M, ROOM_S, Finder, Found
 from conformance.engine.map_text import inline, key, string
@@ -26,6 +34,10 @@ _NEAR: Final = 2.0
 # Rates that differ by more than this factor are of different kinds.
 _OTHER: Final = 4.0
 _ROOM_RAD: Final = 3.0
+_HEADING: Final = re.compile(r"yaw|heading|theta|orientation", re.IGNORECASE)
+# How far a velocity may be off, as a share of the fastest.
+_OFF, _OFF_WITHOUT_UNIT = 0.15, 0.25
+_COORDINATES: Final = frozenset("xyz")
 
 
 class VelocityFinder(Finder):
@@ -75,7 +87,7 @@ class VelocityFinder(Finder):
         """
         found: dict[str, dict[tuple[str, str], Response]] = {}
         refused: dict[str, NotPossibleError] = {}
-        self._settle_s = 0.3
+        self._settle_s, self._first = 0.3, dict[str, float]()
         for number in self._plan.numbers:
             try:
                 drives = self._forth_and_back(number)
@@ -106,7 +118,7 @@ class VelocityFinder(Finder):
         speeds = [number.little] if most > 0 else []
         speeds += [-number.little] if least < 0 else []
         drives: list[tuple[float, ...]] = []
-        for speed in speeds:
+        for speed in (*speeds, *speeds[:1]):
             rested = self._clock.now()
             self._watch(_BEFORE_S)
             begun, _ = self._drive(number, speed)
@@ -114,7 +126,12 @@ class VelocityFinder(Finder):
             self._watch(_AFTER_S)
             drives.append((speed, rested, begun, ended, self._clock.now()))
             if len(drives) == 1 and not self._alike(drives):
+                if speed == speeds[-1]:
+                    break
+                drives.clear()  # at an end of its travel a device only goes back
+            elif len(drives) == len(speeds):
                 break
+        self._first[number.name] = drives[0][0]
         return drives
 
     def _alike(self, drives: Sequence[tuple[float, ...]]) -> dict[tuple[str, str], Response]:
@@ -180,7 +197,10 @@ class VelocityFinder(Finder):
     def _shown(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
         velocities = {place: one for place, one in own.items() if not one.is_position and 1 / _NEAR < one.ratio < _NEAR}
         position = self._shown_as_position(own)
-        if position and (number.turns or not turning):
+        # A joint is called as what commands it. Once a device has turned, x and y change otherwise.
+        called = number.place.rpartition("/")[2].lower()
+        is_joint = position and called not in _COORDINATES and position[0].rpartition("/")[2].lower() == called
+        if position and (number.turns or not turning or is_joint):
             return position
         return min(velocities.items(), key=lambda item: abs(math.log(item[1].ratio)), default=None)
 
@@ -197,7 +217,7 @@ class VelocityFinder(Finder):
 
     def _hold_s(self, number: Commanded, place: str, response: Response) -> float | None:
         """Let the device go; return how long it drove on, s, and stop it. None: for longer than the suite waits."""
-        speed = number.little if number.limits[1] > 0 else -number.little
+        speed = self._first[number.name]
         self._watch(_BEFORE_S)
         _, last = self._drive(number, speed, end=False)
         read, moving = self._reads[0].label, response.ratio * speed
@@ -244,6 +264,16 @@ class VelocityFinder(Finder):
             for (operation, place), one in responses[name].items()
             if operation == read and one.is_position and 1 / _OTHER < one.ratio / _unit(one.ratio)[0] < _OTHER
         }
+        # How fast each place changes at most.
+        fastest = {
+            place: max(
+                abs(one.ratio) * max(map(abs, numbers[name].limits))
+                for name in shown
+                for at, one in responses[name].items()
+                if at == (read, place)
+            )
+            for place in places
+        }
         names = unique_names(list(places))
         driven = {place: name for name, (place, one) in shown.items() if one.is_position}
         yield "[motion.state]"
@@ -252,7 +282,7 @@ class VelocityFinder(Finder):
         yield "[motion.state.axes]" + ("" if places else "  # nothing shows where it is")
         for place, response in places.items():
             number = numbers.get(driven.get(place, ""))
-            yield f"{key(names[place])} = {self._axis(place, response, number)}"
+            yield f"{key(names[place])} = {self._axis(place, response, number, fastest[place])}"
         yield ""
         yield "[motion.velocity]"
         yield f"send = {string(self._plan.drive.label)}"
@@ -260,8 +290,11 @@ class VelocityFinder(Finder):
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in shown}
             yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1}))}"
+            yield from (direction_line(numbers[name]) for name in shown if numbers[name].direction)
         widest = {name: max(map(abs, numbers[name].limits)) for name in shown}
-        yield f"tolerance = {0.15 * max(widest.values()):.3g}  # the suite's: 15 % of the fastest"
+        off = {name: _OFF if numbers[name].has_unit else _OFF_WITHOUT_UNIT for name in shown}
+        least = max(off[name] * widest[name] for name in shown)
+        yield f"tolerance = {least:.3g}  # the suite's: {max(off.values()):.0%} of the fastest"
         yield f"settle_s = {min(settle_s, 2.0):.2f}  # seen: so long it took to rest, and half as long again"
         if hold_s is not None:
             yield f"hold_s = {hold_s:.2f}  # seen: let go, it stopped by itself"
@@ -274,29 +307,37 @@ class VelocityFinder(Finder):
             number = numbers[name]
             given: dict[str, Any] = {"limits": list(number.limits)}
             given |= {"of": names[place]} if response.is_position else {"at": place}
-            scale, _ = _unit(response.ratio)
+            # Without a unit nobody says how fast it must be, but as fast as it was seen.
+            scale = _unit(response.ratio)[0] if number.has_unit else float(f"{response.ratio:.3g}")
             if response.is_position and scale != 1:
                 given["scale"] = scale
-            given["tolerance"] = round(max(0.15 * widest[name], 8 * (0 if response.is_position else response.sigma)), 4)
+            given["tolerance"] = round(
+                max(off[name] * widest[name], 8 * (0 if response.is_position else response.sigma)), 4
+            )
             source = "limits as declared" if number.declared else "limits: the suite's, as none are declared"
             yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
 
-    def _axis(self, place: str, response: Response, number: Commanded | None) -> str:
+    def _axis(self, place: str, response: Response, number: Commanded | None, fastest: float) -> str:
         """Return an axis of the state, within some room around where it is."""
         samples = self._looks.samples(self._reads[0].label, place, 0.0)
         here = samples[-1][1]
         scale, (way, turn) = _unit(response.ratio)
         turns = number.turns if number else ANGLE in place
         pointer, _, angle = place.partition(ANGLE)
-        unit = turn if turns else way
-        if turns and unit == "rad" and not angle and re.search(r"yaw|heading|theta|orientation", place, re.IGNORECASE):
+        schema = dict(numbers_in(self._reads[0].shape or {})).get(pointer, {})
+        unit = unit_of(pointer, schema) or (turn if turns else way)
+        # One that was seen to turn in degrees is known by the same factor of a radian.
+        scale = next((factor for factor, units in _UNITS.items() if unit and unit in units), scale)
+        if turns and unit in {"rad", "deg"} and not angle and _HEADING.search(place):
             angle = "yaw"
-        fastest = max(map(abs, number.limits)) * scale if number else 0.1 * scale
         room = _ROOM_RAD * scale if turns else max(ROOM_M * scale, ROOM_S * fastest)
-        limits = [-3, 3] if angle else [round(here - room, 4), round(here + room, 4)]
+        all_around = [round(end * scale, 1) for end in (-3.0, 3.0)]
+        limits = all_around if angle else [round(here - room, 4), round(here + room, 4)]
+        if declared := bounds_of(schema):
+            limits = [max(limits[0], declared[0]), min(limits[1], declared[1])]
         given: dict[str, Any] = {"at": pointer, "unit": unit, "limits": limits}
         given["tolerance"] = round(max(6 * response.sigma, 0.06 * fastest, 0.002 * scale), 4)
-        given |= {"angle": angle} if angle else {}
+        given |= {"angle": angle} if angle else {} if declared else {"bound": False}
         return f"{inline(given)}  # limits: {'all around' if angle else f'{room:.3g} {unit} around where it was'}"
 
 

@@ -177,7 +177,8 @@ def motion_map_of(text: str, where: str) -> MotionMap:
         StatementError: it is none.
     """
     try:
-        return fit(tomllib.loads(text), _Map, where, StatementError).motion
+        found = {"motion": written_out(tomllib.loads(text).get("motion"), {})}
+        return fit(found, _Map, where, StatementError).motion
     except tomllib.TOMLDecodeError as error:
         raise StatementError(f"{where} is no TOML: {error}") from error
 

@@ -9,7 +9,7 @@ from statistics import median
 
 from conformance.measures.samples import SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.measuring import measured
+from conformance.scenarios.motion.measuring import end_of_travel, measured
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
@@ -80,6 +80,7 @@ def tries_of(drives: Sequence[Drive]) -> Iterable[list[Drive]]:
 
 def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drove as drives want it; one that a slow link broke off is made again."""
+    seen = [reading for drive in drives for reading in (*drive.under_way, *drive.after)]
     for tries in tries_of(drives):
         # What was refused counts each time.
         shown = [
@@ -88,14 +89,14 @@ def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             if motion.velocity is not None
             and (one.was_kept(motion.velocity.hold_s) or not all(command.accepted for command in one.commands))
         ]
-        found = [outcome for one in shown for outcome in _driven(one, motion)]
+        found = [outcome for one in shown for outcome in _driven(one, motion, seen)]
         cases = [one for one in found if isinstance(one, Case)]
         yield from cases or found
         if not shown:
             yield NotTested("over this link the device was not driven on within its hold time")
 
 
-def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
+def _driven(drive: Drive, motion: MotionMap, so_far: Sequence[Reading]) -> Iterator[Outcome]:
     if motion.velocity is None:
         return
     refused = next((one for one in drive.commands if not one.accepted), None)
@@ -105,6 +106,9 @@ def _driven(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     first = drive.commands[0]
     seen = [one for one in drive.under_way if one.sent >= drive.settled(motion.velocity.settle_s)]
     for name, wanted in drive.wanted.items():
+        if (place := end_of_travel(drive.under_way, name, wanted, motion, so_far)) is not None:
+            yield NotTested(f"it stands at {place:.4g}, maybe the end of its travel: write its limits into the map")
+            continue
         found = measured(seen, name, motion)
         if found is None:
             yield NotTested("the velocity could not be measured")

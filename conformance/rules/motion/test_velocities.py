@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
 from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, slowest, tries_of, went_on
-from conformance.scenarios.motion.measuring import measured, noise_of
+from conformance.scenarios.motion.measuring import end_of_travel, measured, noise_of
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, vanishing, velocities
@@ -132,11 +132,14 @@ def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[
     if motion.velocity is None or motion.velocity.hold_s is None:
         return
     unseen, seen = set[str](), set[str]()
+    so_far = [one for drive in trace for one in drive.readings]
     for drive in trace:
         last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s, share, motion)
         within = [one for one in drive.after if begin <= one.sent and one.received <= end]
         for name, wanted in drive.wanted.items():
             found = measured(within, name, motion) if wanted else None
+            if end_of_travel(within, name, wanted, motion, so_far) is not None:
+                continue
             if found is not None:
                 seen.add(name)
                 room = noise_of(within, name, motion, drive.resting)

@@ -52,9 +52,8 @@ def with_room(
         axes = mapped.motion.state.axes
         mapped.go("room for a drive", {name: axes[name].within(value) for name, value in wanted.items()})
         mapped.come_to_rest()
-    else:
-        for axis, span in away.items():
-            _drive_back(mapped, axis, span)
+    elif any(_drive_back(mapped, axis, span) for axis, span in away.items()):
+        return with_room(mapped, choices, lasts_s, slower=slower)
     here = mapped.where()
     for axis, (least, greatest) in begin.items():
         room = mapped.motion.tolerance(axis)
@@ -82,8 +81,8 @@ def _learn(mapped: MappedDevice, name: str) -> None:
     mapped.come_to_rest()
 
 
-def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> None:
-    """Drive along an axis by velocity until the device is in a span."""
+def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
+    """Drive along an axis by velocity until the device is in a span; return whether its travel ends before."""
     forward = mapped.where()[axis] < span[0]
     speeds = [
         {name: speed.limits[forward] * _BACK_SHARE}
@@ -93,12 +92,15 @@ def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> None:
     if not speeds:
         raise NotPossibleError(f"no velocity of the map takes {axis} back to where it has room for a drive")
     until, seen = mapped.clock.now() + _BACK_S, [mapped.read() for _ in range(SEVERAL)]
-    middle = sum(span) / 2
-    while mapped.clock.now() < until and not mapped.room.is_over(speeds, seen, mapped.drives.settle_s):
+    middle, ends = sum(span) / 2, False
+    starts_by = mapped.clock.now() + mapped.drives.settle_s + _LEARNED_S
+    while not ends and mapped.clock.now() < until and not mapped.room.is_over(speeds, seen, mapped.drives.settle_s):
         if not mapped.drive(speeds[0]).accepted:
             break
         seen.append(mapped.read())
         if seen[-1].values and (seen[-1].values[axis] >= middle if forward else seen[-1].values[axis] <= middle):
             break
+        ends = mapped.clock.now() > starts_by and mapped.room.ends(speeds[0], seen)
     mapped.drive({})
     mapped.come_to_rest()
+    return ends

@@ -7,13 +7,15 @@ from statistics import median
 from typing import Final
 
 from conformance.measures.samples import LATE, SEVERAL, slope, usual_s
-from conformance.scenarios.motion.trace import Reading, Resting
+from conformance.scenarios.motion.trace import Reading, Resting, middle_of
 from conformance.statement.motion_map import MotionMap
 
 # A reading is late if it takes longer than usual, and more than this share of the drive.
 _SHARE: Final = 0.1
 # Shortest time over which a velocity is measured, s.
 _LAPSE_S: Final = 0.1
+# Share of a velocity at which a device stands.
+_STANDS: Final = 0.1
 #: A velocity is steady if each half of this time shows it, s; one that the device only passes through is not.
 STEADY_S: Final = 0.36
 
@@ -35,6 +37,30 @@ def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float
         return None
     rate = slope(seen)
     return None if rate is None else rate / speed.scale
+
+
+def end_of_travel(
+    readings: Sequence[Reading], name: str, wanted: float, motion: MotionMap, so_far: Sequence[Reading]
+) -> float | None:
+    """Return where a device stands though it is driven on, if nobody declared that its travel goes any farther.
+
+    Args:
+        readings: under way.
+        name: the velocity.
+        wanted: how fast it is, units per second.
+        motion: the map.
+        so_far: other readings; a device that was farther in this direction does not stand at its end.
+    """
+    speed = motion.velocity.axes[name] if motion.velocity else None
+    if speed is None or not speed.of or not wanted or motion.state.axes[speed.of].bound:
+        return None
+    last = [one for one in readings if one.values and one.sent >= readings[-1].sent - STEADY_S]
+    found, room, way = measured(last, name, motion), motion.tolerance(speed.of), 1 if wanted > 0 else -1
+    if found is None or abs(found) > _STANDS * abs(wanted) or last[-1].sent - last[0].sent < STEADY_S / 2:
+        return None
+    place = middle_of(last[-SEVERAL:], speed.of)
+    farther = any(way * (one.values[speed.of] - place) > room for one in so_far if one.values)
+    return None if farther else place
 
 
 def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting: Resting) -> float:

@@ -10,7 +10,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from msgspec import structs
+
 from conformance.measures.samples import FARTHEST, LATE, SEVERAL, Noise, usual_s
+from conformance.scenarios.motion.measuring import end_of_travel
 from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
@@ -59,6 +62,7 @@ class Room:
         # The same while nothing but this velocity was commanded: a device that did not turn drives the same way.
         self._heading: dict[str, dict[str, Span]] = {}
         self._driven = set[str]()
+        self._so_far: list[Reading] = []
 
     def plan(self, choices: Sequence[Speeds], lasts_s: float) -> tuple[float, dict[str, Span]]:
         """Plan a drive at any of several velocities, until the device rests again.
@@ -127,6 +131,20 @@ class Room:
                     rate = way / lapse_s / speed
                     least, greatest = self._rates[name].get(axis, (rate, rate))
                     self._rates[name][axis] = min(least, rate), max(greatest, rate)
+
+    def ends(self, speeds: Speeds, readings: Sequence[Reading]) -> bool:
+        """Learn whether a device stands at an end of its travel that nobody declared; later drives end before it."""
+        self._so_far += readings[:: max(1, len(readings) // SEVERAL)]
+        found = False
+        for name, wanted in speeds.items():
+            place = end_of_travel(readings, name, wanted, self._motion, self._so_far)
+            if place is not None and self._motion.velocity:
+                of = self._motion.velocity.axes[name].of
+                least, most = self._axes[of].limits
+                limits = (least, place) if wanted > 0 else (place, most)
+                if abs(sum(limits) - least - most) > self._motion.tolerance(of) and limits[0] < limits[1]:
+                    self._axes[of], found = structs.replace(self._axes[of], limits=limits), True
+        return found
 
     def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
         """Learn from readings at a steady velocity which way it takes the device until the next command."""

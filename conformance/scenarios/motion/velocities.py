@@ -471,6 +471,8 @@ def _kept_up(
         steady = [one for one in readings if one.sent >= since]
         mapped.room.note(made, steady)
         mapped.room.note_heading(made, steady)
+    elif mapped.room.ends(made, readings):
+        whole = False
     since = begun + settle_s if since is None else min(since, begun + settle_s)
     drive = Drive(part.what, wanted, tuple(commands), tuple(readings), None, (), slowed=slowed)
     return replace(drive, resting=mapped.resting, since=since), whole
