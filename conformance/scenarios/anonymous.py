@@ -23,6 +23,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 
 # Statuses about the resource, which a device may send before it checks credentials.
 _UNDECIDED: Final = frozenset({404, 409, 410})
+# Statuses by which a device says that there is a new thing, or a job that has begun.
+_MAY_BE_CREATED: Final = frozenset({200, 201, 202})
 # Of a slow device: operations that are sent without credentials on a connection that has carried some.
 _KEPT: Final = 3
 # _NEVER: number for an identifier that nobody creates.
@@ -99,7 +101,7 @@ def _on_new_thing(
     read, create, delete = (known.get((method, path)) for method, path in _life_of(item))
     if operation.safe or read is None or create is None:
         return
-    path = created_path(surveyor, create, read)
+    path = created_path(surveyor, create, read, _MAY_BE_CREATED)
     if path:
         target = path + operation.template[len(item) :] + "".join(request.target.partition("?")[1:])
         sent = client.send(

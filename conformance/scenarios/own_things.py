@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -115,8 +115,17 @@ def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     return path if thing.sent(create, None).ok else ""
 
 
-def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
-    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing."""
+def created_path(
+    surveyor: Surveyor, create: Operation, read: Operation, statuses: Container[int] = frozenset({201})
+) -> str:
+    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing.
+
+    Args:
+        surveyor: sends the requests.
+        create: operation that creates it.
+        read: operation that reads it.
+        statuses: of a creation that counts. With 202, a thing may come later, or end by itself.
+    """
     made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = _with_texts(create, usual[0].body)
@@ -129,7 +138,7 @@ def created_path(surveyor: Surveyor, create: Operation, read: Operation) -> str:
         made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
         if made.ok:
             break
-    if made is None or made.exchange is None or made.status != 201:  # noqa: PLR2004 - RFC 9110 15.3.2
+    if made is None or made.exchange is None or made.status not in statuses:
         return ""
     return located(surveyor.api, read, made.exchange)
 

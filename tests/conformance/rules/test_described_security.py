@@ -78,7 +78,7 @@ class _Bays(Handler):
             authorized = False
         if self.command == "POST" and not id_ and authorized:
             bays.append(len(bays) + 1)
-            return self.send(201, b'{"id": %d}' % bays[-1])
+            return self.send(self.server.created, b'{"id": %d}' % bays[-1])
         if id_ and id_ not in bays:
             return self.send(404, b"{}")
         if self.command == "DELETE" and authorized:
@@ -86,10 +86,11 @@ class _Bays(Handler):
         return self.send(200 if authorized else 401, b"{}")
 
 
+@pytest.mark.parametrize("created", [201, 202])
 @pytest.mark.parametrize("unguarded", [(), ("DELETE", 2), ("POST", 3)])
-def test_a_thing_that_is_there_shows_whether_credentials_are_needed(tmp_path, unguarded):
+def test_a_thing_that_is_there_shows_whether_credentials_are_needed(tmp_path, unguarded, created):
     contract = Contract.load(write_described_pack(tmp_path, _BAYS, _BAYS))
-    with server_of(_Bays, bays=[], open={unguarded}) as server:
+    with server_of(_Bays, bays=[], open={unguarded}, created=created) as server:
         statement = Statement(endpoints=Endpoints(rest=server.url), calls=Calls(allow=("*",)))
         run = Run(statement=statement, contract=contract)
         with closing(HttpClient(server.url, Connection(token="roaas"))) as client:  # noqa: S106 - no secret
