@@ -120,6 +120,8 @@ def allow(occasion: Occasion) -> Iterator[Case]:
     besides = f"{', '.join(sorted(named - wanted - _ALWAYS_ALLOWED))} besides"
     declared = f"Allow: {', '.join(sorted(wanted))}, as declared"
     yield occasion.case("description/allow", named <= wanted | _ALWAYS_ALLOWED, declared, besides, cause=besides)
+    if is_asked and not occasion.contract.is_claimed:
+        return  # a response to OPTIONS need not have Allow (RFC 9110 9.3.7), so it need not name all methods either
     refused = {method} - _ALWAYS_ALLOWED if is_refused else set()
     yield occasion.case(
         "http/allow-agrees",

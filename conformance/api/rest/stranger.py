@@ -30,11 +30,10 @@ class Stranger:
     def __init__(self, api: RestInterface, wrong: Credentials | None = None) -> None:
         self._api = api
         connection = api.client.connection
-        self._client = HttpClient(
-            api.client.base_url,
-            # Sent again, wrong credentials would shut the suite out for longer.
-            replace(connection, token=None, credentials=wrong or connection.credentials.wrong, is_patient=False),
-        )
+        wrong = wrong or connection.credentials.wrong
+        # Sent again, wrong credentials would shut the suite out for longer.
+        settings = replace(connection, token=None, credentials=wrong, is_patient=False)
+        self._client = HttpClient(api.client.base_url, settings)
 
     def close(self) -> None:
         """Close all open connections."""

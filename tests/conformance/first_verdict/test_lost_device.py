@@ -69,7 +69,7 @@ def test_a_device_that_hangs_is_restarted_once_and_judged_to_the_end(tmp_path):
     assert "sent alone after the device had come back, did it again" in failure["message"]
     # What was found besides is kept, and what comes after it is judged.
     assert outcome.requirement("description/body-schema")["verdict"] == "fail"
-    assert outcome.requirement("http/allow-agrees")["verdict"] == "pass"
+    assert outcome.requirement("description/allow")["verdict"] == "pass"
 
 
 def test_a_crash_that_needs_two_requests_is_shown_by_the_two(tmp_path):
