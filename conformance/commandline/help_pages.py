@@ -25,7 +25,7 @@ class Group(StrEnum):
     CREDENTIALS = "Credentials"
     MEASURED = "What is measured"
     EFFORT = "Effort"
-    COMPARED = "What it is compared with"
+    COMPARED = "Comparison"
     MACHINES = "Several machines"
     OUTPUT = "Output"
     HELP = "Help"

@@ -46,7 +46,7 @@ class Reaching:
     def request(self, operation: Operation, variation: Variation) -> Outgoing:
         """Return the request of a variation, with the entity tag of its resource if it has or needs If-Match.
 
-        By whatever else stands in it, it would be refused (RFC 9110 13.1.1).
+        With any other tag in If-Match, the device would refuse it (RFC 9110 13.1.1).
         """
         request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
         others = tuple(one for one in request.headers if one[0].lower() != _IF_MATCH)

@@ -37,7 +37,7 @@ def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
     statement = said_of(run)
     found = list(outcomes("rest-resources/velocity-both", trace.drive, statement.limits))
     if not found:
-        # Either the statement declares how the two depend on each other, or there are no two limits.
+        # The statement declares how both velocities depend on each other, or lacks one of the two limits.
         yield NotClaimed("does not apply: by its statement the robot need not, or velocity-range judges it")
     yield from found
 
