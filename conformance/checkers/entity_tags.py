@@ -184,7 +184,8 @@ class EntityTags:
         yield from self._at_once(occasion, now, wanted or "")
         if now is not None:
             yield from _performed(occasion, asked)
-        if wanted is None or wanted.strip() == "*" or now is None or not _LIST.fullmatch(wanted):
+        is_any = (wanted or "").strip() == "*"
+        if wanted is None or now is None or not (is_any or _LIST.fullmatch(wanted)):
             return
         if not _OTHERS.isdisjoint(asked):
             return
@@ -192,7 +193,7 @@ class EntityTags:
         named = _TAG.findall(wanted)
         # If-Match compares strongly, but a device with only weak tags may accept its own.
         weakly = tag.startswith("W/") and tag[2:] in {one.removeprefix("W/") for one in named}
-        matches = tag in named or weakly
+        matches = tag in named or weakly or is_any
         if is_refused:
             if answer.status == HTTPStatus.PRECONDITION_FAILED and not matches:
                 self._has_412 |= not tag.startswith("W/")

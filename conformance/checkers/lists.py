@@ -172,7 +172,7 @@ class Lists:
             return others[:1] if is_plain and values else None
         items = flat(member["items"]) if isinstance(member.get("items"), dict) else member
         if choices and set(asked) <= set(map(text_of, items.get("enum", ()))):
-            if name in LEVELS and len(asked) == 1:
+            if name in LEVELS and len(asked) == 1 and "exact" not in parameter.says.lower():
                 ranks = [choices.index(one) - choices.index(asked[0]) for one in others if one in choices]
                 return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
             return others[:1] if values else None

@@ -82,22 +82,25 @@ def own_things(api: RestInterface, values: Values) -> Survey:
         create = operations.get(("POST", collection_of(path))) or operations.get(("PUT", path))
         delete = operations.get(("DELETE", path))
         with api.run.limit.lifted(), suppress(NoAnswerError):
-            if not read.parameter("path"):
-                if changes:
-                    _Thing(surveyor, read, path_of_usual(read, values)).written(changes)
-            elif create is not None and collection_of(path):
-                make = _put if create.method == "PUT" else created_path
-                if thing_path := make(surveyor, create, read):
-                    thing = _Thing(surveyor, read, thing_path)
-                    thing.asked()
-                    if "206" in read.responses:
-                        thing.in_parts(read, thing.target)
-                    thing.written(changes)
-                    thing.filled()
-                    thing.listed_below(operations)
-                    if values.unique.knows(create) and changes:
-                        thing.made_alike(create, changes, delete)
-                    thing.deleted(delete, operations.get(("GET", collection_of(path))))
+            is_item = bool(read.parameter("path"))
+            make = _put if create is not None and create.method == "PUT" else created_path
+            thing_path = make(surveyor, create, read) if is_item and create is not None and collection_of(path) else ""
+            # Without a way to create one, what is there is written, and restored.
+            is_fixed = not is_item or (bool(collection_of(path)) and (create is None or make is _put))
+            free = [one for one in changes if not is_item or is_free(one, path)]
+            if free and is_fixed and not thing_path:
+                _Thing(surveyor, read, path_of_usual(read, values), is_own=False).written(free)
+            if create is not None and thing_path:
+                thing = _Thing(surveyor, read, thing_path)
+                thing.asked()
+                if "206" in read.responses:
+                    thing.in_parts(read, thing.target)
+                thing.written(changes)
+                thing.filled()
+                thing.listed_below(operations)
+                if values.unique.knows(create) and changes:
+                    thing.made_alike(create, changes, delete)
+                thing.deleted(delete, operations.get(("GET", collection_of(path))))
     return surveyor.trace
 
 
@@ -168,6 +171,8 @@ class _Thing:
     target: str
     tag: str = ""
     last: Exchange | None = None
+    # Whether the run has created it.
+    is_own: bool = True
     # Files below it that are there.
     below: list[tuple[Operation, Outgoing]] = field(default_factory=list)
 
@@ -265,6 +270,8 @@ class _Thing:
             tried.append(())
         if self.tag and "if-none-match" in names:
             tried.append((("If-None-Match", "*"),))
+        if self._current() and "if-match" in names and change.method != "DELETE" and _fits(change, "*"):
+            tried.append((("If-Match", "*"),))
         if "406" in change.responses:
             tried.append((("Accept", NO_FORMAT),))
         # First without credentials: what follows may rightly be done.
@@ -432,7 +439,7 @@ class _Thing:
         if not is_json(media_type) or self.last is None:
             return
         parts = flat(change.bodies[media_type].schema).get("properties", {})
-        single = not self.read.parameter("path")
+        single = not self.is_own
 
         def may(name: str) -> bool:
             return not single or is_changeable(name, parts.get(name, {}), values.collections)
@@ -537,7 +544,11 @@ class _Thing:
         chosen = {name: value for name, value in values.items() if value != whole.get(name)}
         chosen |= {name: one for name, one in _texts(schema, whole).items() if name in chosen}
         found = []
+        is_there = not self.is_own and bool(self.read.parameter("path"))
+        parts, collections = flat(schema).get("properties", {}), self.surveyor.values.collections
         for name, value in chosen.items():
+            if is_there and not is_changeable(name, parts[name], collections):
+                continue
             body = {name: value} if change.method == "PATCH" else {**whole, name: value}
             found += [body] if fits(schema, body) else []
         return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]

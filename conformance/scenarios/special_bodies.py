@@ -67,6 +67,7 @@ def special_bodies(
         needed = flat(read.shape or {}).get("required", ()) if GONE.search(change.text) else None
         yield from _replacing(schema, base, changed, values, may, needed)
         return
+    yield from [{}] if fits(schema, {}) else []
     if MERGE in usual.media_type:
         yield from _nulls(parts, read, now, values, may)
     else:
@@ -204,7 +205,7 @@ def _nulls(
     needed, there = flat(read.shape or {}).get("required", ()), now()
     usable = {name: one for name, one in there.items() if name in parts and one is not None and may(name)}
     own = {name for name in usable if is_devices(name, parts[name], frozenset())}
-    nulls = [name for name in usable if name not in needed and name not in own]
+    nulls = [name for name in usable if name not in own and (name not in needed or fits(parts[name], None))]
     together = [name for name in nulls if fits(parts[name], None)]
     for turn, names in enumerate([together, *([name] for name in nulls[:_NULLS])]):
         gone = [name for name in names if now().get(name) is not None]

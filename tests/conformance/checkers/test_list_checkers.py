@@ -212,6 +212,9 @@ def test_a_list_in_xml_is_judged_by_the_names_of_its_schema(style, count, blamed
     assert {one for one in broken if one.startswith("description/list-")} == blamed
 
 
+_EXACT = {**_text("level", enum=_LEVELS), "description": "Exactly this level."}
+
+
 @pytest.mark.parametrize(
     ("parameter", "query", "keep", "blamed"),
     [
@@ -224,6 +227,7 @@ def test_a_list_in_xml_is_judged_by_the_names_of_its_schema(style, count, blamed
         (_text("state", enum=_STATES), {"state": "open"}, lambda one: one["state"] == "open", False),
         (_text("state", enum=[*_STATES, "all"]), {"state": "all"}, lambda _: True, False),
         (_text("level", enum=_LEVELS), {"level": "warning"}, lambda one: one["level"] != "info", False),
+        (_EXACT, {"level": "warning"}, lambda one: one["level"] != "info", True),
         (_text("tags", enum=["a", "b"]), {"tags": "a"}, lambda one: "a" in one["tags"], False),
         (_bool("active", default=False), {"active": "false"}, lambda _: True, False),
         (_bool("archived"), {"archived": "true"}, lambda _: True, False),

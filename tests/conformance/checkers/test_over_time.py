@@ -138,6 +138,7 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
 @pytest.mark.parametrize(
     ("requirement", "exchanges"),
     [
+        ("if-match", [_TAG_A, one("PUT /tubes/1 412", body=_B, if_match="*"), _TAG_A]),
         ("head", [one("HEAD /tubes 200"), _READ, one("HEAD /tubes/1 404"), _READ]),
         ("head", [_READ, one("HEAD /tubes/1 405"), _READ, one("HEAD /tubes 200")]),
         ("head", [_READ, one("HEAD /tubes/1 406"), _READ]),

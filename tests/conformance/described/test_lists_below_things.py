@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import json
 import re
 
 import pytest
@@ -133,3 +134,41 @@ def test_what_is_created_below_a_thing_is_read_in_its_list(fault, blamed, tmp_pa
     # Which of two things with one number is read last decides whether its text differs, too.
     beside = {"description/written-is-read"} if fault == "number" else set()
     assert set(blamed) <= set(done.blamed) <= {*blamed, *beside}, done.text
+
+
+@pytest.mark.parametrize("fault", [False, True])
+def test_what_nobody_can_create_is_written_as_well(fault, tmp_path):
+    tray = {"label": "left", "note": "a"}
+    schema = {
+        "type": "object",
+        "required": ["label", "note"],
+        "properties": {"label": {"type": "string"}, "note": {"type": ["string", "null"]}},
+        "additionalProperties": False,
+    }
+    patch = {"content": {"application/merge-patch+json": {"schema": {**schema, "required": []}}}, "required": True}
+
+    async def read(request):
+        return web.json_response(tray) if request.match_info["trayId"] == "1" else error(404, "no such tray")
+
+    async def change(request):
+        try:
+            value = json.loads(await request.text())
+            json.dumps(value, ensure_ascii=False).encode()
+        except (ValueError, RecursionError):
+            return error(400, "JSON, please")
+        texts = (
+            [one for name, one in value.items() if (name, one) != ("note", None)] if isinstance(value, dict) else [1]
+        )
+        if request.content_type != next(iter(patch["content"])):
+            return error(415, "a merge patch, please")
+        if not all(isinstance(one, str) for one in texts) or not value.keys() <= tray.keys():
+            return error(400, "texts, please")
+        tray.update({name: one for name, one in value.items() if one is not None or not fault})
+        return await read(request)
+
+    item = {**reading(schema), "patch": {"requestBody": patch, "responses": {"200": answers(schema), "4XX": REFUSED}}}
+    number = {"in": "path", "name": "trayId", "required": True, "schema": {"type": "integer"}, "example": 1}
+    paths = {"/trays/{trayId}": {"parameters": [number], **item}}
+    with small_device(described(paths, "3.1.0"), {"/trays/{trayId}": {"GET": read, "PATCH": change}}) as url:
+        done = certified(f"{url}/openapi.json", tmp_path, "--call", "PATCH *")
+    assert set(done.blamed) == ({"description/patch"} if fault else set()), done.text
