@@ -159,8 +159,8 @@ class Overload:
                 after = response.header("retry-after") or "missing"
                 self.reason = (
                     f"The device limits the rate of requests: {len(self._row)} in a row were answered 429, the last "
-                    f"one with Retry-After {after}. What came after was not judged. Raise the limit for the suite, or "
-                    "give it a slower pace by --request-rate."
+                    f"one with Retry-After {after}. Later requests were not judged. Raise the device's limit, or send "
+                    "fewer requests per second (`roaas certify --request-rate`)."
                 )
                 self.ended(self.reason)
             return False
