@@ -123,11 +123,12 @@ class Overload:
     Attributes:
         reason: why the run waits no longer, although the device refuses all requests; or empty.
         ended: is called with this reason.
+        is_off: whether nothing is waited for, as the device has shut the suite out.
     """
 
     def __init__(self, patience_s: float = 900.0) -> None:
         self.ended: Callable[[str], None] = lambda _reason: None
-        self.reason = ""
+        self.reason, self.is_off = "", False
         self._left_s = patience_s
         # Endpoints that are not waited for; endpoints that 429 refused since the last other response, and
         # how long was waited meanwhile, s.
@@ -147,6 +148,8 @@ class Overload:
             self._row, self._row_s = [], 0.0
             if self._given_up and response.ok:
                 self._given_up.discard(endpoint())
+            return False
+        if self.is_off:
             return False
         status, name = response.status, endpoint()
         self._row += [name] if status == TOO_MANY else []

@@ -56,5 +56,7 @@ class Stranger:
         with suppress(NoAnswerError):
             own = list(until_taken(self._api.client.connection, lambda: self._api.client.send("GET", self._api.path)))
             self._api.is_shut_out = own[-1].response.status in _SHUT_OUT
+            # The suite's own doing is no limit on the rate.
+            self._api.client.connection.overload.is_off |= self._api.is_shut_out
         self._api.is_shut_out |= exchange.response.status in _SHUT_OUT
         return exchange
