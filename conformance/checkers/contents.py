@@ -1,4 +1,4 @@
-"""Contents by their octets: a part is a part of the whole, a digest that of the content, a file what was sent.
+"""Contents as bytes: a range is part of the whole, a digest fits the content, a file reads as it was uploaded.
 
 RFC 9110 14, RFC 9530. What differs counts only between two equal readings of the whole.
 """

@@ -1,4 +1,4 @@
-"""Entity tags, conditions and ranges: a tag stands for one content, and 304 and 206 are asked for (RFC 9110 13, 14)."""
+"""Entity tags, conditions and ranges: one tag names one content, and 304 and 206 need a condition (RFC 9110 13, 14)."""
 
 import re
 from collections.abc import Iterator
@@ -90,7 +90,7 @@ class EntityTags:
                 yield from self._read(occasion)
 
     def _read(self, occasion: Occasion) -> Iterator[Case]:
-        """Compare a content with the earlier content of the same tag, and with the one before the last write."""
+        """Compare a response with the earlier content of the same tag, and with the content before the last write."""
         url, answer = occasion.request.url, occasion.response
         # Compressed content has an entity tag of its own.
         wrote = self._wrote.pop(url, None) if not answer.header("content-encoding") else None
@@ -167,7 +167,7 @@ class EntityTags:
             yield occasion.case(_TAGS, False, expected, cause=f"{label} 412")  # noqa: FBT003
 
     def _write(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
-        """Judge a request that acts, by its conditions and what was current before it."""
+        """Judge a request that changes something, by its conditions and the tag that was current before."""
         url, answer, wanted = occasion.request.url, occasion.response, asked.get("if-match")
         now, is_refused = self._now.get(url), 400 <= answer.status < 500  # noqa: PLR2004 - RFC 9110 15.5
         self._wrote.pop(url, None)
@@ -254,7 +254,7 @@ def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
 
 
 def _has_changed(occasion: Occasion, before: Response) -> bool:
-    """Return whether the response to a write shows a member as it was sent, which was read otherwise before."""
+    """Return whether the response to a write contains a sent value that was another one before."""
     sent, old, new = (read_json(one).value for one in (occasion.request.body, before.body, occasion.response.body))
     if not occasion.response.ok or not all(isinstance(one, dict) for one in (sent, old, new)):
         return False
@@ -267,7 +267,7 @@ def fields_of(occasion: Occasion) -> Fields:
 
 
 def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
-    """Judge a refused request by what a read shows after it."""
+    """Judge a refused request by the next read."""
     occasion, label = waiting.occasion, label_of(waiting.occasion.operation)
     status = occasion.response.status
     if waiting.matches:
@@ -303,7 +303,7 @@ def _declares(operation: Operation | None, *, with_status: bool) -> bool:
 
 
 def difference(one: Response, other: Response) -> str:
-    """Return how two contents differ, as a noun phrase; empty if they say the same."""
+    """Return how two contents differ, as a noun phrase; empty if they are equal."""
     if one.body == other.body:
         return ""
     if not (is_json(one.media_type) and is_json(other.media_type)):

@@ -1,4 +1,4 @@
-"""Lists: the query parameters that limit, filter and sort them do so, and totals agree with what is shown."""
+"""Lists: query parameters limit, filter and sort them, and totals agree with the items."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Lists:
                 self._seen.update(hash((listing.operation.label, identity, name, str(own.get(name)))) for name in names)
 
     def _known(self, listing: Listing, page: Page, name: str) -> Iterator[Any]:
-        """Yield a member of each item that had the same value before; items without it are left out."""
+        """Yield a member's value for each item in which it is known from before."""
         for identity, item in zip(page.identities, page.items, strict=True):
             value = members_of(item).get(name)
             if value is not None and hash((listing.operation.label, identity, name, str(value))) in self._seen:

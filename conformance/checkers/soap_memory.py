@@ -1,4 +1,4 @@
-"""Judge what SOAP operations wrote, created and removed by what other operations return: SetGain by GetGain.
+"""Judge the effects of SOAP operations that write, create and remove by others that read: SetGain by GetGain.
 
 Names alone blame nobody. A value has to be read as it was written only where two other values were, for as long, and
 only within what was kept so far: a device may limit a number, reach a target slowly, or let a command expire.
@@ -24,12 +24,12 @@ from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Simple,
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
-# Other values that must be kept before one counts as lost; times that another value is read before it counts.
+# _KEPT: values that must be stored before another counts as lost. _SEEN: how often another value must be read.
 _KEPT: Final = 2
 _SEEN: Final = 2
-# After this many reads of one value, whatever is written, it counts as never written.
+# If a value reads the same this often, whatever is written, it counts as read-only.
 _LOST: Final = 6
-# Values that are read at once: one of them may be read later, by a read that failed.
+# _FEW: values that are read immediately; a read of the others may come too late if one fails.
 _FEW: Final = 3
 _MOST: Final = 1_000
 # Things of a list that are compared one by one, and reads of a list that show whether it changes by itself.
@@ -39,7 +39,7 @@ _STEADY: Final = 3
 _NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
 # Values that may say that a thing is removed, though it is still told.
 _STATES: Final = re.compile(r"stat(?:e|us)|delet|remov|activ|enabl|valid|archiv|exist")
-# What no XML has, between the values of one name.
+# Separator between the values of one name: a character that XML cannot contain.
 _BETWEEN: Final = "\0"
 _WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 _WORDS: Final = re.compile(r"[\w ]*", re.ASCII)
@@ -49,7 +49,7 @@ _Texts = dict[str, list[str]]
 
 @dataclass
 class _Write:
-    """What one request wrote: ``key`` names the thing, ``values`` are its texts; all names are in lower case.
+    """One accepted write: ``key`` names the thing, ``values`` are its texts; all names are in lower case.
 
     ``shown`` are those that were read so since, ``late`` those that first were not; ``refused`` what was refused since.
     """
@@ -92,7 +92,7 @@ class _Past:
 
     @property
     def moves(self) -> bool:
-        """Whether the value approaches the written one step by step, so that a change may take any time."""
+        """Return whether the value approaches the written one in steps, so that a change may take any time."""
         return self.late * _FEW > self.prompt
 
     def longest(self, text: str) -> float:
@@ -129,7 +129,7 @@ class SoapMemory:
         acts = acts_of(found)
         self._acts = {(urlsplit(act.port.url).path, act.operation.request): act for act in acts}
         self._writers = {act.label: [one for one in acts if act.shows(one)] for act in acts}
-        # The values by which a writing operation names the thing that it is for.
+        # Names of the elements by which a write identifies its thing.
         self._keys = {
             writer.label: {name for act in acts if act.shows(writer) for name in act.sent.keys() & writer.names.keys()}
             for writer in acts
@@ -365,7 +365,7 @@ class SoapMemory:
         yield from past.twice(name, exchange, what, got, f"{doer.label} {act.label}")
 
     def _listed(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
-        """Judge whether a list contains what was created, and nothing that was removed."""
+        """Judge whether a list contains created things, and no removed ones."""
         yield from self._unchanged(act, exchange, told)
         ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
         for thing in self._things:
@@ -398,7 +398,7 @@ def _joined(texts: list[str]) -> str:
 
 
 def _is_same(simple: Simple, text: str, got: str) -> bool:
-    """Return whether what was read is what was written."""
+    """Return whether a read text has the written value."""
     pairs = list(zip_longest(text.split(_BETWEEN), got.split(_BETWEEN)))
     return all(one is not None is not two and is_alike(simple, one, two) for one, two in pairs)
 

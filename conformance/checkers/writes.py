@@ -30,16 +30,16 @@ from conformance.verdict.evidence import Case
 
 _NOT_NOW: Final = HTTPStatus.ACCEPTED
 _MOST: Final = 1_000
-# A device may act this much later, s.
+# A device may carry out a write this long after its response, s.
 _SETTLES_S: Final = 3.0
 _MOST_OCTETS: Final = 65_536
-# Requests that must show a habit of the device before it counts.
+# Responses that must show a habit of the device before it counts.
 _SEEN: Final = 2
 # Whole numbers beyond this are not exact as doubles (RFC 8259 6).
 _EXACT: Final = 2**53
-# Doubles that differ by less than the first are equal; those that differ by more than the second were not rounded.
+# _EQUAL: doubles with a smaller difference are equal. _CLOSE: with a larger one, the difference is no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
-#: Texts of a description that say what becomes of members that a PUT leaves out.
+#: Phrases in a description on members that a PUT leaves out.
 GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
@@ -139,16 +139,16 @@ class Writes:
         self._collections = collections_of(operations)
         self._states: dict[str, _State] = {}
         self._writes: dict[str, list[Occasion]] = defaultdict(list)
-        # Writes that no read has shown so far.
+        # By path: writes that no read has shown yet.
         self._late: dict[str, Occasion] = {}
         self._moving: set[tuple[str, str]] = set()
-        # What may be chance: by operation and member, the bodies that showed it.
+        # By operation and member: bodies with which it failed; a single one may be chance.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._precise: set[tuple[str, str]] = set()
         # By template and member: methods whose values were read as they were sent, and patches that changed nothing.
         self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._ignored: dict[tuple[str, str], dict[bytes, Case]] = defaultdict(dict)
-        # The last body that was accepted, by path: a device may apply it after a request that it refuses.
+        # By path: the last accepted body, which a device may still apply after a refused request.
         self._accepted: dict[str, Any] = {}
 
     def forget(self) -> None:
@@ -218,7 +218,7 @@ class Writes:
             yield from self._patched(occasion, item, change)
         elif isinstance(change.sent, dict):
             yield from self._owned(occasion, item, change)
-            # A schema of a merge patch need not say that null removes.
+            # The schema of a merge patch need not say that null removes a member.
             if MERGE in request.media_type:
                 yield from self._merged(occasion, item, change)
             if not write.is_valid:
@@ -258,7 +258,7 @@ class Writes:
             expected = f"a refusal of the whole patch, because an operation of it fails: {error}"
             found = f"status {change.write.response.status}"
             cause = f"{change.operation.label} {str(error).partition(' ')[0]}"
-            # What moves may have had the value at that moment.
+            # A member that changes by itself may have had the value at that moment.
             if not change.moving & {str(error).rpartition("/")[2]}:
                 yield Case(False, change.write.exchange, expected, found, cause, requirement=_KEPT)  # noqa: FBT003
             return
@@ -267,7 +267,7 @@ class Writes:
         touched = [name for name in {**change.before, **made} if not same(made.get(name), change.before.get(name))]
         for name in touched:
             kept, is_same = change.now.get(name), same(change.now.get(name), change.before.get(name))
-            # What is removed may have its default.
+            # A removed member may return to its default.
             is_free = name not in made and "default" in flat(_parts(item.shape).get(name) or {})
             far = not same(kept, made.get(name)) and (is_same or (name in made and isinstance(kept, list)))
             if name not in change.moving and name in change.now and not is_free:

@@ -16,7 +16,7 @@ from conformance.documents.xsd_assembly import UNKNOWN
 if TYPE_CHECKING:
     from lxml import etree
 
-# Elements of one message that are read: types that contain each other could be read without end.
+# Elements of one message to read: recursive types could be read without end.
 _MOST: Final = 20_000
 # Elements that a request may have.
 _LARGEST: Final = 100_000
@@ -137,7 +137,7 @@ class _Reader:
             return _simple(declared)
         if declared.elem is not None and declared.elem.get(UNKNOWN):
             return Complex(wildcard=True, unknown=True)
-        # A type within itself is followed once; what is beyond is optional in every message that ends.
+        # A recursive type is followed once; everything deeper is optional in any finite message.
         if self.path.count(id(declared)) > 1 or self.left < 0:
             return Complex()
         attributes = tuple(
@@ -206,7 +206,7 @@ def _simple(declared: Any) -> Simple:
     builtin = declared
     while builtin is not None and not str(builtin.name or "").startswith(clark(XSD, "")):
         builtin = builtin.base_type
-    # A builtin's own pattern only says again what its name says.
+    # A built-in type's own pattern adds nothing to its name.
     patterns = None if builtin is declared else getattr(declared, "patterns", None)
     return Simple(
         str(builtin.name).rpartition("}")[2] if builtin is not None else "string",
@@ -303,14 +303,14 @@ _INTEGERS: Final = (
     "unsignedLong unsignedInt unsignedShort unsignedByte"
 )
 INTEGERS: Final = frozenset(_INTEGERS.split())
-# 3.2.4 and 3.2.5: those that know INF and NaN.
+# Types that allow INF and NaN (XML Schema Part 2, 3.2.4 and 3.2.5).
 FLOATS: Final = frozenset({"double", "float"})
 NUMBERS: Final = INTEGERS | FLOATS | {"decimal"}
 STRINGS: Final = frozenset({"string", "normalizedString", "token"})
-# Where an integer has no bounds of its own, values stay within what a robot can be asked to hold.
+# _WIDEST: greatest integer to send where the type has no bound. _LONGEST: characters of a text.
 _WIDEST: Final = 2**31 - 1
 _LONGEST: Final = 1_000_000
-# Texts that are no number of any kind to XML Schema, though some are to a programming language.
+# Texts that are no number in XML Schema, although some programming languages accept them.
 NO_NUMBERS: Final = (
     "four",
     "",
@@ -332,7 +332,7 @@ NO_NUMBERS: Final = (
     "\u22124",
     "1\u00a0000",
 )
-# Not-a-number by another spelling than XML Schema's: what Python, Java or C would take (3.2.5.1 is case-sensitive).
+# Spellings of NaN and infinity that Python, Java or C accept but XML Schema does not (3.2.5.1 is case-sensitive).
 NO_FLOATS: Final = (*NO_NUMBERS, "Infinity", "inf", "nan", "-Infinity", "+INF", "NAN", "1.#INF")
 NO_INTEGERS: Final = (*NO_NUMBERS, "4.0", "4.", "4e0", "INF", "NaN", "3.9")
 NO_BOOLEANS: Final = ("yes", "TRUE", "2", "", "on", "tru")
@@ -369,7 +369,7 @@ def beyond(simple: Simple, text: str) -> Iterator[str]:
     if simple.builtin in NUMBERS:
         step = Decimal(1 if simple.builtin in INTEGERS else "0.001")
         for bound, sign in ((simple.minimum, -1), (simple.maximum, 1)):
-            # An exclusive bound is itself forbidden.
+            # An exclusive bound is itself forbidden, so it is sent as well as the number beyond.
             yield from () if bound is None else (f"{bound:f}", f"{bound + sign * step:f}")
         number = number_in(text) if simple.builtin == "decimal" else None
         yield from () if number is None else (f"{number + Decimal('1e-7'):f}",)  # more digits than are allowed
@@ -421,7 +421,7 @@ def plain(simple: Simple) -> str:
         "gDay": "---31",
     }
     text = known.get(simple.builtin, "map")
-    # A text longer than any message cannot be sent.
+    # No text may be longer than a message.
     short = min(simple.min_length or 0, _LONGEST) - len(text)
     return (text + "a" * max(0, short))[: simple.max_length]
 

@@ -95,14 +95,14 @@ def certify(
     remarks, recordings, reached = list(notes), Recordings(), True
     with remembered(run) as interruption:
         try:
-            with suppress(OSError):  # told in the end
+            with suppress(OSError):  # reported at the end
                 write_result(_unfinished(robot, started, command, notes), out)
             robot.keep_history(HistoryWriter(out, suite_version(), rfc3339(started.at)))
             run.limit.begin()
             robot.connect(progress)
             reached = robot.reached
             if reached:
-                # Of a robot that is not there, they would only hide that.
+                # If the robot was never reached, its findings only hide that.
                 if progress is not None:
                     progress.writelines(f"{note}\n" for note in filter(None, (*notes, *announced, robot.estimate())))
                 _run_and_repeat(robot, Progress(robot, progress, bar=bar), remarks, recordings)
@@ -179,7 +179,7 @@ def _concluded(
     narrowed = WITHHELD if run.selection.ids is not None else ""
     if narrowed:
         remarks.append(f"{narrowed[:1].upper()}{narrowed[1:]}: the verdict is at most inconclusive.")
-    # A baseline makes a run green, not a robot conformant: the classes fail all the same.
+    # A baseline changes the exit code only: the classes of accepted failures still fail.
     classes, accepted = (
         withheld(_deciding(one, run.claims, run.beside), run.refused or run.unshown or narrowed)
         for one in (seen, verdicts)
@@ -253,13 +253,13 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
     for requirement in run.contract.ledger.values():
         evidence = judge.evidence[requirement.id]
         if not run.selection.has(requirement.id):
-            # A check judges several requirements at once: what it saw of others is not asked for.
+            # A check judges several requirements: discard what it recorded on unselected ones.
             judge.evidence[requirement.id] = Evidence(skips=[UNSELECTED])
         elif run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
             judge.stopped(requirement.id, run.aborted)
     seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
     if not run.contract.is_claimed:
-        # What a map declares is claimed, and so is that the operations of a WSDL answer.
+        # Declaring a map claims its class, and a WSDL claims that its operations answer.
         _leave_out(
             seen[id_]
             for id_, item in run.contract.ledger.items()
@@ -273,7 +273,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
 
 
 def _leave_out(seen: Iterable[Evidence]) -> None:
-    """Leave out what no permitted request shows: a device that claims no contract has claimed nothing else."""
+    """Leave out requirements that no permitted request can test: a device without a contract did not claim them."""
     for evidence in seen:
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
         if not (evidence.cases or evidence.errors or evidence.because or evidence.unclaimed or evidence.unseen):
@@ -281,7 +281,7 @@ def _leave_out(seen: Iterable[Evidence]) -> None:
 
 
 class _LoadedForGood:
-    """A pytest plugin that spares the garbage collector what stays until the end of the process: modules and checks.
+    """A pytest plugin that exempts modules and checks from garbage collection, because they stay until the end.
 
     Hypothesis looks through all that the collector knows when its first test begins: a tenth of a second.
     """

@@ -1,4 +1,4 @@
-"""What a request of an operation commands: the numbers of its body and path, their limits, and a body for them."""
+"""The numbers that an operation's request commands, in body and path, their limits, and a body for them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _OPPOSITES: Final = (
 )  # fmt: skip
 _DEPTH: Final = 6
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
-# The share of the declared limit at which a robot is driven; without limits, rad and m.
+# _PART: share of the declared limit at which the robot is driven. Without limits: _TURN rad, _WAY m.
 _PART, _TURN, _WAY = 0.1, 0.1, 0.05
 
 
@@ -248,7 +248,7 @@ def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tu
 
 
 def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: int = _DEPTH) -> dict[str, Any]:
-    """Return a body with a template for some places, and a value for what else is required.
+    """Return a body with a template at some places, and values for the other required members.
 
     Args:
         schema: of the body.
@@ -279,7 +279,7 @@ def _is_object(schema: Schema) -> bool:
 
 
 def _chosen(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:
-    """Yield a schema's parts, and of its alternatives the one with the most of the places."""
+    """Yield a schema's parts, with the alternative that has the most of the places."""
     yield schema
     for part in schema.get("allOf", ()):
         yield from _chosen(part, names, at)

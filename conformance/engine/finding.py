@@ -32,18 +32,18 @@ _MOST_NUMBERS, _MOST_READS = 8, 6
 _STATE: Final = re.compile(
     r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle", re.IGNORECASE
 )
-#: Names of values that repeat commands, which are no measurement.
+#: Names of members that repeat a command and measure nothing.
 ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
 _STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
-#: A robot is kept this near to its place, m; a fast one as near as it gets in this time, s.
+#: The robot is kept within ROOM_M of its start, m; a fast robot as near as it can get in ROOM_S, s.
 ROOM_M, ROOM_S = 0.5, 1.5
-#: Statuses by which an operation declares that it refuses an invalid request.
+#: Statuses with which an operation declares that it refuses invalid requests.
 REFUSED: Final = frozenset({"400", "422", "4XX", "4xx"})
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What can be commanded and read, by the description.
+    """The operations to command and to read, found in the description.
 
     Attributes:
         drive: the operation that commands.
@@ -62,7 +62,7 @@ class Plan:
     named: Operation | None = None
 
     def told(self) -> Iterator[str]:
-        """Yield what will be done, in lines."""
+        """Yield the planned steps as lines for the user."""
         yield f"{self.drive.label} commands, by its description:"
         for one in self.numbers:
             declared = (
@@ -92,7 +92,7 @@ class Found:
 
 
 def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules: CallRules) -> Plan:
-    """Return what can be commanded and read, by a description.
+    """Return the operations to command and to read, from a description.
 
     Raises:
         NotPossibleError: it says too little; the message says what.
@@ -191,7 +191,7 @@ def _reads(
 
 
 class Finder(ABC):
-    """Drives a device a little, and finds what shows it.
+    """Drives a device a little, and finds the members that show the movement.
 
     Args:
         api: the device.
@@ -225,7 +225,7 @@ class Finder(ABC):
         """
 
     def _look(self) -> None:
-        """Read one of the operations; one without numbers is not read again."""
+        """Read one operation; an operation without numbers is not read again."""
         operation = self._reads[self._turn % len(self._reads)]
         self._turn += 1
         sent = self._clock.now()

@@ -25,24 +25,25 @@ from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import NoAnswerError
 
-# Budget of a schema: fields, depth, objects; ends of the graph that a comment names.
+# Budget of a schema: _LEAVES fields, _DEPTH levels, and below objects, and names of the graph in a comment.
 _LEAVES: Final = 500
 _DEPTH: Final = 8
 _PLACES: Final = 50
 _NAMED: Final = 3
-# A type with fewer fields than this is not recognized by them.
+# A message type with fewer fields cannot be recognised by its fields.
 _FEW: Final = 4
-# Time for a read, for all reads, for discovery of the graph, and without news before it counts as complete, s.
+# _READ_S: for one read. _READS_S: for all reads. Below: to discover the graph, and without news until it counts as
+# complete, s.
 _READ_S: Final = 3.0
 _READS_S: Final = 60.0
 _DISCOVERY_S: Final = 15.0
 _SETTLES_S: Final = 1.0
-# Names that every node has on the graph, and the parts of actions.
+# _COMMON: names that every ROS node has. _PARAMETER: names of its parts.
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
-#: Beginnings of words for the states of a goal, with the numbers of action_msgs/msg/GoalStatus.
+#: By state of a goal: beginnings of words for it, and the numbers of action_msgs/msg/GoalStatus.
 _STATES: Final = {
     "running": r"run|exec|activ|accept|pend|work|cancell?ing|[123]$",
     "succeeded": r"succe|done|compl|finish|4$",
@@ -53,7 +54,7 @@ _STATES: Final = {
 
 
 class Graph(NamedTuple):
-    """What is on the ROS graph: types by the names of topics, services and actions; and the definition of a type."""
+    """Contents of the ROS graph: types by name of topic, service and action, and definitions of types."""
 
     topics: dict[str, str]
     services: dict[str, str]
@@ -61,10 +62,10 @@ class Graph(NamedTuple):
     definition: Callable[[str], Definition]
 
     def fitting(self, schema: Schema | None, ends: dict[str, str], part: str = "") -> dict[str, Fit]:
-        """Return how a schema has the fields of each end's type, or of a part of it, by name."""
+        """Return by name the ends of the graph whose type, or a part of it, has a schema's fields."""
         found, places = {}, _places(schema or {})
         for name, type_ in ends.items():
-            with suppress(ProbeError):  # the type is not installed
+            with suppress(ProbeError):  # the message type is not installed
                 fit = _fit(places, self.definition(type_ + part))
                 if fit is not None and not (part and fit.lacks):
                     found[name] = fit
@@ -91,7 +92,7 @@ class Fit:
 
     @property
     def keys(self) -> dict[str, Any]:
-        """The keys of the map that say it."""
+        """Return the keys of the ROS map that express this fit."""
         return {name: value for name, value in (("at", self.at), ("fields", self.fields)) if value}
 
 
@@ -114,7 +115,7 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
     until = WALL_CLOCK.now() + _READS_S
     for one in operations:
         if WALL_CLOCK.now() < until and one.method == "GET" and one.shape is not None and "{" not in one.template:
-            # A gateway may subscribe only when somebody asks.
+            # A gateway may subscribe only when a client reads.
             with suppress(NoAnswerError):
                 exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
                 response = exchange.response
@@ -148,7 +149,7 @@ def _settled(robot: Robot) -> dict[str, Any]:
 def proposed_ros_map(
     operations: Sequence[Operation], graph: Graph, domain_id: int, read: dict[str, Any]
 ) -> Iterator[str]:
-    """Yield the lines of a ROS map, with a comment for each operation that is a guess, or no part of it.
+    """Yield the lines of a ROS map; operations that are guesses or do not fit become comments.
 
     Args:
         operations: of the description.
@@ -159,7 +160,7 @@ def proposed_ros_map(
     found: dict[str, _Proposal] = {}
     followers: set[str] = set()
     written: set[str] = set()
-    # What is published is known first: another operation hardly reads it.
+    # Topics that the gateway publishes come first: another operation hardly reads one of them.
     for one in sorted(operations, key=lambda item: item.method == "GET"):
         if "{" in one.template:
             continue
@@ -208,7 +209,7 @@ def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = N
     """
     reads = one.method == "GET"
     fits = graph.fitting(one.shape if reads else body_schema(one), graph.topics)
-    # Some fields of any message may be some of an operation, if not its name says so.
+    # Partial matches of fields count only if the operation's name also fits.
     fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared(one, name)}
     name, guess = _best(one, fits, written if reads else ())
     if not name:
@@ -345,7 +346,7 @@ def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: 
     for place, below in places.items():
         pairs, forms = _pairs(below, by_key), dict[str, str]()
         lacks = len(own) - len(pairs)
-        # A part of a message is all that the body has, and no small part of another one.
+        # A part of a message counts only if the body has all of that part, and it is at least half of the message.
         fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(places[""]))
         larger = len(pairs) > (best.size if best else 0)
         if fits and larger and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items()):
@@ -377,7 +378,7 @@ def _key(text: str) -> str:
 
 
 def _fields(pairs: dict[str, str], own: Collection[str]) -> dict[str, str]:
-    """Return the map's key `fields` for pairs of fields: what is alike below two positions goes by them."""
+    """Return the key `fields` of the map for pairs of fields: equal ones below two positions follow from these."""
     if len(pairs) == len(own) and all(web == one for web, one in pairs.items()):
         return {}
     found: dict[str, str] = {}

@@ -26,11 +26,11 @@ from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
-# How long the device is watched before and after a little move, and how long it has for that, s.
+# _BEFORE_S: how long the device is watched before and after a small move. _MOVES_S: time for the move, s.
 _BEFORE_S, _MOVES_S = 0.25, 3.0
-# No further axis is tried after this time, s.
+# After this time no further axis is tried, s.
 _BUDGET_S: Final = 16.0
-# Shares of a small move that are tried; share by which an axis may miss its target, or another one may move along.
+# _PARTS: shares of a small move that are tried. _FOLLOWS: share by which an axis may miss its target or move along.
 _PARTS, _FOLLOWS = (0.2, 1.0), 0.15
 # No angle is limited to so many rad; the status of a move that must wait for another one.
 _RAD, _CONFLICT = 7.0, 409
@@ -78,7 +78,7 @@ class PositionFinder(Finder):
         self._relative = all(one.is_relative for one in self._plan.numbers if one.name in counts[read])
         schemas = dict(numbers_in(self._reads[0].shape or {}))
         self._schemas = {name: schemas.get(place, {}) for name, place in counts[read].items()}
-        # What else the operation may take is left out, so that it stays where it is.
+        # Optional inputs are left out, so that other parts of the robot stay where they are.
         schema = body_schema(self._plan.drive)
         named = {one.place: f"{{{one.name}}}" for one in self._plan.numbers if one.name in counts[read]}
         self._body = None if schema is None else template_of(schema, named)
@@ -114,7 +114,7 @@ class PositionFinder(Finder):
         return any(one.place.strip("{}").rpartition("/")[2].lower() == called for one in self._plan.numbers)
 
     def _named_places(self, operation: str) -> dict[str, str]:
-        """Return the places of an operation's numbers by the name of what is commanded under the same name."""
+        """Return the places of an operation's numbers, by the name of the commanded number they share."""
         places, found = self._looks.places(operation), dict[str, str]()
         for number in self._plan.numbers:
             words = number.place.strip("{}").split("/")
@@ -123,7 +123,7 @@ class PositionFinder(Finder):
             same = same or [one for one in places if not FAST.search(one) and axis_of(one) == axis_of(own)]
             if own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
                 same += [one for one in places if one.lower() in {"", "/value", f"/{own}/value"}]
-            # Of several, the one whose path has most in common with that of what is commanded.
+            # Of several members, prefer the one whose path is most like the command's.
             same.sort(key=lambda one: (bool(ECHO.search(one)), -len(set(words) & set(one.split("/")))))
             if same and same[0] not in found.values():
                 found[number.name] = same[0]
@@ -132,7 +132,7 @@ class PositionFinder(Finder):
     def _followed(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
         """Move one axis a little to each side, less far if it does not arrive; return how it followed, or None."""
         found, why = None, "its limits leave no room"
-        # Of what is declared, a part is safe; of what is not, nobody knows how far it may go.
+        # With declared limits, a part of them is safe; without, start with the smallest move.
         for part in _PARTS[1:] if number.declared else _PARTS:
             little = part * number.little
             tries: list[Moved] = []

@@ -24,14 +24,14 @@ from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
 
-# How long a velocity is driven, how often it is renewed, how long the device is watched before and after, s.
+# _DRIVEN_S: duration of a drive. _KEPT_S: interval of commands. _BEFORE_S, _AFTER_S: how long the device is watched, s.
 _DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
-# How long at most nothing is sent, to see whether the device stops by itself; how long it must rest to count, s.
+# _LET_GO_S: how long at most no command is sent. _SURE_S: how long the device must rest to count as stopped, s.
 _LET_GO_S, _SURE_S = 3.0, 0.5
-# How many units of a position are one m or one rad.
+# _UNITS: by units in one m or one rad, their names.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
-# Rates that differ by more than this factor are of different kinds.
+# _OTHER: rates that differ by more than this factor have different units. _ROOM_RAD: greatest turn.
 _OTHER: Final = 4.0
 _ROOM_RAD: Final = 3.0
 _HEADING: Final = re.compile(r"yaw|heading|theta|orientation", re.IGNORECASE)
@@ -80,7 +80,7 @@ class VelocityFinder(Finder):
         return begun, last
 
     def _responses(self) -> dict[str, dict[tuple[str, str], Response]]:
-        """Return how each number that was read responds, by what was commanded, operation and place.
+        """Return how each read number changes, by commanded number, operation and place.
 
         Raises:
             NotPossibleError: all of what can be commanded was refused.
@@ -92,7 +92,8 @@ class VelocityFinder(Finder):
             try:
                 drives = self._forth_and_back(number)
             except NotPossibleError as problem:
-                # A body has numbers that the device cannot actuate, such as the height of a rover's Twist.
+                # A body may have numbers that the device cannot drive, such as the vertical velocity of a rover's
+                # Twist.
                 refused[number.name] = problem
                 found[number.name] = {}
                 continue
@@ -178,7 +179,7 @@ class VelocityFinder(Finder):
         turns = {one.name for one in self._plan.numbers if one.turns and own[one.name]}
         shown = {one.name: self._shown(one, own[one.name], turning=bool(turns)) for one in self._plan.numbers}
         if turns and not any(shown[name] for name in shown.keys() - turns):
-            # Where it goes is seen in one direction only: without turning, that is the direction in which it drives.
+            # A drive shows one direction only: without turning, the direction ahead.
             ahead = {name: self._shown_as_position(own[name]) for name in shown.keys() - turns}
             if any(ahead.values()):
                 shown = {name: ahead.get(name) for name in shown}
@@ -228,7 +229,7 @@ class VelocityFinder(Finder):
             if since is not None and self._clock.now() >= since + _SURE_S:
                 held_s = since - last
                 if response.is_position:
-                    # By how far it came: noise hides when it came to rest.
+                    # Computed from the distance covered, because noise hides when the robot came to rest.
                     held_s = (samples[-1][1] - samples[0][1]) / moving
                 self._found.notes.append(f"Let go, it came to rest {held_s:.2f} s after the last command.")
                 return max(0.1, math.ceil(held_s * 20) / 20)

@@ -37,15 +37,16 @@ from conformance.transport.pace import Hangs
 from conformance.transport.rosbridge import BridgeClient
 from conformance.verdict.run import Run
 
-# How long a robot that stopped responding has to come back before the rest of the run is called off, s.
+# How long a robot that stopped responding may take to return before the run ends, s.
 _GRACE_S = 3.0
-# A slow robot gets the time of this many responses.
+# A slow robot gets instead the time of this many responses.
 _GRACE_ANSWERS = 10
-# Responses that show how fast a robot usually is; the fewest, if all would take longer than this, s.
+# _LOOKS: responses that show the robot's usual speed. _FEWEST_LOOKS: the fewest, if more would take longer than the
+# time below, s.
 _LOOKS = 11
 _FEWEST_LOOKS = 5
 _LOOKING_S = 1.0
-# The user is told what the run waits for after this time, s.
+# After this time the command says what it waits for, s.
 _SILENT_S = 2.0
 
 
@@ -76,7 +77,7 @@ class RobotUnderTest:
     _history: HistoryWriter | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
-    # What answered when it was last asked whether the device responds.
+    # Response to the last request that tested whether the device still responds.
     _answered: tuple[str, str] = ("", "")
 
     def __post_init__(self) -> None:
@@ -120,7 +121,7 @@ class RobotUnderTest:
         self.connection.listeners.insert(0, SentListener(self.run.judge))
         self.connection.listeners.insert(0, self.refusals)
         if not self.device.is_known:
-            # A known device has no streams, and counts what it is sent; of another one only a response shows that.
+            # A device with a contract has no streams, and counts requests; another device may do otherwise.
             self.connection.endless = self.connection.resends = True
             self.connection.is_away = self._is_away
         # Where moments count, the scenarios decide when they send again.
@@ -130,7 +131,7 @@ class RobotUnderTest:
         self._connect_rest()
         self._connect_soap()
         kinds = [one.kind for one in self.connection.recent]
-        # It was there, and one of the first requests was too much for it.
+        # The robot was there, and one of the first requests was too much for it.
         lost = not self.reached and NoAnswer.CLOSED in kinds and kinds[-1] is NoAnswer.REFUSED
         if lost and self.alive():
             self.run.unreachable.clear()
@@ -180,7 +181,7 @@ class RobotUnderTest:
         self._services = SoapServices(self.run, services.get(Interface.PUBLISHERS), services.get(Interface.SUBSCRIBERS))
 
     def _permit_reading(self, services: Mapping[Interface, SoapService]) -> None:
-        """Permit messages to the service that only reads, unless the one that acts has the same address."""
+        """Permit messages to the service that only reads, unless the acting service has the same address."""
         if Interface.SUBSCRIBERS in services:
             self.permission.may_post_to(services[Interface.SUBSCRIBERS].endpoint)
         if Interface.PUBLISHERS in services:
@@ -188,7 +189,7 @@ class RobotUnderTest:
 
     @contextmanager
     def _told(self, name: Interface, url: str) -> Iterator[None]:
-        """Report what is waited for if connecting takes long."""
+        """Say what the run waits for if connecting takes long."""
         waits = f"{name}: waiting for {url}, up to {self.connection.timeout_s:g} s for each answer"
         later = threading.Timer(_SILENT_S, self._tell, [waits])
         later.daemon = True
@@ -217,7 +218,7 @@ class RobotUnderTest:
         """Measure an interface's response time, or record it as unreachable."""
         run = self.run
         times: list[float] = []
-        # Should the resource hang, another one may not: that is one broken resource, not a robot that is not there.
+        # If one resource hangs, another may respond: then only that resource is broken.
         for method, target in (("GET", path), ("OPTIONS", path), ("GET", "/")):
             try:
                 while len(times) < _FEWEST_LOOKS or (len(times) < _LOOKS and sum(times) < 1000 * _LOOKING_S):
@@ -234,7 +235,7 @@ class RobotUnderTest:
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
                 self._tell(f"{name}: {method} {target}: {none}")
-        # What hung here was not judged: the checks send it anew.
+        # A hang before the checks was not judged: the checks send the request again.
         client.hangs.forget()
         if times:
             run.unreachable.pop(name, None)
@@ -245,15 +246,15 @@ class RobotUnderTest:
         """Stop the device after the checks, unless that is done; the stop is tried for a bounded time. Never raises."""
         self.run.limit.end()
         if not self.is_at_rest:
-            self.begin("")  # what is sent from here on belongs to no check
+            self.begin("")  # requests from here on belong to no check
             self.stop()
             self.is_at_rest = True
         if self._guard is not None:
-            # It goes on trying where the stop could not be delivered.
+            # If the stop could not be delivered, the guard keeps trying.
             self._guard.release(stopped=not self.run.stop_undelivered)
 
     def keep_history(self, history: HistoryWriter) -> None:
-        """Record in the history what is sent and received from now on."""
+        """Record all sent and received messages in the history from now on."""
         self._history = self.connection.recorder = history
 
     def begin(self, check_name: str) -> None:
@@ -262,7 +263,7 @@ class RobotUnderTest:
         self.begin_span(check_name)
 
     def begin_span(self, name: str) -> None:
-        """Note in the history what the suite does from now on."""
+        """Record in the history which check or scenario runs from now on."""
         if self._history is not None:
             self._history.begin(name)
 
@@ -280,14 +281,14 @@ class RobotUnderTest:
 
     @property
     def reached(self) -> bool:
-        """Whether any interface responded at the start, or was lost in one of the first requests."""
+        """Return whether any interface responded at the start, or was lost in one of the first requests."""
         return self.run.losses > 0 or any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
     @property
     def nothing_shown(self) -> str:
         """Why the run shows nothing of a device with a description of its own, or an empty text."""
         run = self.run
-        # What a web server does by itself needs no operation.
+        # Requirements on the web server need no operation.
         alone = all(run.contract.classes[name].beside for name in run.claims)
         left_out = run.limit.is_struck or bool(run.refused)
         if self.log is None or self.rest is None or alone or left_out or not self.reached:
@@ -299,7 +300,7 @@ class RobotUnderTest:
         if self.run.aborted:
             return False
         recent = self.connection.recent
-        # That a gateway had no device for a moment shows nothing yet.
+        # A gateway that briefly lost its device shows no fault yet.
         behind_gateway = bool(recent) and recent[-1].kind in OF_GATEWAY.values()
         with self.run.limit.lifted():
             return (not behind_gateway and self._responds(self._grace_s)) or self._comes_back()
@@ -333,7 +334,7 @@ class RobotUnderTest:
         from conformance.scenarios.estimate import estimate  # noqa: PLC0415
 
         operations = [one for one in operations_of(run.contract) if CallRules.of(run).decide(one).may]
-        # The first requests call no operation of a WSDL, and show nothing of how long one takes.
+        # The first requests call no WSDL operation, so they do not show its response time.
         measured = measured and SOAP not in run.contract.classes
         said = estimate(run, operations).text(run.effort.usual_ms if measured else None)
         return f"{said} It ends after about {run.limit.minutes:g} minutes." if run.limit.minutes is not None else said
@@ -350,7 +351,7 @@ class RobotUnderTest:
     def _responds(self, within_s: float) -> bool:
         """Return whether the robot responds, on any interface that responded at the start, within so many seconds."""
         until = time.monotonic() + within_s
-        # Nothing is judged by these requests, and none of them made the robot stop.
+        # These requests judge nothing, and did not cause the robot's silence.
         silent = self.connection.unheard(recent=deque(), sent=0, is_away=self._is_of_gateway)
         clients = [(HttpClient(client.base_url, silent, Hangs()), path) for client, path in self._answering()]
         try:
@@ -364,7 +365,8 @@ class RobotUnderTest:
 
     def _answers(self, client: HttpClient, path: str) -> bool:
         client.hangs.forget()
-        # Several targets, so that an endpoint known to hang is no reason to call the robot dead; first what answered.
+        # Several targets, because one endpoint that hangs does not mean a dead robot; the one that last responded comes
+        # first.
         targets = [("GET", path), ("OPTIONS", path), ("GET", "/")]
         for method, target in sorted(targets, key=lambda one: one != self._answered):
             try:
@@ -385,12 +387,12 @@ class RobotUnderTest:
         return bool(before) and exchange.response.status not in before
 
     def _is_away(self, exchange: Exchange) -> bool:
-        """Return whether a gateway sent a response in the device's place: it sends the like to what worked before."""
+        """Return whether a gateway responded in the device's place, as to requests that worked before."""
         with self.run.limit.lifted():
             return self._is_of_gateway(exchange) and not self._responds(0.0)
 
     def _endpoint_of(self, request: Request) -> str:
-        """Return the method and the operation of a request; for a request of none, what its path looks like."""
+        """Return the method and operation of a request; without an operation, a path with its values masked."""
         label = self._operation_of(request)
         return f"{request.method} {label.partition(' ')[2]}" if label else request.endpoint
 

@@ -74,7 +74,7 @@ def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str],
 
 
 def _remedies(failed: Sequence[str], server: str) -> Iterator[str]:
-    """Yield for each known remedy of this server what it mends."""
+    """Yield this server's known remedies, each with the rules that it repairs."""
     for remedy in _known().remedy:
         mended = [id_ for id_ in failed if id_ in remedy.meets]
         if mended and (not remedy.servers or server.lower().startswith(remedy.servers)):

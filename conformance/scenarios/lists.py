@@ -29,36 +29,37 @@ from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
 
-# Pages that are read in a row; values of one parameter at quick, and at other efforts.
+# _PAGES: consecutive pages to read. _VALUES: values of one parameter at quick; below, at other efforts.
 _PAGES: Final = 4
 _VALUES: Final = {"quick": 8}
 _MOST_VALUES: Final = 12
-# Those of these values that are also sent for a part of the list.
+# How many of these values are also sent together with a page limit.
 _WITH_PART: Final = 6
-# Multiple of an exploration's time that one list may take; a list that once took over a second gets this part of it.
+# _BUDGETS: multiple of an exploration's time that one list may take. _SLOW_SHARE: a list that once took over a second
+# gets this fraction.
 _BUDGETS: Final = 3
 _SLOW_SHARE: Final = 4
-# Tries of a fault; those in which it must be seen; reads that must show the same list before and after.
+# _TRIES: tries of a fault. _TWICE: tries that must show it. Below: reads that must show the same list before and after.
 _TRIES: Final = 4
 _TWICE: Final = 2
 _STEADY: Final = 3
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
-# Further members by which a list is sorted while it is read page after page.
+# Further members by which a list is sorted while its pages are read.
 _SORTS: Final = 2
 # Fewest items that make pages to compare.
 _FEWEST: Final = 2
-# Offsets beyond the end of a list, as far as the schema allows.
+# _BEYOND: offsets beyond the end of a list, as far as the schema allows. _DEPTH: of nested members.
 _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
-# Difference of a far place's clocks from UTC, h.
+# Difference from UTC of a distant time zone, h.
 _FAR_H: Final = 11
-# Texts of a description that say that the last page names no next one.
+# Phrases in a description which say that the last page has no link to a next one.
 _ENDS: Final = re.compile(
     r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
     re.IGNORECASE,
 )
-# Plain names of members that have a link to the next page, or the cursor of it.
+# Normalised names of members with the link to the next page, or its cursor.
 _NEXT: Final = re.compile(
     r"next(?:page)?(?:cursor|token|marker|link|url|href|key|after|id)?|end(?:cursor|token)|continuationtoken"
 )
@@ -99,7 +100,7 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
         if listing.limit or listing.offset or listing.page or listing.cursor:
             is_possible = True
             api.run.limit.check()
-            with suppress(NoAnswerError):  # the survey tells what breaks a connection
+            with suppress(NoAnswerError):  # the survey reports a broken connection
                 found += _pages_of(Reader(api, values, listing))
     if not is_possible:
         raise NotPossibleError("no list that may be read has parameters for a part of it")
@@ -120,7 +121,7 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
         ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
         best = max(ranks, key=ranks.__getitem__, default="")
-        # A cursor has to tell items apart that have one value: by each member, some may.
+        # A cursor must tell apart items with equal values: try each member, because some may not.
         others = {one.member: text for text, one in listing.sortings.items()} if listing.cursor is not None else {}
         others.pop(listing.sortings[best].member if best else "", None)
         for text in (best, *islice(others.values(), _SORTS)):
@@ -195,7 +196,7 @@ class Reader:
         inputs = self.usual
         for name, value in {**self.always, **(query or {})}.items():
             inputs = inputs.having("query", name, value)
-        # A device may answer on a new connection, or with a coding, in another way.
+        # A device may respond differently on a new connection, or with compression.
         is_odd, request = len(query or {}) % 2 == 1, written(self.listing.operation, inputs)
         target = self.path + "".join(request.target.partition("?")[1:]) if self.path else request.target
         headers = (*request.headers, *([("Accept-Encoding", "gzip")] if is_odd else []))
@@ -251,7 +252,7 @@ def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
         return
     agreed = [name for name, total in before.totals.items() if total >= len(before.items)]
     wrong = [query] if not now.goes_on and any(now.totals.get(name) != len(now.items) for name in agreed) else []
-    # A total of all items whatever the filter is right as well.
+    # A total of all items, regardless of the filter, is right too.
     pages = {index: part[1] for index, one in enumerate(doubted) if (part := reader.part(one)) is not None}
     is_said = says_filtered(listing)
     wrong += [
@@ -281,7 +282,7 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
             members_of(one).get(bound.member) for one in page.items if members_of(one).get(bound.member) is not None
         }
         ordered = sorted(there, key=lambda one: bound.rank(str(one)) or 0)
-        # The second of several: there are items on both sides, and one is at the bound.
+        # The middle of several values: items lie on both sides, and one at the bound.
         middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
         rows += [
             {bound.parameter.name: text}
@@ -393,7 +394,7 @@ class _Parts:
             return None
         found = part[1].identities
         expected = whole.identities[: len(found)] if len(found) % _ROUND == 0 else whole.identities
-        # Of the newest so many in the order of their time, the last ones are the same.
+        # A limit may select the newest items: then the ends of both lists are equal.
         is_newest = found[-len(whole.items) :] == whole.identities[-len(found) :]
         fault = "" if found[: len(expected)] == expected or is_newest else _difference(expected, found)
         return self._paged(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
@@ -434,7 +435,7 @@ class _Parts:
         if offset is None or part is None or (whole.goes_on and not whole.totals):
             return None
         found = part[1].identities
-        # By a page's number some servers answer the last page, which may be the only one, or end with what was read.
+        # For a page beyond the end, some servers return the last page, or end with the items read before.
         is_last = listing.offset is None and len(found) >= end
         again = bool(found) and found[:1] == whole.identities[:1] and not is_last
         fault = f"the item {found[0]} of the first page" if again else ""
@@ -461,7 +462,7 @@ class _Parts:
         limit = self.reader.listing.limit
         if page is None or limit is None or not size:
             return None
-        # Pages are counted from 0 or from 1.
+        # Page numbers begin at 0 or at 1.
         begin = 1 if 1 in {flat(page.schema).get("default"), flat(page.schema).get("minimum")} else None
         if begin is None:
             starts = (one for one in (1, 0) if self._begins(whole, {page.name: one, limit.name: size}))
@@ -513,7 +514,7 @@ class _Parts:
                 following = next(cursors(self.reader.listing, *last), "")
                 query = {way: following} if following else None
             if query is None:
-                # Only a device that named a next page before has said that this is the last one.
+                # Only a device that named a next page before says by its absence that this is the last.
                 ends = f"no further page after {len(joined)} items" if number > 1 and not whole.goes_on else ""
                 break
             part = self.reader.part({**query, limit.name: size})

@@ -1,4 +1,4 @@
-"""Conditions, single members and undeclared methods, at what the run has created or may write."""
+"""Conditions, single members and undeclared methods, tried on resources that the run created or may write."""
 
 from __future__ import annotations
 
@@ -45,15 +45,16 @@ from conformance.transport.reach import is_same, joined, path_of
 #: Way by which a list below another thing is read.
 ANOTHER: Final = "another thing"
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
-# Members of a resource that are written one by one.
+# Members of a resource that are written singly.
 _MEMBERS: Final = 6
-# Filters of a list that are tried; time for which a device may list what was deleted, and pause between reads, s.
+# _FILTERS: filters of a list that are tried. _SETTLES_S: how long a deleted thing may still be listed, s. _PAUSE_S:
+# between reads.
 _FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
-# A list of tags that no content has.
+# _NEITHER: a list of entity tags that no content has.
 _NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
 _GONE_PLACE: Final = "path of what was deleted"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# Files with what programs take for the end of a line, of a text or of a file, each shorter than the one before.
+# Files with bytes that programs take for the end of a line, text or file, each shorter than the one before.
 _FILES: Final = (
     bytes(range(255, -1, -1)) * 18,
     bytes(range(256)) * 17 + b"\r\n\n \0end",
@@ -61,11 +62,11 @@ _FILES: Final = (
 )
 # How a client sends content of unknown length (RFC 9112 7.1).
 _IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
-# Texts of equal length in octets, with several kinds of line ends.
+# Texts of equal length in bytes, with several kinds of line ends.
 _TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b"end" for word in ("one", "other"))
-# The turn of an identifier that no other check uses.
+# Number for an identifier that no other check uses.
 _TURN: Final = 98
-# Members that are written one by one after all together, to see whether the others stay.
+# Members that are written singly after all together, to see whether the others stay.
 _SINGLES: Final = 4
 
 
@@ -132,7 +133,7 @@ def created_path(
     made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = _with_texts(create, usual[0].body)
-    # With all members, each can be written and removed later.
+    # Create it with all members, so that each can be written and removed.
     whole = whole_body(create, surveyor.values)[1]
     whole = whole if isinstance(whole, dict) else usual[0].body
     whole = _with_texts(create, whole) or whole
@@ -157,7 +158,7 @@ def located(api: RestInterface, read: Operation, made: Exchange) -> str:
         targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
     usable = list(dict.fromkeys(one for one in targets if re.fullmatch(pattern, one)))
-    # A Location may be wrong.
+    # The Location header may be wrong, so try it.
     found = (one for one in usable if len(usable) == 1 or api.send(Outgoing("GET", one)).response.ok)
     return next(found, "")
 
@@ -173,7 +174,7 @@ class _Thing:
     last: Exchange | None = None
     # Whether the run has created it.
     is_own: bool = True
-    # Files below it that are there.
+    # Existing files below it.
     below: list[tuple[Operation, Outgoing]] = field(default_factory=list)
 
     @property
@@ -200,7 +201,7 @@ class _Thing:
         return self.surveyor.send(operation, Variation(kind, "", place, inputs), request)
 
     def asked(self) -> None:
-        """Send to it, and to what is below it, methods that the description does not have."""
+        """Send methods that the description does not have, to the thing and to paths below it."""
         if not self.get().ok:
             return
         template = self.read.template.rstrip("/")
@@ -221,7 +222,7 @@ class _Thing:
         is_behind = False
         for change in changes:
             bodies = self._bodies(change, members(first.exchange, ()))
-            # A JSON patch has no members: the first one that changes something.
+            # A JSON patch has no members, so use the first patch that changes something.
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._refused(change, refusable)
             self._at_once(change, bodies)
@@ -238,7 +239,7 @@ class _Thing:
                         is_behind = True
                         self._behind(change, bodies[-1], old)
             waits = True
-            # What is written in other formats shows by special bodies.
+            # Special bodies show what is written in other formats.
             formats = _by_format(change)
             for own in formats[1:] if self.tag else ():
                 self._refused(own, list(islice(self._special(own), 1)))
@@ -246,19 +247,19 @@ class _Thing:
                 before, until = self._members(), time.monotonic() + _SETTLES_S
                 is_done = self.sent(one, body, *self._current(), place="body").ok
                 self.get()
-                # A JSON patch says what it changes; a device may do it later.
+                # A JSON patch describes the change, which a device may carry out later.
                 while waits and is_done and is_list_of_changes(before, body) and self._members() == before:
                     waits = time.monotonic() < until
                     time.sleep(_PAUSE_S if waits else 0)
                     self.get()
 
     def _refused(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
-        """Send what the description lets the device refuse for its header fields alone, and read after each.
+        """Send requests whose headers alone let the device refuse them, and read after each.
 
         That is a wrong condition or none, no format that the device has, and no credentials.
         """
         names = {one.name.lower() for one in change.parameter("header")}
-        # Twice: a device may take the second try for a wish to overwrite.
+        # Twice, because a device may take the second try for a wish to overwrite.
         tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] * 2 if self.tag else []
         if self._current() and "if-match" in names:
             # Strong comparison: a weak tag matches none (RFC 9110 13.1.1).
@@ -274,7 +275,7 @@ class _Thing:
             tried.append((("If-Match", "*"),))
         if "406" in change.responses:
             tried.append((("Accept", NO_FORMAT),))
-        # First without credentials: what follows may rightly be done.
+        # First without credentials: a later request may be carried out.
         if demands(self.api.run.contract.openapi, change):
             body, inputs = self._other(bodies), usual_inputs(change, self.surveyor.values)[0]
             request = written(change, inputs if body is None else replace(inputs, body=body))
@@ -288,7 +289,7 @@ class _Thing:
                 return
 
     def _at_once(self, change: Operation, bodies: Sequence[Any]) -> None:
-        """Write from two clients at the same moment with the same copy; one of them must be refused.
+        """Write from two clients at the same moment with the same entity tag; one of them must be refused.
 
         What they have changed is restored, so that each write after it changes its member, whoever was first.
         """
@@ -396,7 +397,7 @@ class _Thing:
         return (found, tuple(page.items)) if found is not None and page is not None else None
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
-        """Read a file, parts of it, and the file again."""
+        """Read a file, ranges of it, and the file again."""
         whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
         self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
         read_parts(self.surveyor, read, whole, more=more)
@@ -423,7 +424,7 @@ class _Thing:
                 self.surveyor.send(read, odd, whole)
 
     def _look_at_gone(self, read: Operation, request: Outgoing) -> None:
-        """Read what was deleted until it is gone, or until a device has had its time."""
+        """Read a deleted thing until it is gone, or the time for that is over."""
         began = time.monotonic()
         while self.surveyor.send(read, Variation(Kind.ODD, "", _GONE_PLACE, Inputs()), request).ok:
             if time.monotonic() - began > _SETTLES_S:
@@ -492,7 +493,7 @@ class _Thing:
         id_ = identifier_of(was, self.read)
         queries = list(_filters(listing, was)) if listing is not None and id_ else []
         for query in queries:
-            # A device may keep the answer.
+            # A device may cache the response.
             self._look_in(listing, query, id_, began - _SETTLES_S)
         self._refused(delete)
         ends, own = ending_with(delete), self.read.template.rstrip("/")
@@ -518,7 +519,7 @@ class _Thing:
             self._look_in(listing, query, id_, began)
 
     def _look_in(self, listing: Listing | None, query: dict[str, Any], id_: str, began: float) -> None:
-        """Read a list until what was deleted is not in it, or until a device has had its time."""
+        """Read a list until a deleted thing has left it, or the time for that is over."""
         if listing is None:
             return
         inputs = usual_inputs(listing.operation, self.surveyor.values)[0]
@@ -561,7 +562,7 @@ def _by_format(change: Operation) -> list[Operation]:
 
 
 def _fits(change: Operation, tags: str) -> bool:
-    """Return whether an operation's If-Match, as far as it is declared, may have these tags."""
+    """Return whether an operation's declared If-Match allows these tags."""
     return all(fits(one.schema, tags) for one in change.parameter("header") if one.name.lower() == "if-match")
 
 

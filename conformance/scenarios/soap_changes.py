@@ -38,25 +38,26 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
 
-# Interval of reads while a value is awaited, s; time that it has to last: longer than any that is judged.
+# _STEP_S: pause between reads while a value is awaited, s. _LASTS_S: how long it has to stay, s.
 _STEP_S: Final = 0.1
 _LASTS_S: Final = SETTLES_S + 0.4
 # Longest time for all changes of one operation, s.
 _BUDGET_S: Final = 12.0
-# Changes of one operation at quick and at other efforts; refusals of it.
+# Changes of one operation: _TURNS at quick and at other efforts. _REFUSALS: refused messages.
 _TURNS: Final = (6, 16)
 _REFUSALS: Final = 3
-# Values after the first one that are watched for lasting: two, as a third one may be read in place of one of them.
+# _LASTING: values after the first that must stay; two, because a third may be read in place of one. _THINGS: things
+# that are created.
 _LASTING: Final = 2
 _THINGS: Final = 3
-# Successive reads of each operation; reads in each of as many simultaneous rounds.
+# _READS: successive reads of each operation. _ROUNDS: rounds of simultaneous reads. Both at quick and at other efforts.
 _READS: Final = (20, 60)
 _ROUNDS: Final = (6, 30)
-# The turn whose text is beyond ASCII.
+# Number of the change whose text is beyond ASCII.
 _BEYOND_ASCII: Final = 3
 # Longest text that is sent because its type allows it, characters.
 _LONGEST: Final = 1_000
-# Header blocks that a device has to let pass (SOAP 1.1, 4.2.2 and 4.2.3; SOAP 1.2 Part 1, 2.2 to 2.4).
+# Header blocks that a device has to ignore (SOAP 1.1, 4.2.2 and 4.2.3; SOAP 1.2 Part 1, 2.2 to 2.4).
 _BLOCKS: Final = (
     ("a header block that need not be understood", "0", ""),
     ("a header block that another node must understand", "1", "urn:example:other"),
@@ -91,7 +92,7 @@ class _Changes:
                 continue
             with suppress(NotPossibleError):
                 if act.role is Role.REMOVES:
-                    # Not called: the thing may be the one that is read and changed.
+                    # Do not call it: the thing may be the one that is read and changed.
                     self.acts.append((act, *self.caller.messages.usual(act.operation)))
                     continue
                 declared, node, kind = usual_message(self.caller, act)
@@ -125,7 +126,7 @@ class _Changes:
             free = [one for one in own if node.at(one[0]).name.lower() not in keys]
             made = _varied(node, free, turn)
             if not self.caller.ask(act, made, "a message with other values").succeeded:
-                # Not all of them may be changed: those that may are found one by one.
+                # Some members may not be changed: find those that may, one by one.
                 tried = [(one, self.caller.ask(act, _varied(node, [one], turn), "another value")) for one in free]
                 keys |= {node.at(one[0]).name.lower() for one, probe in tried if not probe.succeeded}
                 free = [one for one, probe in tried if probe.succeeded]
@@ -135,11 +136,11 @@ class _Changes:
                 self.caller.ask(act, made, "a message with other values")
             sent = self._wait(readers, made, free)
             if sent and 0 < turn <= _LASTING:
-                # A value that is back at the second read did not end: the first one failed, after a time without any.
+                # If the value is back at the second read, it had not ended: the first read failed.
                 time.sleep(_LASTS_S)
                 self._read(readers, made, times=2)
             elif sent and turn and refusals < _REFUSALS:
-                # What a refusal changes is soon seen; other values were kept for longer by now.
+                # An effect of a refusal shows soon; other values have stayed for longer by now.
                 self._refuse(act, declared, _varied(made, free, turn + 1), refusals)
                 refusals += 1
                 self._read(readers, made, times=2)
@@ -170,7 +171,7 @@ class _Changes:
         yield "texts: cdata", Kind.VARIED, made, self._styled(act, made, XmlStyle(text="cdata")), "utf-8"
         octets = self.caller.messages.message(act.port, act.operation, made)
         for text in {made.at(path).text for path, simple in free if simple.builtin in STRINGS}:
-            # Only in texts: a reader that sees a part of an identifier or a number refuses the message.
+            # Only in texts: a device that reads only a part of an identifier or number refuses the message.
             if text[1:].replace(" ", "").isalnum():
                 octets = octets.replace(f">{text}<".encode(), f">{text[:2]}<!-- 2 -->{text[2:]}<".encode())
         yield "comments within texts", Kind.TRIED, made, octets, "utf-8"
@@ -208,7 +209,7 @@ class _Changes:
                 self._wait(readers, made, [one for one in left if made.at(one[0]).name in names])
 
     def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> bool:
-        """Read until what was written is read, or a device should have taken it; return whether anything was."""
+        """Read until a written value is read, or the time for it is over; return whether any was."""
         until = time.monotonic() + SETTLES_S
         while True:
             told = {name: texts[0] for name, texts in self._read(readers, made).items() if len(texts) == 1}
@@ -222,7 +223,7 @@ class _Changes:
         return any(seen)
 
     def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, list[str]]:
-        """Read what a message concerns; return the values by name."""
+        """Read the values that a message concerns; return them by name."""
         found: dict[str, list[str]] = {}
         for _ in range(times):
             for act, _, node in readers:
@@ -267,7 +268,7 @@ class _Changes:
                 time.sleep(wait_s)
                 for made in written:
                     self._read(readers, made)
-            # Several clients read different things at the same moment: each has to get its own.
+            # Several clients read different things at the same moment: each must get its own.
             asked = [(one, _asked(message, made)) for made in written for one, _, message in readers]
             clients = [self._addressed(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
             send_together([clients] * (_ROUNDS[not self._is_quick] // 2))
@@ -278,7 +279,7 @@ class _Changes:
                     self.caller.ask(act, _as_it_was(thing, free, values), "the values that were there before")
 
     def create(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
-        """Create things, read the lists, be refused, and remove what was created."""
+        """Create things, read the lists, send messages to be refused, and remove the created things."""
         remove = next((one for one in self.acts if one[0].role is Role.REMOVES and one[0].noun == act.noun), None)
         lists = [one for one in self.acts if one[0].lists(act)]
         if remove is None or not lists or remove[2] is None:
@@ -297,7 +298,7 @@ class _Changes:
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
             asks = [Node("", "", tuple(Node(*one) for one in told.items())), *asks]
             if not turn:
-                # The first one shows that things last longer than the others do until they are removed.
+                # The first thing shows that things last longer than the others exist before they are removed.
                 time.sleep(_LASTS_S)
             self._read(lists, node)
             yield
@@ -326,7 +327,7 @@ class _Changes:
     def read_often(self) -> None:
         """Read again and again, one after another and at the same moment."""
         readers = [one for one in self.acts if one[0].role is Role.READS]
-        # What writers change was read as often beside them.
+        # Values that writes change were read as often beside them.
         written = [act for act, _, _ in self.by_role(Role.WRITES)]
         for act, _, node in readers:
             for _ in range(0 if any(map(act.shows, written)) else _READS[not self._is_quick]):
@@ -348,7 +349,7 @@ class _Changes:
         for act, declared, node in self.acts:
             if act.role in {Role.CREATES, Role.REMOVES}:
                 continue
-            # A bound of what names a thing names none that is there.
+            # A bound is no valid name of an existing thing.
             free = frozenset(act.sent.keys() - asked if act.role is Role.WRITES else ())
             made_of = [*_alternatives(declared, node, free)] if declared and node else []
             # What is left out of a message that writes is read too (_ends).
@@ -360,7 +361,7 @@ class _Changes:
             if act.role is Role.WRITES:
                 self.caller.ask(act, node, "the values that were there before")
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
-            # A reader that takes no comments is left alone: there are many, and no client that writes messages has any.
+            # Comments are sent to no device that rejects them: client libraries write none.
             for says, style in [one for one in single_changes() if "comment" not in one[0]]:
                 self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
             for says, text, actor in _BLOCKS:
@@ -391,7 +392,7 @@ class _Changes:
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.INPUT)
 def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
-    """Change what may be changed over SOAP, read it back, be refused in between, and put it back."""
+    """Change values over SOAP, read them back, send messages to be refused in between, and restore the values."""
     changes = _Changes(Caller.of(api))
     changes.find()
     if not changes.acts:
@@ -442,7 +443,7 @@ def _varied(node: Node, free: _Leaves, turn: int) -> Node:
     for path, simple in free:
         name = node.at(path).name
         there[name] += 1
-        # A name may be that of the thing itself; where it refers to another one, it is refused, and then left alone.
+        # A member called name may be the thing's own; if it refers to another thing, it is refused and then left alone.
         is_free = name.lower().endswith("name") or REFERS.search(name) is None
         node = with_text(node, path, another(simple, node.at(path).text, turn + there[name] - 1, is_free))
     return node
@@ -456,7 +457,7 @@ def _as_it_was(node: Node, leaves: _Leaves, began: dict[str, list[str]]) -> Node
 
 
 def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterator[tuple[str, Node]]:
-    """Yield further messages that may be valid, each with what is special about it.
+    """Yield further messages that may be valid, each with its description.
 
     The values that are called as in ``free`` get the bounds of their types too.
     """
@@ -471,7 +472,7 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
             else []
         )
         others += [plain(one) for one in simple.others if name.lower() in free]
-        # Two values of one type may be bounds of each other.
+        # Two values of one type may bound each other.
         if types.count(simple) == 1 and simple.builtin in NUMBERS and name.lower() in free:
             others += [f"{bound:f}" for bound in (simple.minimum, simple.maximum) if bound is not None]
         if simple.builtin in STRINGS and name.lower() in free:

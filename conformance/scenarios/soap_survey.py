@@ -33,15 +33,16 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from lxml import etree
 
-# Faults of invalid messages that are tried: services differ on others, such as the order.
+# Faults of invalid messages that are sent: services disagree about others, such as the order.
 _FORBIDDEN: Final = ("missing", "unknown", "lexical", "range", "namespace")
-# Messages of one operation at standard: invalid ones of each kind; usual ones.
+# _MOST: invalid messages of each kind of an operation at standard. _USUAL: usual messages.
 _MOST: Final = 4
 _USUAL: Final = 6
 _REPEATED: Final = 2
 # Longest time for one operation, s.
 _BUDGET_S: Final = 20.0
-# With a time limit, all but the usual messages end at this share of it: few other checks follow.
+# _SURVEY_SHARE: with a time limit, other messages than usual ones end at this share of it. _MANY: more than all
+# messages.
 _SURVEY_SHARE: Final = 0.85
 _MANY: Final = 1000
 # Values from the device that are tried for one operation.
@@ -261,7 +262,7 @@ class Caller:
             if self.api.run.losses == losses:
                 self.probes.append(probe)
             else:
-                # The loss is a finding of its own, and what was lost once is not risked again.
+                # The loss is a finding of its own, and a message that caused one is not sent again.
                 self.lost.add(probe.operation)
             if not goes_on:
                 raise PartialTraceError(tuple(self.probes)) from none
@@ -283,7 +284,7 @@ def wsdl_faults(run: Run) -> tuple[str, ...]:
 def soap_survey(api: RestInterface) -> tuple[SoapProbe, ...]:
     """Call each operation that may be called, with valid messages and with wrong ones."""
     caller = Caller.of(api)
-    # What one operation answers, another asks for: those that ask for nothing that must be known come first.
+    # Operations with fewer unknown inputs come first, because their responses contain inputs of others.
     order = in_order(caller.acts.values(), caller.asks)
     api.run.limit.in_turns({act.label: _explore(caller, act) for act in order}, _SURVEY_SHARE)
     if not caller.probes:
@@ -310,9 +311,9 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
         _about_others(caller, act, node)
     yield
     effort = caller.api.run.effort
-    # What was created may be there only once, and what was removed is not there any more.
+    # A created thing may be allowed only once, and a removed thing is gone.
     is_once = act.role in {Role.CREATES, Role.REMOVES}
-    # At quick, what may not be repeatable is repeated too: what wrong messages do to it shows only beside that.
+    # At quick, send it again even if it is not repeatable: only then do effects of wrong messages show.
     quick = _REPEATED if act.role in {Role.OTHER, Role.ENDS} else 0
     for _ in range(0 if is_once else quick if effort.name == "quick" else _USUAL - 1):
         if act.label not in caller.lost:

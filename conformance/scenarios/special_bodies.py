@@ -21,9 +21,11 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 
-#: With an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and what other formats escape.
+#: Texts with an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and characters that formats
+#: escape.
 TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
-# Fractions, several for each member; one that needs all digits of a double; an integer that is no double.
+# _PARTS: fractions, several for each member. _ALL_DIGITS: needs all digits of a double. Below: an integer that is no
+# double.
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
 _ALL_DIGITS: Final = 0.12345678901234
 _BEYOND_DOUBLES: Final = 2**53 + 1
@@ -63,7 +65,7 @@ def special_bodies(
     if change.method == "PUT":
         base = {**usual.body, **there}
         yield from half_valid(change, usual, {**base, **changed})
-        # A device has no default for what the description says goes.
+        # If the description says that omitted members go, the device has no default for them.
         needed = flat(read.shape or {}).get("required", ()) if GONE.search(change.text) else None
         yield from _replacing(schema, base, changed, values, may, needed)
         return
@@ -74,7 +76,7 @@ def special_bodies(
         needed = flat(read.shape or {}).get("required", ())
         nulls = [name for name in there if name not in needed and there[name] is not None and may(name)]
         yield from ({name: None} for name in nulls[:_NULLS] if fits(parts[name], None))
-    # What is refused comes first: what is there already would show nothing.
+    # Requests to be refused come first: a value that is already there would show nothing.
     yield from half_valid(change, usual, changed)
     # All together, and what has a time zone alone: the device may have a reason to refuse another one.
     zoned = [
@@ -163,7 +165,7 @@ def half_valid(change: Operation, usual: Inputs, valid: dict[str, Any]) -> Itera
 
 
 def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
-    """Return other values for members of a body that show what a device does not keep: fractions, order, time zones."""
+    """Return other values for a body's members by which losses show: fractions, order, time zones."""
     parts, found = parts_of(schema), another(schema, body, turn, collections)
     for name in found:
         given = flat(parts.get(name, {}))
@@ -193,7 +195,7 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
     elif schema.get("format") == "date-time":
         yield _TIME.format(turn)
     elif isinstance(value, str) and is_free_text(schema):
-        # As long as it may be: a device may cut it, or count octets.
+        # The longest allowed text: a device may cut it, or count bytes.
         most = min(schema.get("maxLength", 0), _LONGEST)
         yield from (*((one * most)[:most] for one in TEXTS[:1] if most > len(one)), *TEXTS)
 
@@ -218,7 +220,7 @@ def _nulls(
     for name in [one for one in changed if isinstance(changed[one], list) and changed[one] != usable[one]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
     for name, given in ((one, entry_of(flat(parts[one]))) for one in usable if one not in own):
-        # One entry of a map goes beside another one that is new, and then all go.
+        # Add an entry to a map beside the existing one, then remove all.
         entry = sample(given) if given is not None else None
         if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):
             yield {name: dict.fromkeys(_KEYS[:2], entry)}
@@ -228,7 +230,7 @@ def _nulls(
     for name, value in changed.items():
         inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
         if inner and len(value) > 1:
-            # Each alone: what the patch before has changed stays; also where the patch names what is there already.
+            # Each member alone: the others must keep the value of the patch before.
             for one in inner[:2]:
                 if now().get(name) != value:
                     yield {name: value}
@@ -267,7 +269,7 @@ def _patches(
     ]
     for name in (one for one, part in parts.items() if may(one) and "array" in kinds_of(part)):
         apart = alike_and_apart(parts[name])[1] or [None]
-        # What is there already would show nothing.
+        # A value that is already there would show nothing.
         *rest, last_item = apart[::-1] if same(first.get(name), apart) else apart
         whole, added = (
             {"op": "add", "path": _pointer(name), "value": rest},

@@ -41,18 +41,18 @@ from conformance.verdict.time_limit import TimeIsOverError
 if TYPE_CHECKING:
     from conformance.api.rest.generated import Target
 
-# Parts of a refused request with several members that are sent alone.
+# Members of a refused request that are sent alone.
 _MOST_PARTS: Final = 24
-# Refused requests that are tried again in other states; number of such states.
+# _TRIED: refused requests that are tried again in other states. _STATES: such states.
 _TRIED, _STATES = 3, 2
-#: At standard effort, timed sends of the usual request before the groups of others and after each: a failure in one
-#: call of twenty is found.
+#: Timed sends of the usual request before other groups and after each, at standard effort: a failure in one of twenty
+#: is found.
 TIMED: Final = 5
-# One request in this many is the first on its connection.
+# One request in this many opens a new connection.
 _FRESH: Final = 5
-# A device may use the run's deadline for its own work, and then respond that it is over: that is no hang.
+# A device may work until the run's deadline and then respond: that is no hang.
 _GRACE: Final = 1.25
-# Times that a thing is created and deleted.
+# How often a thing is created and deleted.
 _CYCLES: Final = 24
 # Statuses of an operation that does not exist.
 _NOT_FOUND: Final = 404
@@ -63,20 +63,21 @@ _CHARSET: Final = "header Content-Type"
 _OTHER_TYPES: Final = ("text/plain", "application/xml")
 #: Statuses that refuse a request for its content, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
-# Statuses that may refuse a second thing of one name; requests that must be accepted.
+# _DOUBTED: statuses that may refuse a second thing with the same name. _ACCEPTED: requests that must be accepted.
 _DOUBTED: Final = frozenset({400, 409, 422})
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
-# Kinds of requests that are judged in the same way when they are generated: they need not be sent again.
+# Kinds of requests that generated requests cover too, so they need not be sent again.
 _JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
-# Repeats of one request; fewest repeats; cases of Schemathesis of each kind, for one operation.
+# REPEATS: repeats of one request; FEWEST_REPEATS at least. Below: cases of Schemathesis of each kind for an operation.
 REPEATS: Final = 200
 FEWEST_REPEATS: Final = 60
 COVERAGE: Final = 150
-# Multiple of an exploration's time that one operation may take: a slow one must not take the whole run.
+# _BUDGETS: multiple of an exploration's time that one operation may take, so that a slow one does not take the whole
+# run.
 _BUDGETS: Final = 3
 FUZZED: Final = 40
-# With a time limit, shares of it: the survey's requests beyond the usual ones end at the first, so that what binds
-# every web API is tried; the generated requests end at the second.
+# Shares of a time limit: at SURVEY_SHARE the survey sends only usual requests, at _GENERATED_SHARE generated requests
+# end.
 SURVEY_SHARE: Final = 0.5
 _GENERATED_SHARE: Final = 0.85
 
@@ -217,7 +218,7 @@ class Surveyor:
         request = request or self._reaching.request(operation, variation)
         probe, losses = self._described(operation, variation, request), self.api.run.losses
         try:
-            # A device may treat the first request on a connection in another way than those after it.
+            # A device may handle the first request on a connection differently.
             if fresh is None:
                 fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
             exchange = self._recorded(request, fresh=fresh)
@@ -232,7 +233,7 @@ class Surveyor:
             if self.api.run.losses == losses:
                 self.probes.append(probe)
             else:
-                # The loss is a finding of its own, and what was lost once is not risked again.
+                # The loss is a finding of its own, and a request that caused one is not sent again.
                 self.given_up.add(operation.label)
                 self.api.streams.add(operation.label)
             if not goes_on:
@@ -251,7 +252,7 @@ class Surveyor:
         if operation.safe and kind in _JUDGED:
             self.api.judged.add(request)
         if exchange.response.cut:
-            # An endless response says nothing new the second time, and costs its time each time.
+            # A second endless response would show nothing new and cost as much time.
             self.given_up.add(operation.label)
             self.api.streams.add(operation.label)
         if exchange.response.ok:
@@ -394,20 +395,20 @@ class Surveyor:
         """Send as many references as a list may have, the usual request with a charset, and again unchanged."""
         is_usable = operation.label not in self.given_up
         for fewer, most in most_references(operation, usual, self.values) if is_usable else ():
-            # If the device takes all but one, and takes that one alone, it knows each of them.
+            # If the device accepts all members but one, and accepts that one alone, it knows each.
             if self.send(operation, Variation(Kind.AGAIN, "", "", fewer)).ok:
                 self.send(operation, most)
         if is_json(usual.media_type) and operation.label not in self.given_up:
             shown = Variation(Kind.OPTIONAL, "with a charset", _CHARSET, usual)
             request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
-        # What may be left out may be ignored.
+        # An optional body may be ignored.
         is_judged = is_usable and operation.body_required and "415" in operation.responses
         types = [one for one in _OTHER_TYPES if is_judged and not {one, "text/*", "*/*"} & operation.bodies.keys()]
         for media_type in types[: 1 if self.api.run.effort.name == "quick" else None]:
             other = Variation(Kind.INVALID, f"{media_type}, which is not declared, with 415 declared", _CHARSET, usual)
             self.send(operation, other, self._reaching.request(operation, other).having_type(media_type))
-        # What is left out has its default, more than once.
+        # Optional inputs then have their defaults, more than once.
         least = least_inputs(operation, usual)
         for inputs in [usual] if least is None else [least] * 2:
             self.send(operation, Variation(Kind.AGAIN, "", "", inputs))
@@ -483,7 +484,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
     surveyor = Surveyor(api, values)
     api.values = values
     steps = {operation.label: surveyor.explore(operation) for operation in sorted(operations, key=order_of)}
-    # What DELETE deletes, the others still need.
+    # Other operations still need the things that DELETE removes.
     behind = {operation.label for operation in operations if operation.method == "DELETE"}
     is_complete = run.limit.in_turns(steps, SURVEY_SHARE, behind)
     if is_complete:
@@ -491,7 +492,7 @@ def survey(api: RestInterface, values: Values) -> Survey:
         surveyor.try_again(operations)
     for operation in operations if is_complete else ():
         if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
-            # What was created meanwhile has an id now.
+            # Things created meanwhile have ids now.
             surveyor.begin(operation)
     for operation in operations:
         surveyor.look_elsewhere(operation)
@@ -565,7 +566,7 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
 
     run = surveyor.api.run
     if operation.safe and not target.has_input:
-        return  # there is one such request, and the survey has sent it
+        return  # there is only one such request, and the survey has sent it
     until = time.monotonic() + _BUDGETS * run.effort.budget_s
     count = COVERAGE // (SLOW_SHARE if operation.label in surveyor.api.slow else 1)
     chosen = run.effort.draw_passing(target.covering(), count, f"{run.seed}/coverage {target.label}")

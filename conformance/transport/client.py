@@ -59,7 +59,7 @@ _CRASHED: Final = "the server closed the connection without a response, and acce
 
 
 class BeforeSending(Protocol):
-    """What a connection calls before each message."""
+    """A function that a connection calls before each message."""
 
     def __call__(self, *requests: tuple[str, str]) -> None:
         """Prepare for a message with these requests: method and URL of each."""
@@ -214,7 +214,7 @@ class HttpClient:
 
     @property
     def hangs(self) -> Hangs:
-        """What did not respond before."""
+        """Return the endpoints that did not respond before."""
         return self.connection.hangs if self._hangs is None else self._hangs
 
     def url(self, path: str) -> str:
@@ -439,13 +439,13 @@ _drafts: ContextVar[list[Draft] | None] = ContextVar("drafts", default=None)
 
 
 def is_drafting() -> bool:
-    """Return whether what clients in this thread would send is only kept."""
+    """Return whether requests of this thread are only kept, not sent."""
     return _drafts.get() is not None
 
 
 @contextmanager
 def drafted() -> Iterator[list[Draft]]:
-    """Send nothing: yield a list that gets what clients in this thread would have sent. Each gets a response 404."""
+    """Send nothing: yield a list that collects this thread's requests. Each gets a response 404."""
     drafts: list[Draft] = []
     token = _drafts.set(drafts)
     try:
@@ -455,7 +455,7 @@ def drafted() -> Iterator[list[Draft]]:
 
 
 class _SilenceError(Exception):
-    """Raised when one attempt to send a request gets no response; the message says why."""
+    """Raised when an attempt to send a request gets no response; the message explains why."""
 
     def __init__(self, problem: str, kind: NoAnswer) -> None:
         super().__init__(problem)
@@ -463,7 +463,7 @@ class _SilenceError(Exception):
 
 
 def _no_answer(error: Exception, seconds: float) -> _SilenceError:
-    """Convert a network error to the reason for a missing response; raise any other error again, as it is a bug."""
+    """Convert a network error to the reason for a missing response; raise any other error again: it is a bug."""
     text = str(error) or type(error).__name__
     if isinstance(error, TimeoutError):
         return _SilenceError(f"no response within {seconds:.3g} s", NoAnswer.TIMEOUT)

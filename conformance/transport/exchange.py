@@ -14,11 +14,11 @@ from conformance.transport.shell_command import bytes_command, shell_command
 
 # Methods that change nothing (RFC 9110 9.2.1), so they may be sent again without permission.
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
-# Characters that may stand in a request target (RFC 3986 2).
+# Characters of a request target (RFC 3986 2).
 _SENDABLE: Final = "".join(map(chr, range(0x21, 0x7F)))
 # Methods that have the same effect when sent twice (RFC 9110 9.2.2): a client may repeat them on a new connection.
 IDEMPOTENT_METHODS = SAFE_METHODS | {"PUT", "DELETE"}
-# A path segment that contains this, or is longer than this, is a value and no name.
+# A path segment that matches _VALUE, or is longer than _LONG_SEGMENT, is a value and no name.
 _VALUE = re.compile(r"\d|%|NaN|Infinity")
 _LONG_SEGMENT = 40
 _PARTIAL: Final = 206
@@ -72,7 +72,7 @@ class Outgoing:
 
 @dataclass(frozen=True)
 class Request:
-    """One HTTP request as it was sent.
+    """A sent HTTP request.
 
     Attributes:
         method: HTTP method.
@@ -246,9 +246,9 @@ class NoAnswer(StrEnum):
     CLOSED = "closed"
     TLS = "tls"
     MALFORMED = "malformed"
-    # The endpoint has hung before, so nothing was sent.
+    # the endpoint hung before, so the request was not sent
     CIRCUIT_OPEN = "circuit-open"
-    # Too much time was lost with what hangs, so it was not waited for until the deadline: that shows nothing.
+    # hangs have cost so much time that the run did not wait until the deadline: this shows nothing about the device
     HURRIED = "hurried"
     # A gateway responded in the place of a device that is away.
     BAD_GATEWAY = "502"
@@ -256,7 +256,7 @@ class NoAnswer(StrEnum):
     GATEWAY_TIMEOUT = "504"
 
 
-#: What each status of a gateway means where the device behind it is away (RFC 9110 15.6.3 to 15.6.5).
+#: By status of a gateway: what it says about the absent device behind it (RFC 9110 15.6.3 to 15.6.5).
 OF_GATEWAY: Final = {502: NoAnswer.BAD_GATEWAY, 503: NoAnswer.UNAVAILABLE, 504: NoAnswer.GATEWAY_TIMEOUT}
 
 
@@ -275,7 +275,7 @@ class Unanswered(NamedTuple):
 
     @property
     def came(self) -> str:
-        """A short description of what happened instead of a response, for findings."""
+        """Return a short description of what happened instead of a response, for findings."""
         return self.problem
 
 
@@ -286,7 +286,7 @@ class Sending(NamedTuple):
     kind: NoAnswer | None
 
 
-# What became of a request: a finding's evidence.
+# A request and its outcome; findings refer to it as evidence.
 Attempt = Exchange | Unanswered
 
 
@@ -303,12 +303,12 @@ class NoAnswerError(Exception):
 
     @property
     def kind(self) -> NoAnswer:
-        """What happened instead of a response."""
+        """Return what happened instead of a response."""
         return self.unanswered.kind
 
 
 class NotPermittedError(Exception):
-    """Raised instead of sending a request that this run may not send; the message says why not."""
+    """Raised instead of sending a request that this run may not send; the message explains why."""
 
 
 class Listener:

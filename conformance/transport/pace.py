@@ -11,17 +11,17 @@ from typing import Final
 
 from conformance.transport.exchange import TOO_MANY, UNAVAILABLE, Response
 
-# Octets a second of the slowest link: an exchange may take as much longer.
+# Bytes per second of the slowest link: an exchange gets as much more time.
 _SLOWEST_OCTETS_PER_S = 256 * 1024
-# Octets that may still be under way after they were handed to the network: buffers on both sides and between.
+# Bytes that may still be in buffers on both sides and between, after the suite handed them to the network.
 _UNDER_WAY = 1024 * 1024
-# A response is late if it takes twice the usual time and this much more, s: TCP may have to repeat a segment.
+# A response is late if it takes twice the usual time plus this, s: TCP may have to repeat a segment.
 _LATE_S = 0.1
-#: An endpoint that let this many deadlines pass within this time, s, is not called until the time is over, which
-#: doubles with each further hang. A link that failed twice in a long run does not count.
+#: An endpoint that reached HANGS deadlines within _HANGS_WITHIN_S is not called until that time is over; the time
+#: doubles with each further hang. Two failures far apart in a long run do not count.
 HANGS: Final = 2
 _HANGS_WITHIN_S: Final = 60.0
-# After waiting for hangs for so long in all, s, the run waits less: so long, or so many times its slowest answer, s.
+# After _MOST_WAITED_S spent on hangs, a request waits only for _HURRIED_S, or _SLOWER times the slowest response, s.
 _MOST_WAITED_S: Final = 60.0
 _HURRIED_S, _SLOWER = 2.0, 3.0
 # Times that a request is sent that the device puts off: by 429, and by 503, which may be the state of a thing as well.
@@ -35,7 +35,7 @@ _IN_ROW, _ENDPOINTS = 12, 2
 
 
 def time_for(octets: int) -> float:
-    """Return how long a number of bytes may take on the network, s. Deadlines are extended by it."""
+    """Return how long a number of bytes may take on the network, s. Deadlines are extended by that."""
     return octets / _SLOWEST_OCTETS_PER_S
 
 
@@ -89,7 +89,7 @@ class Hangs:
         return bool(self._at or self.hurried)
 
     def is_put_off(self, endpoint: str) -> bool:
-        """Return whether an endpoint is not asked at present."""
+        """Return whether an endpoint is not called for now."""
         at = self._at.get(endpoint, ())
         within_s = _HANGS_WITHIN_S * float(1 << max(0, len(at) - HANGS))
         return sum(time.monotonic() - one < within_s for one in at) >= HANGS

@@ -55,7 +55,7 @@ def send_together(rounds: Sequence[Sequence[Addressed]]) -> list[list[Attempt]]:
                     ]
                     attempts.append([job.result() for job in jobs])
                 except BaseException:
-                    # A signal came before all were begun: the others would wait, and the process, without an end.
+                    # A signal came before all threads had begun: without this, the others would wait for ever.
                     start.abort()
                     raise
                 for to, request in requests:
@@ -117,15 +117,15 @@ def _sent_apart(to: HttpClient, requests: Sequence[Outgoing], timeout_s: float) 
 
 
 class _Client:
-    """One of several concurrent clients, with its own connections and without listeners."""
+    """One of several concurrent clients, with connections of its own and without listeners."""
 
     def __init__(self) -> None:
-        # By base URL: the client whose connections are shared, and the own one.
+        # By base URL: the client whose connections are shared, and the client of this thread.
         self._clients: dict[str, tuple[HttpClient, HttpClient]] = {}
 
     def send(self, shared: HttpClient, request: Outgoing, wait: Callable[[], object]) -> Attempt:
         """Wait for the other clients, then send."""
-        # The ceiling on the rate has been kept to before.
+        # The limit on the rate was applied before.
         settings = shared.connection.unheard(heard=Heard.UNLESS_BUSY, request_rate=None, resent=0)
         _, own = self._clients.setdefault(shared.base_url, (shared, HttpClient(shared.base_url, settings)))
         wait()

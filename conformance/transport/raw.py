@@ -36,9 +36,9 @@ from conformance.transport.exchange import (
 from conformance.transport.pace import time_for
 from conformance.transport.passage import Passage
 
-# Faults of a header section that a recipient may accept and a server must not send (RFC 9112 2.2, 5.2).
+# Faults of a header section that a recipient may tolerate but a server must not send (RFC 9112 2.2, 5.2).
 _FORGIVEN = re.compile(rb"(?<!\r)\n|\r(?!\n)|\n[ \t]")
-# A request line wherever it stands, with any whitespace that servers may forgive (RFC 9112 3); one without a version.
+# A request line anywhere in a text, with whitespace that servers may tolerate (RFC 9112 3), or without a version.
 _REQUEST_LINE = re.compile(
     rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+)[ \t\v\f\r]+([^ \t\v\f\r\n]+)[ \t\v\f\r]+HTTP/|(?:\A|[\r\n])[ \t\v\f]*"
     rb"((?:PUT|POST|DELETE|PATCH)(?=[ \t\v\f])|[A-Za-z-]+(?=[ \t\v\f]+(?:/|https?:)))[ \t\v\f]+([^ \t\v\f\r\n]+)"
@@ -46,7 +46,7 @@ _REQUEST_LINE = re.compile(
 _MOST = 4 * 1024 * 1024
 _MOST_INTERIM = 100
 _SHORT = 64 * 1024
-# Shortest wait for a connection, s.
+# _TO_CONNECT_S: shortest wait for a connection, s. _SILENCES: kinds of missing responses.
 _TO_CONNECT_S = 0.05
 _SILENCES = {
     NoAnswer.CLOSED: "the server closed the connection without a response",
@@ -104,7 +104,7 @@ def chunked(body: bytes, size: int, extension: bytes = b"", trailers: bytes = b"
 
 
 def refuses_chunks(attempt: Attempt) -> bool:
-    """Return whether a server asked for a Content-Length by 411, as it may for any content (RFC 9112 6.3)."""
+    """Return whether a server demanded a Content-Length by 411, which RFC 9112 6.3 allows."""
     return isinstance(attempt, Exchange) and attempt.response.status == HTTPStatus.LENGTH_REQUIRED
 
 
@@ -198,7 +198,7 @@ def _talked(
             first_s = first_s or time.monotonic()
             received += piece
             deadline += time_for(len(piece))
-            # A long answer is looked at when no more of it is there to be read, as each look takes time.
+            # A long response is examined only when no more bytes wait, because each look takes time.
             short = len(received) < _SHORT or not select.select([link], [], [], 0)[0]
             if answers and short and answers_in(bytes(received), answers) == answers:
                 break
@@ -222,7 +222,7 @@ def _sent(
             _set_timeout(link, deadline)
             link.sendall(octets[begin:end])
     except OSError:
-        # Too slow, or the robot has closed the connection; what it sent before can still be read.
+        # Too slow, or the robot closed the connection; bytes that it sent before can still be read.
         return False, early
     return True, early
 
@@ -305,7 +305,7 @@ def _parsed(octets: bytes, method: str, *, closed: bool, elapsed_ms: float) -> t
     if _FORGIVEN.search(section):
         raise FramingError(f"a bare CR or LF, or a folded field, in {section[:60]!r} (RFC 9112 2.2, 5.2)")
     reader = h11.Connection(h11.CLIENT, max_incomplete_event_size=_MOST)
-    # Only HEAD changes how a response is framed (RFC 9112 6.3), so no other method needs to be one that h11 takes.
+    # Only HEAD changes the framing of a response (RFC 9112 6.3), so GET stands for any other method.
     reader.send(h11.Request(method="HEAD" if method == "HEAD" else "GET", target="/", headers=[("Host", "")]))
     reader.send(h11.EndOfMessage())
     reader.receive_data(octets)

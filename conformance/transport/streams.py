@@ -20,7 +20,7 @@ from conformance.transport.exchange import NoAnswer, NoAnswerError, NotPermitted
 from conformance.transport.passage import Heard, Passage
 
 Kind = Literal["sse", "websocket"]
-# Messages that are kept for whoever asks, and the longest line of an event, or message, octets.
+# _KEPT: messages of a stream that are kept. _LONGEST: bytes of an event's line or of a message.
 _KEPT: Final = 2000
 _LONGEST: Final = 16 * 1024 * 1024
 _EVENTS: Final = "text/event-stream"
@@ -109,7 +109,7 @@ class Stream:
         self._link.close()
 
     def _listen(self) -> None:
-        # Whatever a server sends, and however the stream ends: that it did, is all that counts.
+        # Only the end of the stream matters here, not its reason.
         with suppress(Exception):
             for octets, id_ in self._pieces:
                 self.last_id = id_
@@ -163,7 +163,7 @@ def _data(response: http.client.HTTPResponse) -> Iterator[tuple[bytes, str]]:
 
 def _messages(link: socket, url: str, headers: dict[str, str], timeout_s: float) -> _Opened:
     """Open a WebSocket."""
-    # By its name, as only streams need it; who installed roaas without ROS has no use for it.
+    # Imported by name, because only streams need it, and installations without ROS lack it.
     try:
         library: Any = import_module("websockets.sync.client")
     except ModuleNotFoundError as error:

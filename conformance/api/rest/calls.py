@@ -19,7 +19,7 @@ from conformance.transport.exchange import Exchange
 
 JSON = "application/json"
 XML = "application/xml"
-# A refusal is worth waiting for if its Retry-After is no longer than this, s.
+# A refused request is repeated if its Retry-After is no longer than this, s.
 _MOMENT_S = 2
 
 

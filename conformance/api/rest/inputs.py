@@ -120,13 +120,13 @@ def _body(operation: Operation, inputs: Inputs) -> tuple[str, bytes]:
 
 
 def parameter_verdict(operation: Operation, parameter: Parameter, value: Any) -> str:
-    """Return whether a parameter's value is valid, invalid or unclear as it is written; NOTHING: without it."""
+    """Return whether a parameter's text is valid, invalid or unclear; with NOTHING, whether leaving it out is."""
     alone = replace(operation, parameters=(parameter,), bodies={})
     return _verdict(alone, Inputs().having(parameter.where, parameter.name, value))
 
 
 def body_verdict(operation: Operation, inputs: Inputs) -> str:
-    """Return whether the body of a request is valid, invalid or unclear as it is written."""
+    """Return whether a request body's bytes are valid, invalid or unclear."""
     return _verdict(replace(operation, parameters=()), inputs)
 
 
@@ -137,7 +137,7 @@ def _verdict(operation: Operation, inputs: Inputs) -> str:
 
 
 def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
-    """Return inputs of valid requests with what is required and nothing else, the most promising first."""
+    """Return inputs of valid requests with only the required parameters and members, the most promising first."""
     base = Inputs()
     chosen = [(item, values.of(operation, item)) for item in operation.parameters if item.required]
     for item, known in chosen:
@@ -175,7 +175,7 @@ def _type_of_part(name: str, part: Schema, body: Body) -> str:
 
 
 def renewed(operation: Operation, inputs: Inputs, values: Values, place: str = "") -> Inputs:
-    """Return the inputs of a creation with new values of the members that must be new, but for the one at a place."""
+    """Return the inputs of a creation with new unique values, except for the member at a place."""
     if operation.method != "POST" or inputs.media_type not in operation.bodies:
         return inputs
     schema, keep = operation.bodies[inputs.media_type].schema, place.removeprefix("body /")

@@ -1,4 +1,4 @@
-"""What a run sent to each operation of a described API, and what it got: the operations matrix of the page."""
+"""Record the requests to each operation of a described API and their responses, for the page's table of operations."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class OperationLog(Listener):
         return request.url[len(self._base_url) :].partition("?")[0]
 
     def _look_into(self, operation: Operation, record: _Record, exchange: Exchange) -> None:
-        """Note the branches of its schema that a response's body shows, until all of them are known."""
+        """Record which alternatives of its schema a response's body shows, until all of them were seen."""
         response, key = exchange.response, operation.response_key(exchange.response.status)
         wanted = self._branches.get((operation.label, str(key), response.media_type), set())
         if wanted <= record.branches or len(response.body) > _READ:
@@ -176,7 +176,7 @@ class OperationLog(Listener):
         }
 
     def nothing_shown(self, rules: CallRules) -> str:
-        """Return why the run shows nothing of the device, and what is needed; empty if an operation succeeded."""
+        """Return why the run shows nothing about the device, and what it needs; empty if an operation succeeded."""
         reasons = {item: rules.decide(item) for item in operations_of(self._contract)}
         if any(record.succeeded for record in self._records.values()):
             return ""

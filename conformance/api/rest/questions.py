@@ -1,4 +1,4 @@
-"""Questions whose responses can be told apart, so that a response that went to another client is noticed."""
+"""Requests whose responses can be told apart, to notice a response that went to the wrong client."""
 
 import itertools
 import json
@@ -21,10 +21,10 @@ from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import BUSY, Outgoing, Response
 from conformance.transport.parallel import Addressed
 
-# Begins the values in a question that only one client sends.
+# _MARK: start of values that only one client sends. _UNKNOWN: unknown members of a response that are reported.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
-# Characters of a mismatch that are shown.
+# Characters of a mismatch that a message shows.
 _SHOWN: Final = 400
 
 
@@ -45,7 +45,7 @@ class Question:
     comes_and_goes: bool = False
 
     def outgoing(self, api: RestInterface) -> Addressed:
-        """Return the request as one of several clients sends it."""
+        """Return the request of one of several concurrent clients."""
         return api.client, Outgoing("GET", self.path, (("Accept", self.accept),))
 
 
@@ -66,7 +66,7 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
 
 
 def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
-    """Return why a response cannot be the one to this question; empty where it can.
+    """Return why a response cannot belong to this request; empty if it can.
 
     The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends. A crash
     is nobody's response; robustness/no-server-error judges it. Neither is that of an overloaded device.
@@ -110,7 +110,7 @@ def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
 
 
 def _shape_of(call: Call, media_type: str, alone: Response, *, entries: bool) -> Callable[[Response], str]:
-    """Return a test whether a response has the shape of the one received alone and, if asked, its entries."""
+    """Return a test whether a response has the shape of a single client's response and, on request, its entries."""
     schema, names = call.operation.shape or {}, _names_in(alone)
     listed = _entries(media_type, alone, schema) if entries else None
 
@@ -122,13 +122,14 @@ def _shape_of(call: Call, media_type: str, alone: Response, *, entries: bool) ->
         try:
             problem = shape_of(schema).problem(read(media_type, answer.body, schema))
         except PatternError:
-            problem = ""  # other checks tell that the schema cannot be judged
+            problem = ""  # another requirement says that the schema cannot be used
         except UnreadableError as error:
             return str(error)
         if problem:
             return f"a body in which {problem}"
         found = _names_in(answer)
-        # Optional members come and go.
+        # Fewer than half of the members: the response belongs to another schema. Single optional members may be
+        # missing.
         if found and 2 * len(names & found) < len(names):
             return f"an object without {min(names - found)}"
         other = _entries(media_type, answer, schema) if listed is not None else None
@@ -147,7 +148,7 @@ def _entries(media_type: str, answer: Response, schema: Schema) -> list[str] | N
 
 
 def _names_in(answer: Response) -> frozenset[str]:
-    """Return the names in a JSON object, or in the first of a list: two lists may fit one schema, as it is open."""
+    """Return the names in a JSON object or in a list's first item: one open schema may fit two different lists."""
     value = read_json(answer.body).value if is_json(answer.media_type) else None
     first = value[0] if isinstance(value, list) and value else value
     return frozenset(first) if isinstance(first, dict) else frozenset()

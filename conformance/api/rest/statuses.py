@@ -1,4 +1,4 @@
-"""Whether a request was refused, accepted or cut off, by the status of its response, and what it would have needed."""
+"""Decide by a response's status whether a request was refused, accepted or cut off, and what it would have needed."""
 
 import re
 from collections.abc import Callable, Collection
@@ -13,26 +13,27 @@ from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
 from conformance.transport.exchange import BUSY, Attempt, Exchange, NoAnswer, Unanswered
 
-#: Statuses by which a server says that it, or one behind it, failed; 503 means not now, 501 never.
+#: Statuses which say that the server, or one behind it, failed. 503 only says "not now", and 501 "never".
 CRASHES = frozenset({500, 502, 504})
 #: Statuses that HTTP lets any server or gateway send, so that no description need have them: conditions, ranges, rates,
 #: sizes, upgrades.
 ANY_TIME: Final = frozenset({100, 101, 206, 304, 401, 407, 408, 411, 412, 413, 414, 416, 417, 421, 425, 426, 429, 431})
-#: Statuses of a device whose state keeps it from acting, whatever the request contains: a conflict, a condition, a
-#: lock, a rate, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
+#: Statuses which say that the device's state forbids the operation, whatever the request contains: conflict, condition,
+#: lock, rate limit, no room (RFC 9110 15.5.10, 15.5.13; RFC 4918 11.3, 11.5; RFC 6585 3, 4).
 HELD: Final = frozenset({409, 412, 423, 428, 429, 503, 507})
-# Digits, and the letters of times and request ids around them: they differ between two responses to one request.
+# Digits, with the hexadecimal letters around them: times and request ids, which differ between responses to the same
+# request.
 _VARYING: Final = re.compile(r"[0-9a-fA-F]*\d[0-9a-fA-F]*")
-# Operations that one sentence names; the table of operations has all.
+# Operations that one sentence names; the table of operations names all.
 _NAMED = 4
-# Tries of a request whose usual status is wanted: a server error may be a rare one.
+# How often a request is sent to learn its usual status, because a server error may be rare.
 _TRIES = 3
-#: Statuses that refuse a request because of its sender, or because another client holds the thing (RFC 9110 15.5, RFC
-#: 4918 11.3, RFC 6585 3).
+#: Statuses that refuse a request because of its sender, or because another client holds a lock (RFC 9110 15.5, RFC 4918
+#: 11.3, RFC 6585 3).
 REFUSALS: Final = frozenset({401, 403, 407, 423, 428})
-# Statuses that refuse a request for another reason than its content.
+# Statuses that refuse a request for a reason outside its content.
 _NO_REFUSALS = frozenset({401, 405, 406, 408, 429})
-# What an operation needs that was never answered 2xx, in words.
+# What an operation needs for its first 2xx response, in words.
 _VALUES: Final = "values that the device knows"
 _CREDENTIALS: Final = "credentials that may do this"
 _OF_STATUS: Final = {
@@ -117,7 +118,7 @@ def need_of(operation: Operation, status: int) -> tuple[str, list[str]]:
     need = _OF_STATUS.get(status, "")
     in_path = [item.name for item in operation.parameter("path")]
     if need != _VALUES:
-        # Another thing of the same kind may be in the right state.
+        # Another thing of the same kind may be in a state that allows the operation.
         return need, in_path if status in HELD else []
     files = [name for name in operation.bodies if keeps_octets(name)]
     if files and len(files) == len(operation.bodies) and status not in {404, 410}:
@@ -137,7 +138,7 @@ def _members(schema: Schema) -> list[str]:
 
 
 def differ(one: Exchange, other: Exchange) -> bool:
-    """Return whether two responses differ in more than what they repeat of their requests, and in numbers."""
+    """Return whether two responses differ in more than numbers and values repeated from their requests."""
     return _without_request(one) != _without_request(other)
 
 

@@ -12,7 +12,7 @@ from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.parallel import until_taken
 
-# Statuses for a client that sent too many wrong credentials (RFC 6585 4, RFC 4918 11.3).
+# Statuses by which a device locks out a client that sent too many wrong credentials (RFC 6585 4, RFC 4918 11.3).
 _SHUT_OUT: Final = frozenset({423, 429})
 
 

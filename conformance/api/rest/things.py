@@ -17,24 +17,24 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 
-# Ends of path parameters whose value a member of another name may hold, such as ``id`` for ``item_pk``.
+# Ends of path parameters whose value may be a member of another name: ``item_pk`` is the item's ``id``.
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
-# Names of members that a device sets itself, or hides. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
-# are words of their own.
+# Members that a device sets itself or does not return. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
+# are other words.
 _OWN: Final = re.compile(
     r"(?:id|pk|url|href|status|state|version|revision|etag|created|updated|modified|changed|timestamp|time"
     r"|owner|author|user|password|secret|token|pin|key|[^a-z](?:at|by)|(?:[a-z]ed|[^a-z]?(?:seen|made|built|sent))_?on"
     r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
 )
-# Names and states of things that are deleted and can still be read; names of members that say the opposite.
+# _DELETED: states of things that are deleted and can still be read. _STATES: members that contain a state.
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
-# Members that only one of several things has: setting it for one thing takes it from another.
+# Members that only one of several things can have, such as the default: setting it on one thing clears it on another.
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
-# Formats whose texts mean the same in every case and punctuation.
+# Formats whose values are equal regardless of case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
-# Identifiers that a client may choose for what it creates.
+# Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}

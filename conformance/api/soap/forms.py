@@ -36,7 +36,7 @@ EXTREMES: Final[dict[str, tuple[float, ...]]] = {
 }
 # Texts that a device has to keep as they are: of its usual kind, with what XML escapes, beyond ASCII, beyond the BMP.
 _TEXTS: Final = ("roaas one", "roaas two", "a<b>&\"c'", "Gr\u00f6\u00dfe 5 \u00b5m", "roaas  six", "\U0001f916 ok")
-# Values of other types, by turn.
+# Values of other types, which messages use in rotation.
 _TYPED: Final = {
     "boolean": ("true", "false"),
     "dateTime": ("2031-05-06T07:08:09Z", "2032-10-11T12:13:14Z", "2031-07-08T09:10:11Z"),
@@ -46,8 +46,8 @@ _TYPED: Final = {
     "base64Binary": ("//79/Pv6", "+/+/", "AAEC", "/wD+"),
     "hexBinary": ("0A1B", "FFAC", "FF00AC"),
 }
-# Integers by turn, far from each other first, so that later ones lie between; those of wide types beyond what a double
-# or 32 bits hold.
+# Integers that messages use in rotation, far apart first. _LARGE, for 64-bit types, also has numbers that a double or
+# 32 bits cannot hold.
 _SMALL: Final = (1, 9, 4, 7, 2, 6, 3, 8, 5)
 _LARGE: Final = (1, 2**55, 4, 2**53 + 1, 2**32 + 7, 6, 3, 8, 5)
 # Integers whose lower 32, 16 and 8 bits are other integers, and the longest text that is sent, characters.

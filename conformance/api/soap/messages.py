@@ -12,7 +12,7 @@ from conformance.documents import xsd_shapes as lexical
 from conformance.documents.xml import Node, local
 from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
 
-# Most elements of one kind that a message gets: a schema that demands more cannot be met.
+# Most elements of one kind in a message: a schema that demands more is not supported.
 _MOST: Final = 1000
 
 

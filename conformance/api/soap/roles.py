@@ -18,13 +18,13 @@ from conformance.documents.xml import NotXmlError, elements, local, parse
 from conformance.documents.xsd_shapes import STRINGS, Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-#: Names of values by which a device identifies one of its things.
+#: Ends of element names by which a device identifies its things.
 REFERS: Final = re.compile(r"(?:id|token|handle|index|ref|key|number|name|channel)$", re.IGNORECASE)
 #: Nouns of values that are kept as they are given, and are not measured.
 KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences?$|parameters?$|profile$|limits?$")
 #: Types whose values may refer to something.
 TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
-#: A device may apply a change or a removal this much later, s.
+#: A device may apply a change or a removal this long after its response, s.
 SETTLES_S: Final = 1.0
 # Elements of a message that are nested deeper than this are not compared.
 _DEEPEST: Final = 6
@@ -50,7 +50,7 @@ _VERBS: Final = {
     Role.REMOVES: "delete remove unregister erase",
     Role.ENDS: "cancel abort stop end terminate close",
 }
-#: Roles of operations after which a thing has ended.
+#: Roles of operations that end a thing: they come last.
 LAST: Final = frozenset({Role.ENDS, Role.REMOVES})
 #: Roles of operations that may begin a thing, which the response names.
 MAKERS: Final = frozenset({Role.CREATES, Role.OTHER})
@@ -110,7 +110,7 @@ class Act:
         )
 
     def lists(self, creator: Act) -> bool:
-        """Return whether this operation lists what another one creates, as GetPresets lists the result of AddPreset."""
+        """Return whether this operation lists another's things, as GetPresets lists those of AddPreset."""
         own, made = self.noun.removesuffix("s"), creator.noun.removesuffix("s")
         return self.role is Role.READS and not self.needs and bool(made) and own.startswith(made)
 

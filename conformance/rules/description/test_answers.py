@@ -26,16 +26,16 @@ from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run
 
-# Such responses have no content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
+# Statuses without content (RFC 9110 15.3.5, 15.3.6, 15.4.5).
 _BODILESS = frozenset({204, 205, 304})
 _ON = (survey, held_operations, generated_requests, neighbours, own_things, others)
-# Statuses that HTTP allows as well, unless the request was the operation's usual one.
+# Statuses that any server may send unless the request was the operation's usual one.
 _OF_REQUEST = frozenset({405, 406, 415, 501})
-# Those of these statuses that come from the application, in the media type that it declares for them.
+# Of these statuses, those that the application sends, in the media type that it declares for them.
 _OF_APPLICATION = frozenset({412, 415, 428})
 # Statuses by which a device says that it does not know what a request refers to.
 _NO_SUCH_THING = frozenset({400, 404, 409, 422})
-# Statuses that HTTP knows only as responses to requests with one of these fields (RFC 9110 13, 14).
+# _ASKED_FOR: statuses that only requests with one of the headers _ASKING get (RFC 9110 13, 14).
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404
@@ -74,12 +74,12 @@ def _in_question(probe: Probe, status: int) -> bool:
     if probe.invents and status in _NO_SUCH_THING:
         return False
     if status == _BAD_REQUEST and (probe.kind is Kind.MALFORMED or _is_unreadable(probe)):
-        return False  # any server may say so of content that it cannot read (RFC 9110 15.5.1)
+        return False  # any server may answer 400 to content that it cannot read (RFC 9110 15.5.1)
     return status not in ANY_TIME and (probe.kind in _PLAIN or status not in _OF_REQUEST)
 
 
 def _is_unreadable(probe: Probe) -> bool:
-    """Return whether a request's content is no JSON, or no form, although its Content-Type says so."""
+    """Return whether a request's content is no JSON or form, although its Content-Type says so."""
     request = probe.exchange.request if probe.exchange else None
     if request is not None and request.media_type == "multipart/form-data":
         content_type = next(value for name, value in request.headers if name.lower() == "content-type")
@@ -90,7 +90,7 @@ def _is_unreadable(probe: Probe) -> bool:
 
 
 def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, str], object]) -> Iterator[NotSeen]:
-    """Yield the operations whose success the device's state prevented, if a success declares what is judged."""
+    """Yield operations whose success the device's state prevented, if only a success can be judged."""
     held = [
         operation.label
         for operation in operations_of(run.contract)
@@ -196,7 +196,7 @@ def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema,
 
 
 def _with_fault(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response], str]]:
-    """Yield what `_with_schema` yields, with the fault by the schema, or an empty text."""
+    """Yield each probe with its declared schema and the response's fault, or an empty text."""
     for probe, (schema, answer) in _with_schema(trace, run):
         try:
             yield probe, (schema, answer), _wrong(schema, answer)
@@ -208,7 +208,7 @@ def _usable(schema: Schema) -> bool:
     try:
         shape_of(schema)
     except ValueError:
-        return False  # description/file-valid judges the schema itself
+        return False  # the requirement description/file-valid judges the schema itself
     return True
 
 
@@ -264,7 +264,7 @@ def _wrong_header(schema: Schema, value: str) -> str:
 
 @rule("description/security", on=(anonymous_requests,))
 def security(trace: tuple[Exchange, ...]) -> Iterable[Outcome]:
-    """Judge whether what requires credentials is refused without them, and with wrong ones."""
+    """Judge whether operations that need credentials refuse requests without them, or with wrong ones."""
     for exchange in trace:
         expected = "a refusal, because the description requires credentials"
         yield Case(not exchange.response.ok, exchange, expected, cause="served")

@@ -1,4 +1,4 @@
-"""Authentication: a robot that requires a token says so where the token is missing (RFC 9110 11.6.1)."""
+"""Authentication: a robot that requires a token responds so if it is missing (RFC 9110 11.6.1)."""
 
 from contextlib import closing
 from dataclasses import replace

@@ -161,7 +161,7 @@ def _turns(api: RestInterface, calls: Sequence[Call]) -> list[Call]:
 
 @pytest.mark.requirement(_AVAILABLE)
 def test_availability(api: RestInterface, judge: Judge, series: _Reads) -> None:
-    """Look at the series of reads, and read anew if the robot has lost some: ten times, then once a second."""
+    """Judge the series of reads; if some failed, read again: ten times, then once a second."""
     calls = [call for call in reads(api) if call.send(api).response.status < HTTPStatus.INTERNAL_SERVER_ERROR]
     if not calls:
         judge.note(_AVAILABLE, "no resource could be read")
@@ -202,5 +202,5 @@ def _read(api: RestInterface, calls: Sequence[Call], rate: str, count: int, ever
 
 
 def _wait(seen: _Reads) -> None:
-    """Wait as long as the robot asked for."""
+    """Wait as long as the robot's Retry-After demands."""
     time.sleep(min(_LONGEST_WAIT_S, max((one.response.put_off_s or 0.0 for one in seen.put_off), default=0.0)))

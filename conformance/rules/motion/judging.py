@@ -1,4 +1,4 @@
-"""What the rules of motion share: where a device is, and whether it has reached a target."""
+"""Shared functions of the motion rules: where a device is, and whether it has reached a target."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
 
 
 def tries_of(drives: Sequence[Drive]) -> Iterable[list[Drive]]:
-    """Return all tries of each drive: one that a slow link spoilt is made again, later."""
+    """Return all tries of each drive: a drive that a slow link spoilt is repeated later."""
     found: dict[str, list[Drive]] = {}
     for drive in drives:
         found.setdefault(drive.what, []).append(drive)
@@ -79,7 +79,7 @@ def tries_of(drives: Sequence[Drive]) -> Iterable[list[Drive]]:
 
 
 def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the device drove as drives want it; one that a slow link broke off is made again."""
+    """Judge whether the device drove as commanded; a drive that a slow link broke off is repeated."""
     seen = [reading for drive in drives for reading in (*drive.under_way, *drive.after)]
     for tries in tries_of(drives):
         # What was refused counts each time.
@@ -177,7 +177,7 @@ def stopped(
 
 
 def is_each_late(tries: Sequence[tuple[Command, Sequence[Reading]]]) -> bool:
-    """Return whether a command was tried as often as it is, and each time answered late."""
+    """Return whether a command was tried as often as allowed, and its response was late each time."""
     return len(tries) == moves.TRIES and all(command.was_late(readings) for command, readings in tries)
 
 
@@ -195,7 +195,7 @@ def must_rest_from(command: Command, readings: Sequence[Reading], *, excused: bo
 def went_on(
     command: Command, readings: Sequence[Reading], speeds: dict[str, float], within_s: float, motion: MotionMap
 ) -> str:
-    """Return what shows that a device did not rest in time before a late response; empty if nothing does.
+    """Return evidence that a device did not rest in time before a late response; empty if there is none.
 
     Nobody reads the state before the response to a stop; the next reading shows where the device is then. And a client
     that waits for a response much longer than for the rest cannot know that the device rests.
@@ -241,7 +241,7 @@ def _stopped(leg: Leg, motion: MotionMap, *, excused: bool) -> tuple[tuple[Readi
 
 
 def _fastest_so_far(leg: Leg) -> dict[str, float]:
-    """Return how fast the device can be under way: no move is more than twice as fast as it is on the average."""
+    """Return how fast the device can be while moving: at most twice its average speed."""
     goal, order = leg.commands[:2]
     seen = [one for one in usable(leg) if goal.answered < one.sent and one.received <= order.sent]
     if not seen:

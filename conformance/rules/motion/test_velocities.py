@@ -1,4 +1,4 @@
-"""Whether a device drives at the velocities that it is given, and stops when it is told or let go (motion map)."""
+"""Whether a device drives at commanded velocities, and stops by command or when commands cease (motion map)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
-    """Return what still moves in some readings; empty if nothing does, None if they do not show it."""
+    """Return the axes that still move in some readings, as text; empty if none, None if it cannot be told."""
     seen = tuple(one for one in readings if one.values or (one.speeds and not motion.state.axes))
     if len(seen) < 2 * SEVERAL:
         return None
@@ -87,7 +87,7 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) -> str:
-    """Return what is as fast as it was commanded, long after the hold time; empty if nothing is.
+    """Return the axes still driven at the commanded velocity long after the hold time; empty if none.
 
     A device that is coming to rest by then is slower: commands and readings are delayed by part of the settle time.
     """
@@ -120,7 +120,7 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 
 def fails(outcomes: Iterable[Outcome]) -> bool:
-    """Return whether one of some outcomes is a failure."""
+    """Return whether any outcome is a failure."""
     return any(isinstance(one, Case) and not one.holds for one in outcomes)
 
 

@@ -1,4 +1,4 @@
-"""Rules on what a gateway reports missing, what it discovers, and how it lists the graph."""
+"""Rules on absent messages, on discovery, and on lists of the graph."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
 
 @rule("ros-gateway/stale", on=(publishers_end,))
 def stale(trace: Publishers) -> Iterator[Outcome]:
-    """Judge whether an operation says that its last message is too old."""
+    """Judge whether an operation reports that its last message is too old."""
     if not trace.absences:
         yield NotClaimed("the map says of no topic how old a message may be: `max_age_s`")
     for one in trace.absences:
@@ -92,7 +92,7 @@ def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
 
 @rule("ros-gateway/lists", on=(graph_lists,))
 def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
-    """Judge whether lists have what is on the graph, with its type, and nothing that is not."""
+    """Judge whether lists have exactly the names on the graph, with their types."""
     for one in trace:
         wanted = f"{one.name} ({one.kind})" if one.there else f"no {one.name}"
         when = "it came to" if one.there else "it left"

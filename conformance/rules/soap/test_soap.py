@@ -156,7 +156,7 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
 
 @rule("soap/fault", on=_ON)
 def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
-    """Judge whether a fault has what its SOAP version demands, and what the WSDL declares for its detail."""
+    """Judge whether a fault meets its SOAP version, and its detail the WSDL."""
     types = None if (found := services_of(run.contract)) is None else found.types
 
     def wrong(probe: SoapProbe) -> str | None:
@@ -220,7 +220,7 @@ def _wrong_fault_12(found: etree._Element) -> str:
 
 @rule("soap/fault-status", on=_ON)
 def fault_status(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a fault of SOAP 1.1 has status 500 (SOAP 1.1, 6.2), and one of SOAP 1.2 has 400 or 500."""
+    """Judge a fault's status: 500 in SOAP 1.1 (6.2), 400 or 500 in SOAP 1.2."""
 
     def wrong(probe: SoapProbe) -> str | None:
         if probe.fault is None or probe.exchange is None:
@@ -288,7 +288,7 @@ malformed_refused, invalid_refused, version_mismatch, must_understand, doctype_r
 
 @rule("soap/no-bare-error", on=_ON)
 def no_bare_error(trace: Trace) -> Iterator[Outcome]:
-    """Judge whether a server error comes as a fault: a bare 500 says that the service itself failed."""
+    """Judge whether server errors come as faults: a bare 500 means that the service itself failed."""
 
     def wrong(probe: SoapProbe) -> str | None:
         status = probe.exchange.response.status if probe.exchange else 0
@@ -301,7 +301,7 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
 
 @rule("soap/recovers", on=_ON)
 def recovers(trace: Trace, run: Run) -> Iterator[Outcome]:
-    """Judge whether a valid message is answered after wrong ones as it was before them."""
+    """Judge whether a valid message still gets its usual response after wrong ones."""
     before = {one.operation: one.succeeded for one in trace if one.kind is Kind.USUAL}
 
     def wrong(probe: SoapProbe) -> str | None:

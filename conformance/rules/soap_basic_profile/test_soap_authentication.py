@@ -1,4 +1,4 @@
-"""Messages without valid credentials are refused; and what provokes the responses that checkers of SOAP judge."""
+"""Send messages without valid credentials, which must be refused, and messages for the SOAP checkers."""
 
 from contextlib import closing
 from dataclasses import replace

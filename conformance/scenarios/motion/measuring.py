@@ -10,13 +10,13 @@ from conformance.measures.samples import LATE, SEVERAL, slope, usual_s
 from conformance.scenarios.motion.trace import Reading, Resting, middle_of
 from conformance.statement.motion_map import MotionMap
 
-# A reading is late if it takes longer than usual, and more than this share of the drive.
+# A reading is late if it takes longer than usual, and longer than this share of the drive.
 _SHARE: Final = 0.1
-# Shortest time over which a velocity is measured, s.
+# Shortest time in which a velocity is computed from positions, s.
 _LAPSE_S: Final = 0.1
 # Share of a velocity at which a device stands.
 _STANDS: Final = 0.1
-#: A velocity is steady if each half of this time shows it, s; one that the device only passes through is not.
+#: A velocity is steady if each half of this time shows it, s; a device may also pass through a velocity.
 STEADY_S: Final = 0.36
 
 
@@ -26,7 +26,7 @@ def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float
     if speed is None or not speed.of:
         speeds = [one.speeds[name] for one in readings if one.speeds]
         return median(speeds) if len(speeds) >= SEVERAL else None
-    # When a position was read of which the response came late, nobody knows.
+    # If a response came late, the time of its position is not known.
     late_s = max(LATE * usual_s(readings), _SHARE * (readings[-1].sent - readings[0].sent)) if readings else 0.0
     seen = [
         ((one.sent + one.received) / 2, one.values[speed.of])

@@ -18,16 +18,15 @@ from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import MotionMap
 
-# Responses between the last look at the device that lets a drive go on and the moment when its end arrives: of that
-# reading, of a command, of the next reading, and of the end.
+# Responses from the last reading to the end of a drive: of that reading, a command, the next reading, and the stop.
 _BLIND: Final = 3
 # Time between two readings that shows how fast a device is, s.
 _APART_S: Final = 0.3
-# A drive is planned for a device that is so much faster than declared or seen: the fastest is seen under way only.
+# Plan a drive for a device this much faster than declared or seen, because its greatest speed shows only under way.
 _FASTER: Final = 1.25
-# Share of an axis's tolerance by which two readings at rest may differ, beside their noise.
+# Share of an axis's tolerance by which two readings at rest may differ, beyond their noise.
 _UNSURE: Final = 0.2
-#: A velocity is not lowered to less than this many times the tolerance of its measurement.
+#: A velocity is not lowered below this many times the tolerance of its measurement.
 MEASURABLE: Final = 2.0
 
 Span = tuple[float, float]
@@ -59,7 +58,7 @@ class Room:
         self.unknown = {name for name, speed in speeds.items() if not speed.of and self._axes}
         self._declared = {name for name, speed in speeds.items() if speed.of}
         self._turns = any(axis.angle for axis in motion.state.axes.values())
-        # The same while nothing but this velocity was commanded: a device that did not turn drives the same way.
+        # The same while only this velocity was commanded: a device that did not turn drives in the same direction.
         self._heading: dict[str, dict[str, Span]] = {}
         self._driven = set[str]()
         self._so_far: list[Reading] = []
@@ -75,13 +74,13 @@ class Room:
             NotPossibleError: the limits leave no room for a velocity that can be measured.
         """
         share, ways = 1.0, dict[str, Span]()
-        # A move to where the drive begins may turn the device.
+        # A move to the start of a drive may turn the device.
         turned = self._motion.goto is not None
         for name, axis in self._axes.items():
             down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s), turned=turned)
             if down + up > 0:
                 ways[name] = down, up
-                # A device is brought to where the drive begins within its tolerance.
+                # The start of a drive is reached within the tolerance only.
                 free = axis.limits[1] - axis.limits[0] - 2 * self._motion.tolerance(name)
                 share = min(share, max(0.0, free) / (down + up))
         for name, speed in ((name, speed) for one in choices for name, speed in one.items() if speed):
@@ -117,7 +116,7 @@ class Room:
         return 0.0 if share < 1 and slow else share
 
     def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
-        """Learn from a drive how fast one velocity changes each axis; several velocities cannot be told apart."""
+        """Learn from a drive how fast one velocity changes each axis; drives with several velocities do not tell."""
         driven = [(name, speed) for name, speed in speeds.items() if speed]
         if len(driven) != 1:
             return
@@ -185,7 +184,7 @@ class Room:
             return self._heading[name]
         if not self._turns or name in self._declared:
             return self._rates[name]
-        # Wherever the device looks by then, it goes no faster.
+        # Whatever its heading is by then, the device moves no faster than this.
         most = math.hypot(*(max(map(abs, span)) for span in self._rates[name].values()))
         return dict.fromkeys(self._axes, (-most, most))
 

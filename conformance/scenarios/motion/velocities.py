@@ -35,28 +35,28 @@ POLLING: Final = "and the client only goes on reading the state"
 WAYS: Final = (SILENT, CLOSED, HALF_OPEN, POLLING)
 # How long a device without a declared hold time is watched, s; no verdict follows.
 _UNDECLARED_S: Final = 2.0
-# How long an unsteady velocity is measured once it must be reached, s.
+# How long a velocity that still varies is measured once it must be reached, s.
 MEASURED_S: Final = 0.5
-# A slow velocity and the slowest, as shares of the limit.
+# _SLOW: slow velocity, as a share of the limit. _SLOWEST: the slowest.
 _SLOW: Final = 0.4
 _SLOWEST: Final = 0.1
-# Multiple of its tolerance that a velocity needs to differ from rest.
+# A velocity differs from rest by this multiple of its tolerance.
 _TOLD: Final = 1.5
-# Velocities that follow each other before the device is stopped; at quick effort all do.
+# Successive velocities before the device is stopped; at quick effort, all of them.
 _PAIR: Final = 2
-# A slow drive lasts longer than the hold time, up to this, so that a renewed command is seen to last, s.
+# A slow drive exceeds the hold time, up to this, so that renewing shows, s.
 _LONGEST_HOLD_S: Final = 2.0
-# After these parts of the hold time commands that must be refused follow the last one: after the first the device is
-# seen to drive on, and the second renews nothing.
+# Parts of the hold time after which commands are sent that must be refused: after the first the device must still
+# drive; the second must renew nothing.
 _REFUSED_AT: Final = (0.1, 0.9)
-# Renewals of a velocity within its hold time, and longest time between two, s.
+# _KEPT: renewals of a velocity within its hold time. _KEPT_S: longest time between two, s.
 _KEPT: Final = 3
 _KEPT_S: Final = 0.1
-# Rather than that it is moved for room, a device that is let go may begin this part of the velocity slower.
+# To save room, a device that is not stopped may begin at this share of the velocity.
 _SLOWER: Final = 0.7
 # How long a device is watched after the time to rest, s.
 _REST_S: Final = 0.5
-# How long a device that still moves a little is watched, s: one that creeps goes on.
+# How long a device that still moves a little is watched, s: a creeping one goes on.
 _SLOWS_S: Final = 2.0
 # Most further readings of it.
 _MORE: Final = 50
@@ -84,12 +84,12 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
 
 
 def _by(way: Way, speeds: Position) -> _By:
-    """Return the ways of commanding velocities, ordered so that the last one commands at least a part of them."""
+    """Return the ways to command velocities; the last one commands at least one of these."""
     return (way,) if {name for name, speed in speeds.items() if speed} <= way.axes else (None, way)
 
 
 def _in_turn(mapped: MappedDevice, speeds: Position, number: int) -> _By:
-    """Return one of the ways in which velocities can be commanded."""
+    """Return the way to command velocities whose turn it is."""
     ways = [way for way in mapped.drives.ways if way.axes & speeds.keys()]
     return ((), *(_by(way, speeds) for way in ways))[number % (1 + len(ways))]
 
@@ -127,7 +127,7 @@ def _at_once(mapped: MappedDevice) -> Iterator[Position]:
 
 
 def _slowest(mapped: MappedDevice, name: str, limit: float) -> Position:
-    """Return a velocity that is just fast enough to be told from rest."""
+    """Return the lowest velocity that can be distinguished from rest."""
     least = _TOLD * mapped.motion.speed_tolerance(name)
     return {name: math.copysign(min(max(_SLOWEST * abs(limit), least), _SLOW * abs(limit)), limit)}
 
@@ -139,7 +139,7 @@ def _named(speeds: Position, by: _By = ()) -> str:
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
-    """Command velocities beyond the limits, where the map says that the device drives as fast as it can."""
+    """Command velocities beyond the limits, if the map declares that the device clamps them."""
     if mapped.drives.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that velocities beyond the limits are clamped")
     parts = [
@@ -177,7 +177,7 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
     number = chance.randrange(1 + len(mapped.drives.ways))
     left = [(one, _in_turn(mapped, one, number + made) if quick else ()) for made, one in enumerate([*limits, *others])]
     for made, (speeds, by) in enumerate([*left, *(() if quick else _by_each_way(mapped))]):
-        # An odd number of commands and an even one; and with readings and without.
+        # Odd and even numbers of commands, with and without readings.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
         gone = SILENT if silent else POLLING
         part = Part(f"{_named(speeds, by)}, {gone}", speeds, by=by)
@@ -199,7 +199,7 @@ def vanishing(mapped: MappedDevice) -> tuple[Drive, ...]:
 def _vanished(mapped: MappedDevice, way: str) -> Iterator[Drive]:
     name, axis = next(iter(mapped.drives.axes.items()))
     limit = next(_there_and_back(mapped, axis.limits, axis.of))
-    # So slow that a device that goes on stays near.
+    # So slow that a device that does not stop stays near.
     least = min(_TOLD * mapped.motion.speed_tolerance(name), abs(limit))
     speeds = {name: math.copysign(max(_SLOW * abs(limit), least), limit)}
     hold_s = mapped.drives.hold_s if mapped.drives.hold_s is not None else _UNDECLARED_S
@@ -207,7 +207,7 @@ def _vanished(mapped: MappedDevice, way: str) -> Iterator[Drive]:
 
 
 def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
-    """Yield commands that the device must refuse, each as a noun phrase and as what sends it."""
+    """Yield commands that the device must refuse, each as a noun phrase and a function that sends it."""
     name, axis = next(iter(mapped.drives.axes.items()))
     if mapped.drives.beyond_limits == "refused":
         for _, _, value in beyond({name: axis}):
@@ -251,7 +251,7 @@ class Part:
 
 
 def _in_a_row(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[Drive]:
-    """Drive at velocities one after the other, and end the last by velocity 0; try again what a slow link spoilt."""
+    """Drive at velocities one after the other, and end by velocity 0; repeat drives that a slow link spoilt."""
     left = list(parts)
     for _ in range(TRIES):
         again: list[Part] = []
@@ -307,7 +307,7 @@ def _times(mapped: MappedDevice, before: Position, after: Position) -> float:
 def _goes_on(mapped: MappedDevice, before: Drive, speeds: Position, lasts_s: float) -> bool:
     """Return whether the limits leave room for another velocity without a stop before it."""
     room, seen = mapped.room, before.under_way
-    # Over a slow link nobody sees in time where it gets to.
+    # Over a slow link, readings come too late to see where the device is.
     if usual_s(seen) > _KEPT_S:
         return False
     return room.leads_on(before.wanted, seen, mapped.drives.settle_s) and room.leads_on(speeds, seen, lasts_s)
@@ -351,7 +351,7 @@ def left_alone(
         kept, measured_s = (replace(part, by=()), MEASURED_S) if outlasts_s else (part, 0.0)
         drive, whole = _kept_up(mapped, kept, made, settle_s, rests_s, outlasts_s=outlasts_s, measured_s=measured_s)
         if not whole:
-            # The next try begins elsewhere, or is slower: this one has shown how far the device comes.
+            # The next try begins elsewhere, or is slower, because this one has shown how far the device drives.
             mapped.come_to_rest()
             continue
         way = part.by[-1] if part.by else None
@@ -451,7 +451,7 @@ def _kept_up(
     begun = commands[0].answered
     until, since, whole = max(begun + settle_s, begun + outlasts_s) + measured_s, None, True
     while mapped.clock.now() < until and commands[-1].accepted:
-        # Before it has settled, one that turns round still drives at the velocity before.
+        # Before the settle time is over, a device that reverses still drives at the earlier velocity.
         settled = before is None or mapped.clock.now() >= begun + settle_s
         mapped.room.note(made, [one for one in readings[-_NOTED:] if before is None or one.sent >= begun + settle_s])
         choices, seen = (
@@ -508,7 +508,7 @@ def _watched(
 
     after += mapped.watch(rests_at + _REST_S, lambda seen: drives_on(seen) or rested(seen) is not None)
     since = rested(after)
-    # Where a reading took long, only those count that come as much later: several of them show whether it rests.
+    # After a slow reading, only readings as much later count: several of them show rest.
     for _ in range(_MORE if since is None else 0):
         counted = [one for one in after if one.sent >= rests_at + longest_s([*drive.readings, *after])]
         if len(counted) >= 2 * SEVERAL or drives_on(after):
@@ -516,7 +516,7 @@ def _watched(
         after.append(mapped.read())
     still = [one for one in after if one.sent >= (rests_at if since is None else since)]
     if creeping(still, mapped.motion, mapped.resting):
-        # It may come to rest yet.
+        # The device may still come to rest.
         after += mapped.watch(after[-1].sent + _SLOWS_S, drives_on)
         since = None
     mapped.saw_rest(after)

@@ -1,4 +1,4 @@
-"""Scenarios on topics: what a gateway returns of the messages on them, and publishes on them.
+"""Scenarios on topics: the messages that a gateway returns from topics, and publishes on them.
 
 Times are s of the monotonic clock, which all processes of a machine share.
 """
@@ -82,7 +82,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Topics:
-    """What was read of topics, and the definitions of their types."""
+    """Reads of topics, and the definitions of their types."""
 
     probes: tuple[Shown, ...]
     definitions: dict[str, Definition]
@@ -112,7 +112,7 @@ class _Reader:
     contents: set[str] = field(default_factory=set)
 
     def shown(self, effort: Effort) -> Iterator[Shown]:
-        """Yield what is shown of each message."""
+        """Publish messages, and yield the gateway's response for each."""
         lost = 0
         samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=effort.name != "quick")
         for sample in samples:
@@ -218,7 +218,7 @@ class Burst:
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
 def topic_writes(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
-    """Send messages of extreme values to the gateway one at a time, and receive what it publishes."""
+    """Send messages with extreme values to the gateway one by one, and receive what it publishes."""
     return tuple(_bursts(gateway, lambda writer: writer.one_by_one(effort)))
 
 
@@ -398,7 +398,7 @@ class _Writer:
             yield from self.malformed_as(what, replace(right, body=body), is_wrong=what in is_wrong)
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
-        """Yield an invalid request with its outcome, apart from what the gateway publishes by itself."""
+        """Yield an invalid request with its outcome, apart from messages that the gateway publishes by itself."""
         for _ in range(2):
             one = replace(self.sent(what, "", made), is_wrong=is_wrong)
             heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)

@@ -100,7 +100,7 @@ def document_of(octets: bytes) -> Document:
 
 
 def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
-    """Return the document that an operation gets to send a message: as the map says, or as JSON has it."""
+    """Return the request document for sending a message, in the map's form or plain JSON."""
     message = _web(value, Shape(definition.root), definition, ros)
     if body.fields:
         mapped: Any = {}
@@ -171,7 +171,7 @@ class _Comparison:
     is_xml: bool
 
     def compared(self, web: Any, own: Any, shape: Shape, at: str) -> Iterator[Difference]:
-        """Yield the differences of a value and what it holds."""
+        """Yield the differences in a value and its parts."""
         if shape.is_octets:
             if not self._are_octets(web, base64.b64decode(own["b64"])):
                 yield self._difference(at, shape, web, own["b64"])
