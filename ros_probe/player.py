@@ -163,12 +163,14 @@ class Player:
         if messages and repeat_s:
             self._timers[topic] = self._node.create_timer(repeat_s, partial(publisher.publish, messages[-1]))
         there = self._node.get_subscriptions_info_by_topic(topic)
-        best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in there)
+        best_effort = any(item.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for item in there)
         return {"sent": sent, "subscribers": publisher.get_subscription_count(), "best_effort": best_effort}
 
     def _listen(self, topic: str, type: str) -> dict[str, Any]:  # noqa: A002 - as above
         publishers = self._node.get_publishers_info_by_topic(topic)
-        best_effort = any(one.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for one in publishers)
+        best_effort = any(
+            publisher.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for publisher in publishers
+        )
         reliability = ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE
 
         def came(message: Any) -> None:
@@ -233,14 +235,14 @@ class Player:
     def _forget(self, name: str) -> dict[str, Any]:
         self._stop_repeating(name)
         found = [self._entities.pop(key) for key in (name, f"publish {name}") if key in self._entities]
-        for one in found:
+        for item in found:
             # In rclpy, each entity has its own way out; an action server is one of several entities.
-            if isinstance(one, ActionServer):
-                one.destroy()
+            if isinstance(item, ActionServer):
+                item.destroy()
             else:
                 destroy = {"Publisher": "destroy_publisher", "Subscription": "destroy_subscription"}
-                node = self._servant if one.__class__.__name__ == "Service" else self._node
-                getattr(node, destroy.get(one.__class__.__name__, "destroy_service"))(one)
+                node = self._servant if item.__class__.__name__ == "Service" else self._node
+                getattr(node, destroy.get(item.__class__.__name__, "destroy_service"))(item)
         return {"forgotten": len(found)}
 
     def _graph(self) -> dict[str, Any]:

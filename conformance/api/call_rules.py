@@ -96,7 +96,7 @@ class CallRules:
     def unused(self, operations: Sequence[Operation]) -> list[str]:
         """Return the patterns that match no operation."""
         patterns = (*self.allow, *self.never)
-        return [one for one in patterns if not any(matches(one, operation) for operation in operations)]
+        return [pattern for pattern in patterns if not any(matches(pattern, operation) for operation in operations)]
 
 
 def matches(pattern: str, operation: Operation) -> bool:

@@ -84,7 +84,11 @@ class Changes:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
+        reads = {
+            operation.template.rstrip("/"): operation
+            for operation in operations
+            if operation.method == "GET" and operation.shape
+        }
         self._states = {
             template: name for template, one in reads.items() if collection_of(template) and (name := state_of(one))
         }
@@ -95,10 +99,16 @@ class Changes:
             if (said := _final(reads[template], name, operations))
         }
         # By operation: states that only one thing at a time may be in. Below: accepted operations since the last read.
-        self._alone = {one.label: found for one in operations if "409" in one.responses and (found := _alone(one))}
+        self._alone = {
+            operation.label: found
+            for operation in operations
+            if "409" in operation.responses and (found := _alone(operation))
+        }
         self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
         # By path template: members that never decrease. Below, by path: their last values.
-        self._growing = {one.template.rstrip("/"): names for one in reads.values() if (names := _growing(one))}
+        self._growing = {
+            operation.template.rstrip("/"): names for operation in reads.values() if (names := _growing(operation))
+        }
         self._grown: dict[str, tuple[dict[str, Any], float]] = {}
         # By path: the thing as it was last read, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
@@ -142,7 +152,7 @@ class Changes:
             yield from self._told(occasion, operation, above, self._states[item])
         elif operation is not None and occasion.response.ok and template in self._states:
             self._known.pop(path, None)
-        elif operation is None or f"{template}/" not in {f"{collection_of(one)}/" for one in self._states}:
+        elif operation is None or f"{template}/" not in {f"{collection_of(state)}/" for state in self._states}:
             self._known.clear()
 
     def _told(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
@@ -243,7 +253,7 @@ class Changes:
 def state_of(read: Operation) -> str:
     """Return the member that contains a thing's state, if some of its values are final; empty if there is none."""
     outer = flat(read.shape or {}).get("properties", {})
-    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
     parts = ((name, flat(one)) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict))
     named = (
         str(name) for name, one in parts if plain_name(name) in _STATES and FINAL & set(map(str, one.get("enum", ())))
@@ -274,10 +284,14 @@ def _growing(read: Operation) -> frozenset[str]:
 def _final(read: Operation, name: str, operations: Iterable[Operation]) -> frozenset[str]:
     """Return the states of a thing that its operations call final, as in "done and failed are final"."""
     given = flat(flat(read.shape or {}).get("properties", {}).get(name, {}))
-    own = [one.text for one in operations if f"{one.template}/".startswith(f"{read.template.rstrip('/')}/")]
+    own = [
+        operation.text
+        for operation in operations
+        if f"{operation.template}/".startswith(f"{read.template.rstrip('/')}/")
+    ]
     said = [found[1] for text in own for found in _IS_FINAL.finditer(text) if not _UNLESS.search(found[1])]
     words = {word for text in said for word in re.findall(r"[\w-]+", text.casefold())}
-    return frozenset(str(one) for one in given.get("enum", ()) if str(one).casefold() in words)
+    return frozenset(str(item) for item in given.get("enum", ()) if str(item).casefold() in words)
 
 
 def _state_in(occasion: Occasion, name: str) -> str:

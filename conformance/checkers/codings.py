@@ -86,7 +86,7 @@ def _allowed(occasion: Occasion) -> Iterator[Case]:
     coding, weights = occasion.response.content.coding, _weights(asked)
     if asked and weights is not None:
         expected = f"no coding but one that Accept-Encoding: {asked} allows"
-        holds = not coding or all(_is_allowed(one.strip(), weights) for one in coding.split(","))
+        holds = not coding or all(_is_allowed(text.strip(), weights) for text in coding.split(","))
         cause = f"{label_of(occasion.operation)} allowed"
         yield occasion.case(_ALLOWED, holds, expected, f"Content-Encoding: {coding}", cause=cause)
 
@@ -100,7 +100,7 @@ def _beside(occasion: Occasion, bare: Response) -> Iterator[Case]:
         is_other = tag != bare.header("etag")
         yield occasion.case(_ALLOWED, is_other, expected, f"ETag: {tag}", cause=f"{label} tag")
     if not _NOT_SHARED.search(answer.header("cache-control") or ""):
-        named = {one.strip().lower() for one in vary.split(",")}
+        named = {text.strip().lower() for text in vary.split(",")}
         expected, found = "Vary with Accept-Encoding", f"Vary: {vary}" if vary else "no header field Vary"
         yield occasion.case(_ALLOWED, bool(named & {"accept-encoding", "*"}), expected, found, cause=f"{label} Vary")
 
@@ -108,9 +108,9 @@ def _beside(occasion: Occasion, bare: Response) -> Iterator[Case]:
 def _weights(text: str) -> dict[str, float] | None:
     """Return the weights in an Accept-Encoding by coding in lower case; None if it is malformed."""
     found = [_ELEMENT.fullmatch(one) for one in text.split(",") if one.strip()]
-    if any(one is None for one in found):
+    if any(match is None for match in found):
         return None
-    return {one[1].lower(): float(one[2] or 1) for one in found if one is not None}
+    return {match[1].lower(): float(match[2] or 1) for match in found if match is not None}
 
 
 def _is_allowed(coding: str, weights: dict[str, float]) -> bool:

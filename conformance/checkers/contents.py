@@ -149,7 +149,7 @@ def _may_be(body: bytes, read: Occasion, sent: Occasion) -> bool:
     as such files do, is not only the first part of what was sent, and has nothing of its pixels and samples as they
     were.
     """
-    if any(_KEEPS.search(one.operation.text) for one in (read, sent) if one.operation is not None):
+    if any(_KEEPS.search(occasion.operation.text) for occasion in (read, sent) if occasion.operation is not None):
         return False
     octets, kind = sent.request.body, sent.request.media_type
     if kind == _TEXT:

@@ -182,7 +182,7 @@ def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:
     given = flat(schema)
     if isinstance(value, list):
         inner = given.get("items")
-        found = [_shown_of(inner, one, depth + 1) for one in value[:_ITEMS]] if isinstance(inner, dict) else []
+        found = [_shown_of(inner, item, depth + 1) for item in value[:_ITEMS]] if isinstance(inner, dict) else []
     elif isinstance(value, dict) and depth < _DEEPEST:
         found = []
         for name, part in given.get("properties", {}).items():
@@ -196,7 +196,7 @@ def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:
                 found.append(_shown_of(part, value[name], depth + 1))
     else:
         return None
-    told = [one for one in found if one is not None]
+    told = [text for text in found if text is not None]
     return max(told) if told else None
 
 

@@ -131,7 +131,7 @@ class EntityTags:
     def _cached(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
         """Judge a read by a client that has a copy: if it is current, it gets 304."""
         answer, label = occasion.response, label_of(occasion.operation)
-        tags = {one.removeprefix("W/") for one in _TAG.findall(asked["if-none-match"])}
+        tags = {item.removeprefix("W/") for item in _TAG.findall(asked["if-none-match"])}
         # `If-None-Match: *` matches any content; no client has a copy with that tag, so 200 is no finding.
         is_any = asked["if-none-match"].strip() == "*"
         expected = "status 304, because If-None-Match has the current entity tag"
@@ -192,7 +192,7 @@ class EntityTags:
         tag = now.header("etag") or ""
         named = _TAG.findall(wanted)
         # If-Match compares strongly, but a device with only weak tags may accept its own.
-        weakly = tag.startswith("W/") and tag[2:] in {one.removeprefix("W/") for one in named}
+        weakly = tag.startswith("W/") and tag[2:] in {item.removeprefix("W/") for item in named}
         matches = tag in named or weakly or is_any
         if is_refused:
             if answer.status == HTTPStatus.PRECONDITION_FAILED and not matches:
@@ -255,8 +255,10 @@ def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
 
 def _has_changed(occasion: Occasion, before: Response) -> bool:
     """Return whether the response to a write contains a sent value that was another one before."""
-    sent, old, new = (read_json(one).value for one in (occasion.request.body, before.body, occasion.response.body))
-    if not occasion.response.ok or not all(isinstance(one, dict) for one in (sent, old, new)):
+    sent, old, new = (
+        read_json(octets).value for octets in (occasion.request.body, before.body, occasion.response.body)
+    )
+    if not occasion.response.ok or not all(isinstance(item, dict) for item in (sent, old, new)):
         return False
     return any(name in old and old[name] != value == new.get(name) for name, value in sent.items())
 
@@ -281,8 +283,10 @@ def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
     if occasion.request.method == "DELETE":
         acted = "nothing there any more" if after.status in _GONE else ""
     elif after.ok:
-        sent, old, new = (read_json(one).value for one in (occasion.request.body, waiting.before.body, after.body))
-        if all(isinstance(one, dict) for one in (sent, old, new)):
+        sent, old, new = (
+            read_json(octets).value for octets in (occasion.request.body, waiting.before.body, after.body)
+        )
+        if all(isinstance(item, dict) for item in (sent, old, new)):
             changed = [name for name, value in sent.items() if name in old and old[name] != value]
             if changed and all(new.get(name) == sent[name] for name in changed):
                 acted = f"{changed[0]} as it was sent, {shown(sent[changed[0]])}"

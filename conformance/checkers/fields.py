@@ -82,7 +82,7 @@ def formats(occasion: Occasion) -> Iterator[Case]:
 def last_modified(occasion: Occasion) -> Iterator[Case]:
     """Judge that Last-Modified is not later than the response's Date (RFC 9110 8.8.2.1)."""
     said, now = (occasion.response.header(name) or "" for name in ("last-modified", "date"))
-    if all(_IMF_FIXDATE.fullmatch(one.strip()) and _is_date(one) for one in (said, now)):
+    if all(_IMF_FIXDATE.fullmatch(text.strip()) and _is_date(text) for text in (said, now)):
         late = parsedate_to_datetime(said) - parsedate_to_datetime(now)
         expected, holds = f"Last-Modified no later than Date: {now}", late.total_seconds() <= _SKEW_S
         yield occasion.case("http/last-modified", holds, expected, f"Last-Modified: {said}", cause="late")

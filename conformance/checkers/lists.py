@@ -71,8 +71,8 @@ class Lists:
         self._learn(listing, page)
 
     def _learn(self, listing: Listing, page: Page) -> None:
-        names = {*listing.filters, *(one.member for one in listing.sortings.values())}
-        names |= {one.member for one in listing.bounds}
+        names = {*listing.filters, *(sorting.member for sorting in listing.sortings.values())}
+        names |= {bound.member for bound in listing.bounds}
         if len(self._seen) < _REMEMBERED:
             for identity, item in zip(page.identities, page.items, strict=True):
                 own = members_of(item)
@@ -94,7 +94,7 @@ class Lists:
         if listing.limit is None:
             return
         cause = listing.operation.label
-        key = cause, frozenset(one for one in sent.items() if one[0] != listing.limit.name)
+        key = cause, frozenset(pair for pair in sent.items() if pair[0] != listing.limit.name)
         longest, self._longest[key] = self._longest[key], max(self._longest[key], count)
         if most <= 0:
             return
@@ -108,7 +108,8 @@ class Lists:
         is_cut = page.goes_on or max([longest, *page.totals.values()]) > count
         total, short = max(page.totals.values(), default=0), self._short.get(key)
         is_first = not any(
-            one is not None and one.name in sent for one in (listing.offset, listing.page, listing.cursor)
+            parameter is not None and parameter.name in sent
+            for parameter in (listing.offset, listing.page, listing.cursor)
         )
         if not is_sent and is_first and count < most and total > count:
             expected = f"{min(most, total)} of {total} items, by the default of {listing.limit.name}"
@@ -153,7 +154,7 @@ class Lists:
                 steps = [count for _, count in sorted(counts.items(), reverse=bound.is_least)]
                 is_sure |= steps == sorted(steps) and len(set(steps)) > 1
             if is_sure and values:
-                wrong = [one for one in values if bound.excludes(text, one)]
+                wrong = [value for value in values if bound.excludes(text, value)]
                 side = "at least" if bound.is_least else "at most"
                 expected = f"items with {bound.member} {side} {text}, which the parameter {name} asks for"
                 found = f"an item with {text_of(wrong[0])}" if wrong else ""
@@ -164,7 +165,7 @@ class Lists:
         """Return an item's value that the filter excludes; empty if there is none; None if unknown."""
         parameter, member = listing.filters[name], flat(listing.members[name])
         choices = _choices(parameter)
-        others = [text for one in values for text in [_text(one)] if not _holds(one, asked)]
+        others = [text for value in values for text in [_text(value)] if not _holds(value, asked)]
         if kinds_of(parameter.schema) == {"boolean"}:
             default = flat(parameter.schema).get("default")
             includes = name in _INCLUDING and asked == ["true"]
@@ -173,7 +174,7 @@ class Lists:
         items = flat(member["items"]) if isinstance(member.get("items"), dict) else member
         if choices and set(asked) <= set(map(text_of, items.get("enum", ()))):
             if name in LEVELS and len(asked) == 1 and "exact" not in parameter.says.lower():
-                ranks = [choices.index(one) - choices.index(asked[0]) for one in others if one in choices]
+                ranks = [choices.index(other) - choices.index(asked[0]) for other in others if other in choices]
                 return others[:1] if min(ranks, default=0) < 0 < max(ranks, default=0) else []
             return others[:1] if values else None
         # A filter for a part of a text can only be judged in pairs: it is broken if the list for A has an item of B,
@@ -182,7 +183,7 @@ class Lists:
         if len(asked) != 1 or not values or len(found) > _ASKED:
             return None
         found[asked[0]].update(others[:_COMPARED])
-        return [one for one in others if asked[0] in found.get(one, ())][:1]
+        return [other for other in others if asked[0] in found.get(other, ())][:1]
 
     def _order(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         sort = listing.sort
@@ -221,9 +222,9 @@ class Lists:
 
 def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # noqa: FBT001 - None: either
     """Return whether items of one kind stand before all others, such as pinned ones or folders, each kind sorted."""
-    items = [members_of(one) for one in page.items[:_COMPARED]]
-    for name in {name for one in items[:1] for name, value in one.items() if isinstance(value, bool | str)}:
-        kinds = [str(one.get(name)) for one in items]
+    items = [members_of(item) for item in page.items[:_COMPARED]]
+    for name in {name for item in items[:1] for name, value in item.items() if isinstance(value, bool | str)}:
+        kinds = [str(item.get(name)) for item in items]
         parts = [[one for one, kind in zip(items, kinds, strict=True) if kind == of] for of in dict.fromkeys(kinds)]
         is_grouped = len(parts) == _KINDS and kinds == sorted(kinds, key=kinds.index)
         pairs = (pair for part in parts if is_grouped for pair in combinations(part, 2))
@@ -237,7 +238,7 @@ def _choices(parameter: Parameter) -> list[str]:
     """Return the declared values of a parameter, or of the items of its list, as texts."""
     schema = flat(parameter.schema)
     schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
-    return [text_of(one) for one in schema.get("enum", ()) if one is not None]
+    return [text_of(item) for item in schema.get("enum", ()) if item is not None]
 
 
 def _text(value: Any) -> str:
@@ -246,9 +247,9 @@ def _text(value: Any) -> str:
 
 def _holds(value: Any, asked: list[str]) -> bool:
     """Return whether a member equals or contains one of the requested values, ignoring case."""
-    wanted = {one.strip().casefold() for one in asked}
+    wanted = {text.strip().casefold() for text in asked}
     own = value if isinstance(value, list) else [value]
-    return any(isinstance(one, dict | list) or text_of(one).casefold() in wanted for one in own)
+    return any(isinstance(item, dict | list) or text_of(item).casefold() in wanted for item in own)
 
 
 # Texts that may be sorted by meaning: numbers with units, durations, addresses, levels, days and months.

@@ -120,20 +120,28 @@ class Memory:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        methods = {(one.method, one.template) for one in operations}
-        reads = [one for one in operations if one.method == "GET" and not one.parameter("query")]
-        self._items = {one.template.rstrip("/"): one for one in reads if collection_of(one.template)}
+        methods = {(operation.method, operation.template) for operation in operations}
+        reads = [
+            operation for operation in operations if operation.method == "GET" and not operation.parameter("query")
+        ]
+        self._items = {
+            operation.template.rstrip("/"): operation for operation in reads if collection_of(operation.template)
+        }
         self._of_collections = {collection_of(template): one for template, one in self._items.items()}
         # Templates of things below another thing that may exist or not.
         self._items |= {
-            one.template: one
-            for one in reads
-            if one.template.rpartition("/")[0] in self._items
-            and {("PUT", one.template), ("DELETE", one.template)} <= methods
+            operation.template: operation
+            for operation in reads
+            if operation.template.rpartition("/")[0] in self._items
+            and {("PUT", operation.template), ("DELETE", operation.template)} <= methods
         }
-        self._actions = {one.template for one in operations if not self._items.keys().isdisjoint(_above(one.template))}
-        self._single = {one.template for one in operations if one.method == "GET"} - {
-            one.template for one in self._items.values()
+        self._actions = {
+            operation.template
+            for operation in operations
+            if not self._items.keys().isdisjoint(_above(operation.template))
+        }
+        self._single = {operation.template for operation in operations if operation.method == "GET"} - {
+            operation.template for operation in self._items.values()
         }
         self._collections = collections_of(operations)
         self._things: dict[str, _Thing] = {}
@@ -224,7 +232,7 @@ class Memory:
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
-            self._things |= {one.casefold(): replace(thing, path=one, own=True) for one in below}
+            self._things |= {text.casefold(): replace(thing, path=text, own=True) for text in below}
         if status == HTTPStatus.CREATED:
             self._made.add(path)
         if not thing.gone and (body := _body_of(occasion, operation)) is not None:
@@ -237,9 +245,11 @@ class Memory:
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
         """Return the things that end together with a thing, by the description of its DELETE."""
-        found = [one.path for one in self._things.values() if _is_below(one.path, path) and not one.gone]
+        found = [thing.path for thing in self._things.values() if _is_below(thing.path, path) and not thing.gone]
         said = ending_with(delete)
-        return [one for one in found if one in self._made and said & set(map(singular, one[len(path) :].split("/")))]
+        return [
+            text for text in found if text in self._made and said & set(map(singular, text[len(path) :].split("/")))
+        ]
 
     def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
@@ -463,8 +473,8 @@ def _sent_of(occasion: Occasion) -> dict[str, Any]:
 
 def ending_with(delete: Operation) -> frozenset[str]:
     """Return the words for things that end with another thing, without clauses on things that stay."""
-    clauses = [one for one in re.split(r"[.;]\s", delete.text) if not _STAYS.search(one)]
-    return frozenset(singular(word) for one in clauses for word in words_of(one))
+    clauses = [item for item in re.split(r"[.;]\s", delete.text) if not _STAYS.search(item)]
+    return frozenset(singular(word) for clause in clauses for word in words_of(clause))
 
 
 def _is_for_ever(item: Operation, create: Operation) -> bool:
@@ -473,7 +483,7 @@ def _is_for_ever(item: Operation, create: Operation) -> bool:
     named = [flat(one) for name, one in parts.items() if plain_name(name) in {plain_name(parameter.name), "id"}]
     given = flat(parameter.schema)
     said = [str(one["description"]) for one in (given, *named) if "description" in one]
-    return given.get("format") == "uuid" or any(_NEVER_AGAIN.search(one) for one in (*said, create.text))
+    return given.get("format") == "uuid" or any(_NEVER_AGAIN.search(text) for text in (*said, create.text))
 
 
 def _above(template: str) -> Iterator[str]:

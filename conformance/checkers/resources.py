@@ -148,9 +148,9 @@ class Resources:
         """Record what a declared operation's response shows about a path, and judge the cases that waited for that."""
         status = occasion.response.status
         if status in _GONE or (occasion.request.method == "DELETE" and occasion.response.ok):
-            gone = [one for one in self._there if one == path or one.startswith(f"{path.rstrip('/')}/")]
+            gone = [text for text in self._there if text == path or text.startswith(f"{path.rstrip('/')}/")]
             self._there.difference_update(gone)
-            self._suspects = [one for one in self._suspects if not f"{one[0]}/".startswith(f"{path.rstrip('/')}/")]
+            self._suspects = [pair for pair in self._suspects if not f"{pair[0]}/".startswith(f"{path.rstrip('/')}/")]
             return
         if not occasion.response.ok and status != HTTPStatus.CONFLICT:
             return
@@ -193,7 +193,7 @@ def _declared_refusal(occasion: Occasion, resource: Resource) -> Iterator[Case]:
     ):
         return
     try:
-        problems = [shape_of(one).problem(read_json(answer.body).value) for one in schemas]
+        problems = [shape_of(schema).problem(read_json(answer.body).value) for schema in schemas]
     except ValueError:
         return  # another requirement says that the schema cannot be used
     fault = "" if "" in problems else f"a body in which {problems[0]}"

@@ -171,8 +171,8 @@ class SoapMemory:
                 yield from self._values(act, attempt, sent, told)
                 # The items of a list tell what was written to each.
                 items = list(map(texts_of, answer.iterdescendants(etree.Element))) if not sent else []
-                for one in items if len(items) <= _ITEMS else ():
-                    yield from self._values(act, attempt, one, one)
+                for item in items if len(items) <= _ITEMS else ():
+                    yield from self._values(act, attempt, item, item)
             return
         self._changes += 1
         self._done_last = act, {text for texts in sent.values() for text in texts}, is_fault
@@ -205,7 +205,7 @@ class SoapMemory:
             if act.role is Role.OTHER:
                 names = {name for name in names if REFERS.search(name)}  # what it does may change all else
             values = {name: _joined(told.get(name, sent[name])) for name in names}
-            others = [one for one in self._written[act.label] if one.key != key][-_MOST:]
+            others = [write for write in self._written[act.label] if write.key != key][-_MOST:]
             others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
         self._written.clear()
         self._written[act.label] = others
@@ -213,7 +213,7 @@ class SoapMemory:
             return
         if act.role is Role.CREATES:
             new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
-            new = [one for one in new if REFERS.search(one[0])] or (new if len(new) == 1 else [])
+            new = [pair for pair in new if REFERS.search(pair[0])] or (new if len(new) == 1 else [])
             for name, text in new[:1]:
                 yield from self._made(_Thing(act, name, text, at_s, _texts(sent)), exchange)
             del self._things[:-_MOST]
@@ -308,7 +308,7 @@ class SoapMemory:
         ]
         return (
             len(past.lost) == _LOST
-            and not any(_BETWEEN in one for one in past.lost)
+            and not any(_BETWEEN in text for text in past.lost)
             and len({*past.lost, *past.kept}) == 1
             and act.noun == writer.noun
             and bool(KEEPS.search(act.noun))
@@ -425,12 +425,12 @@ def _is_cut(simple: Simple, text: str, got: str) -> bool:
 
 def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
     """Return whether a device that keeps some values has to keep this one: it lies between them, or has to be taken."""
-    if simple.enumeration or simple.builtin == "boolean" or any(text in one.enumeration for one in simple.others):
+    if simple.enumeration or simple.builtin == "boolean" or any(text in type_.enumeration for type_ in simple.others):
         return True
     if simple.many or _BETWEEN in text:
         return True
     if simple.builtin in NUMBERS:
-        number, numbers = number_in(text), [one for one in map(number_in, kept) if one is not None]
+        number, numbers = number_in(text), [decimal for decimal in map(number_in, kept) if decimal is not None]
         if number is None or not numbers:
             return False
         return min(numbers) <= number <= max(numbers)

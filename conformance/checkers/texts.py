@@ -50,7 +50,7 @@ class Texts:
             write = self._written.pop(url, None)
             if write is not None and write.id is not None:
                 items = listed(read_json(answer.body).value) or [] if is_json(answer.media_type) else []
-                value = next((one for one in items if isinstance(one, dict) and one.get("id") == write.id), {})
+                value = next((item for item in items if isinstance(item, dict) and item.get("id") == write.id), {})
             if write is not None and len(self._shown) < _MOST:
                 yield from self._read(occasion, write, value)
             self._shown[url] = value

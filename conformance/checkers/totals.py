@@ -100,7 +100,7 @@ class _Count:
         """Record the list that a total agrees with; yield earlier parts that had another total meanwhile."""
         before, self.last = self.last, frozenset(page.identities)
         if self.last == before:
-            told = [one for one in self.other if one[0].response.received_s - changed_s >= SETTLES_S]
+            told = [pair for pair in self.other if pair[0].response.received_s - changed_s >= SETTLES_S]
             self.times += len(told)
             yield from told if self.times >= _OFTEN else ()
         self.other.clear()
@@ -122,14 +122,18 @@ class Totals:
         """Yield the cases of one response; none if the parameters do not tell which part of the list it contains."""
         label, shown = listing.operation.label, len(page.items)
         self._longest[label] = max(self._longest[label], shown)
-        elsewhere = {one.name for one in (listing.page, listing.cursor) if one is not None}
+        elsewhere = {parameter.name for parameter in (listing.page, listing.cursor) if parameter is not None}
         if not sent.keys() <= listing.known - elsewhere:
             return
-        texts = {one.name: sent[one.name] for one in (listing.limit, listing.offset) if one and one.name in sent}
+        texts = {
+            parameter.name: sent[parameter.name]
+            for parameter in (listing.limit, listing.offset)
+            if parameter and parameter.name in sent
+        }
         if any(number_of(text) == 0 and text != "0" for text in texts.values()):
             return
         offset = number_of(sent.get(listing.offset.name, "")) if listing.offset is not None else 0
-        names = {one.name for one in listing.filters.values()}
+        names = {parameter.name for parameter in listing.filters.values()}
         chosen = frozenset((name, text) for name, text in sent.items() if name in names)
         most = listing.most(sent)
         # A limit of 0 may ask for no items, or for all.
@@ -182,7 +186,9 @@ class Totals:
     def _is_cut(self, listing: Listing, shown: int) -> bool:
         """Return whether a server may have cut a list at its own bound: a round number that no list exceeded."""
         is_round = shown % _CUTS[0] == 0 or shown % _CUTS[1] == 0
-        has_parts = not all(one is None for one in (listing.limit, listing.offset, listing.page, listing.cursor))
+        has_parts = not all(
+            parameter is None for parameter in (listing.limit, listing.offset, listing.page, listing.cursor)
+        )
         longest = self._longest[listing.operation.label]
         return is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
 

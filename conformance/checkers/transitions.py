@@ -36,10 +36,14 @@ class Transitions:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET" and one.shape}
+        reads = {
+            operation.template.rstrip("/"): operation
+            for operation in operations
+            if operation.method == "GET" and operation.shape
+        }
         # By template: the member with the thing's state. Below: the states from which each operation starts.
         self._states = {template: name for template, one in reads.items() if (name := state_member(one))}
-        self._starts = {one.label: named for one in operations if (named := self._named(reads, one))}
+        self._starts = {operation.label: named for operation in operations if (named := self._named(reads, operation))}
         # By path: members of the thing at the last read.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
@@ -51,10 +55,12 @@ class Transitions:
             return frozenset()
         given = flat(flat(reads[above].shape or {}).get("properties", {}).get(self._states[above], {}))
         sentences = re.split(r"(?<=[.;])\s+", operation.text)
-        said = [one for one in sentences if not _ELSE.search(one)]
-        named = {str(state): [one for one in said if _word(str(state)).search(one)] for state in given.get("enum", ())}
-        is_open = any(_NEGATED.search(one) or "409" in one for found in named.values() for one in found)
-        is_said = any(_ELSE.search(one) and "409" in one for one in sentences)
+        said = [sentence for sentence in sentences if not _ELSE.search(sentence)]
+        named = {
+            str(state): [item for item in said if _word(str(state)).search(item)] for state in given.get("enum", ())
+        }
+        is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
+        is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)
         return frozenset(state for state, found in named.items() if found) if is_said and not is_open else frozenset()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:

@@ -114,7 +114,7 @@ class Untouched:
         always = [name for name, count in self._changed[key].items() if count == self._count[key]]
         is_all = self._keeps_all or label == _CONDITIONAL
         changed = [found for other, found in self._changed.items() if other[0] == template and other != key]
-        others = {one for found in changed for one in found} if label in self._keeping else set(now)
+        others = {text for found in changed for text in found} if label in self._keeping else set(now)
         wrong = [
             name
             for name in always
@@ -123,7 +123,7 @@ class Untouched:
         ]
         id_ = "description/safe" if label == _CONDITIONAL else "description/refused-keeps"
         found = ", ".join(
-            f"{shown(now[one])} as {one}, and {shown(before.members.get(one))} before" for one in wrong[:1]
+            f"{shown(now[text])} as {text}, and {shown(before.members.get(text))} before" for text in wrong[:1]
         )
         expected = f"the members as before {label}, as {times} times"
         yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched")

@@ -109,7 +109,7 @@ class _Change(NamedTuple):
         """The members that its response shows."""
         response = self.write.response
         answer = read_json(response.body).value if is_json(response.media_type) else None
-        return represented(answer, {plain_name(one) for one in self.now})
+        return represented(answer, {plain_name(text) for text in self.now})
 
     def is_settled(self, name: str, names: Any) -> bool:
         """Return whether the device has acted by the second read, which a device that acts later has not.
@@ -134,8 +134,12 @@ class Writes:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        written = {one.template for one in operations if one.method in {"PUT", "PATCH"}}
-        self._reads = {one.template: one for one in operations if one.method == "GET" and one.template in written}
+        written = {operation.template for operation in operations if operation.method in {"PUT", "PATCH"}}
+        self._reads = {
+            operation.template: operation
+            for operation in operations
+            if operation.method == "GET" and operation.template in written
+        }
         self._collections = collections_of(operations)
         self._states: dict[str, _State] = {}
         self._writes: dict[str, list[Occasion]] = defaultdict(list)
@@ -234,14 +238,14 @@ class Writes:
         """Judge whether a refused request has changed nothing, not even in part."""
         sent, accepted = change.sent, self._accepted.get(change.write.context.target)
         if JSON_PATCH in change.write.request.media_type:
-            made = [one for one in partly_patched(change.before, sent) if isinstance(one, dict)]
+            made = [item for item in partly_patched(change.before, sent) if isinstance(item, dict)]
         else:
             made = [sent] if isinstance(sent, dict) else []
         wrong = ""
-        for name in sorted({name for one in made for name in one} - change.moving):
+        for name in sorted({name for item in made for name in item} - change.moving):
             was, now = change.before.get(name), change.now.get(name)
             is_late = isinstance(accepted, dict) and name in accepted and same(accepted[name], now)
-            is_taken = not same(was, now) and any(name in one and same(one[name], now) for one in made)
+            is_taken = not same(was, now) and any(name in item and same(item[name], now) for item in made)
             if is_taken and not is_late:
                 wrong = f"{shown(now)} as {name}, and {shown(was)} before"
                 break
@@ -280,7 +284,7 @@ class Writes:
         """Judge whether a request has changed members that only the device may set."""
         for name, value in change.sent.items():
             parts = (_parts(change.schema).get(name), _parts(item.shape).get(name))
-            if name in change.now and any(isinstance(one, dict) and flat(one).get("readOnly") for one in parts):
+            if name in change.now and any(isinstance(part, dict) and flat(part).get("readOnly") for part in parts):
                 was, now = change.before.get(name), change.now[name]
                 is_taken = same(now, value) and not same(was, value) and name not in change.moving
                 if is_taken and len(str(value)) < 5:  # noqa: PLR2004 - characters: the device may come to it by itself
@@ -348,7 +352,7 @@ class Writes:
     def _items(self, name: str, value: list[Any], now: list[Any], part: Schema) -> str:
         """Return what differs in a list: its length, the order of its numbers, or members of its objects."""
         inner = flat(part["items"]) if isinstance(part.get("items"), dict) else {}
-        if all(isinstance(one, dict) for one in (*value, *now)):
+        if all(isinstance(item, dict) for item in (*value, *now)):
             if len(value) != len(now):
                 return f"{len(now)} items in {name} in place of {len(value)}"
             for one, other in zip(value, now, strict=True):
@@ -407,10 +411,10 @@ class Writes:
         One member may follow another one. Two that reset each other, by values that change nothing, do not.
         """
         value, was, now = change.sent[name], change.before[name], change.now[name]
-        others = [one for one in was if one in now and one not in value and not same(now[one], was[one])]
+        others = [item for item in was if item in now and item not in value and not same(now[item], was[item])]
         doubts = self._doubts[change.operation.label, f"{name} within"]
-        if all(same(value[one], was.get(one)) for one in value):
-            doubts |= {f"{one} resets {other}".encode() for one in value for other in others}
+        if all(same(value[item], was.get(item)) for item in value):
+            doubts |= {f"{item} resets {other}".encode() for item in value for other in others}
         both = [one for one in others if any(f"{one} resets {other}".encode() in doubts for other in value)]
         return f"{shown(now[both[0]])} as {both[0]} in {name}" if both else ""
 
@@ -434,10 +438,10 @@ class Writes:
 def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
     """Judge whether a map has all new entries of a body, if it has one of them."""
     for name, part in _parts(change.schema).items():
-        value, was, now = (one.get(name) for one in (change.sent, change.before, change.now))
+        value, was, now = (item.get(name) for item in (change.sent, change.before, change.now))
         if isinstance(value, dict) and isinstance(now, dict) and "properties" not in flat(part):
-            new = [one for one in value if one not in (was or {}) and value[one] is not None]
-            lost = [one for one in new if one not in now]
+            new = [item for item in value if item not in (was or {}) and value[item] is not None]
+            lost = [item for item in new if item not in now]
             wrong = f"no {lost[0]} in {name}" if 0 < len(lost) < len(new) else ""
             cause, expected = f"{change.operation.label} {name} entries", f"the entries that {change.label} wrote"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=cause)
@@ -496,10 +500,10 @@ def _missing(
     needed = shape.get("required", ())
     for name, part in parts.items():
         given = flat(part) if isinstance(part, dict) else {}
-        _, was, now = inner = tuple(one.get(name) for one in bodies)
+        _, was, now = inner = tuple(body.get(name) for body in bodies)
         if name not in bodies[0] and name in bodies[1]:
             yield _Leaf(f"{above}{name}", given, given.get("default"), was, now), name in needed
-        elif all(isinstance(one, dict) for one in inner):
+        elif all(isinstance(item, dict) for item in inner):
             within = flat(shape.get("properties", {}).get(name, {}))
             yield from _missing(given.get("properties", {}), within, inner, f"{above}{name}.")
 
@@ -507,5 +511,5 @@ def _missing(
 def _parts(schema: Schema | None) -> Mapping[str, Any]:
     """Return the members of a schema, or of the object in its envelope that has the most."""
     outer = flat(schema or {}).get("properties", {})
-    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
     return max(inner, key=len) if len(outer) == 1 and inner and inner[0] else outer

@@ -268,9 +268,9 @@ def _write_baseline(path: Path, outcome: Certification, contract: Contract, old:
     from conformance.verdict.baseline import baseline_text, load_baseline  # noqa: PLC0415 - only for this option
 
     found = [
-        contract.ledger[one["id"]]
-        for one in outcome.document["requirements"]
-        if one["verdict"] == "fail" or "expected_failure" in one
+        contract.ledger[item["id"]]
+        for item in outcome.document["requirements"]
+        if item["verdict"] == "fail" or "expected_failure" in item
     ]
     known = load_baseline(old, contract.ledger, contract.renamed) if old else ()
     today = dt.datetime.now(dt.UTC).date()
@@ -337,7 +337,7 @@ def _places(contract: Contract, statement: Path | None, source: str | None) -> d
     api = api_of(statement) if statement and source is None else None
     named = source or (api.openapi if api else None)
     file = Path(named) if named and not is_url(named) else contract.openapi_path
-    return places(contract, statement, file, [one.label for one in operations_of(contract)])
+    return places(contract, statement, file, [operation.label for operation in operations_of(contract)])
 
 
 def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
@@ -374,7 +374,7 @@ def _notes(run: Run) -> tuple[str, ...]:
         for name, missing in run.statement.lacking(run.contract).items()
     ]
     operations = operations_of(run.contract) if run.contract.openapi_path else ()
-    labels = [one.label for one in operations]
+    labels = [operation.label for operation in operations]
     for pattern in CallRules.of(run).unused(operations):
         near = difflib.get_close_matches(pattern, labels, 1)
         meant = f"; did you mean {near[0]!r}?" if near else "."

@@ -54,9 +54,9 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
         raise click.UsageError(str(error)) from error
     except MALFORMED as error:
         raise click.UsageError(str(not_well_made(result, error))) from error
-    before = {one["id"]: one for one in document["requirements"]}
+    before = {item["id"]: item for item in document["requirements"]}
     requirement = next((id_ for id_, one in before.items() if requirement in one.get("aliases", ())), requirement)
-    chosen = tuple(one for one in judged.verdicts if requirement in {None, one.requirement.id})
+    chosen = tuple(verdict for verdict in judged.verdicts if requirement in {None, verdict.requirement.id})
     for one in chosen:
         then = str(before.get(one.requirement.id, {}).get("verdict", "not judged"))
         if requirement or one.value in _BROKEN or then in _BROKEN:
@@ -70,7 +70,7 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
         click.echo(inert(fault), err=True)
     if not chosen:
         return CommandResult(ExitCode.INCONCLUSIVE)
-    return CommandResult(ExitCode.FAILED if any(one.value == _FAIL for one in chosen) else ExitCode.PASSED)
+    return CommandResult(ExitCode.FAILED if any(verdict.value == _FAIL for verdict in chosen) else ExitCode.PASSED)
 
 
 def _then(one: "Verdict", then: str) -> str:
@@ -85,8 +85,8 @@ def _summary(judged: "Judged", chosen: tuple["Verdict", ...]) -> str:
     told = f"{counted(judged.requests, 'request')} in the history{'' if judged.ended else ', which was cut short'}"
     if not chosen:
         return f"nothing judged: {told}, and none of them and no trace shows it"
-    values = Counter(str(one.value) for one in chosen)
-    cases = sum(one.evidence.cases for one in chosen)
+    values = Counter(str(verdict.value) for verdict in chosen)
+    cases = sum(verdict.evidence.cases for verdict in chosen)
     kinds = ", ".join(f"{number} {value}" for value, number in sorted(values.items()))
     return f"{kinds}, of {counted(len(chosen), 'requirement')} that this run shows ({counted(cases, 'case')}; {told})"
 

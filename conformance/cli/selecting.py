@@ -56,7 +56,7 @@ def _fitting(pattern: str, judged: Mapping[str, Requirement], option: str) -> fr
         if pattern in one.classes or any(fnmatchcase(name, pattern) for name in (id_, *one.aliases))
     )
     if not found:
-        names = [*judged, *{name for one in judged.values() for name in one.classes}]
+        names = [*judged, *{name for requirement in judged.values() for name in requirement.classes}]
         near = get_close_matches(pattern, names, 1)
         meant = f"; did you mean {near[0]}?" if near else ""
         raise SelectionError(f"{option} {pattern!r} fits no requirement and no class that is judged{meant}")
@@ -71,7 +71,7 @@ def failed_before(result: Path) -> frozenset[str]:
     """
     try:
         document = json.loads(result.read_bytes())
-        found = {one["id"] for one in document["requirements"] if one["verdict"] in _BROKEN}
+        found = {item["id"] for item in document["requirements"] if item["verdict"] in _BROKEN}
     except FileNotFoundError:
         raise SelectionError(f"--last-failed: there is no {result}; run without it first") from None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:

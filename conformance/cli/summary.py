@@ -92,11 +92,11 @@ def print_summary(outcome: Certification) -> None:
 
 def _print_answers(found: Sequence[Mapping[str, str]]) -> None:
     """Print the answers to the questions that a user of a moving device asks first."""
-    for one in found:
+    for item in found:
         mark = click.style(
-            f"{one['answer']:<9}", fg=_COLOURS[{"yes": "pass", "no": "fail"}.get(one["answer"], "inconclusive")]
+            f"{item['answer']:<9}", fg=_COLOURS[{"yes": "pass", "no": "fail"}.get(item["answer"], "inconclusive")]
         )
-        click.echo(f"  {one['question']:<42} {mark} {inert(one['figure'])}".rstrip())
+        click.echo(f"  {item['question']:<42} {mark} {inert(item['figure'])}".rstrip())
     if found:
         click.echo()
 

@@ -70,7 +70,7 @@ def advice(*texts: str) -> str:
     first text is returned.
     """
     running = click.get_current_context(silent=True)
-    known = {option for one in running.command.params for option in one.opts} if running else None
+    known = {option for parameter in running.command.params for option in parameter.opts} if running else None
     return next((text for text in texts if known is None or known.issuperset(_OPTION.findall(text))), "")
 
 

@@ -63,7 +63,7 @@ class GroupedCommand(click.Command):
     def __init__(self, *args: Any, start: str = "", **options: Any) -> None:
         super().__init__(*args, **options)
         self._start = start
-        if any(_place(one).rare for one in self.params):
+        if any(_place(parameter).rare for parameter in self.params):
             everything = click.Option(
                 ["--help-all"], is_flag=True, is_eager=True, expose_value=False, callback=_show_everything,
                 help="Show all options.",

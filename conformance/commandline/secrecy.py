@@ -322,7 +322,7 @@ def _without_cookie(name: Any, value: Any) -> Any:
     if not (isinstance(name, str) and name.lower() == "set-cookie"):
         return value
     if isinstance(value, list):
-        return [_without_cookie(name, one) for one in value]
+        return [_without_cookie(name, item) for item in value]
     return _COOKIE.sub(r"\1$ROAAS_SET_COOKIE", value) if isinstance(value, str) else value
 
 

@@ -103,8 +103,8 @@ def copy_as_data(pack: Path, folder: Path, readable: Callable[[dict[str, Any]], 
     given = tomllib.loads(read_octets(pack / MANIFEST, most=_MOST_MANIFEST).decode("utf-8"))
     lines = [f"{key} = {basic_string(str(given[key]))}" for key in ("name", "version", "title")]
     lines += ["closed_answers = true", "described = true"]
-    lines += [f"without = {json.dumps([str(one) for one in given.get('without', ())])}"]
-    lines += [f"\n[[class]]\nname = {basic_string(str(one['name']))}" for one in given["class"]]
+    lines += [f"without = {json.dumps([str(item) for item in given.get('without', ())])}"]
+    lines += [f"\n[[class]]\nname = {basic_string(str(item['name']))}" for item in given["class"]]
     (folder / MANIFEST).write_text("\n".join(lines) + "\n", encoding="utf-8")
     for file in (path for path in map(pack.joinpath, _DATA_NAMES) if path.exists()):
         content = read_json(read_octets(file))
@@ -128,7 +128,7 @@ def _formats(document: Mapping[str, Any]) -> tuple[set[str], int]:
                 formats = _content(response) if str(status)[0] == "2" else set()
                 # With a parameter in the path, only formats of data are requested: the thing may be gone before a
                 # second request.
-                formats = {one for one in formats if _DATA.search(one)} if "{" in str(path) else formats
+                formats = {text for text in formats if _DATA.search(text)} if "{" in str(path) else formats
                 sent = max(sent, len(formats))
     return taken, sent
 

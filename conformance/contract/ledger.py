@@ -85,8 +85,8 @@ def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
     there = tuple(ledger)
     return tuple(
         id_
-        for one in ids
-        for id_ in ([id_ for id_ in there if id_.endswith(one[1:])] if one.startswith("*/") else [one])
+        for text in ids
+        for id_ in ([id_ for id_ in there if id_.endswith(text[1:])] if text.startswith("*/") else [text])
     )
 
 

@@ -90,7 +90,7 @@ def current(contract: Contract, ledger: Mapping[str, Requirement]) -> Requiremen
     """Return a ledger as a set, with the name of the frozen set of the same content if there is one."""
     requirements = {id_: frozen(item) for id_, item in ledger.items()}
     sets = (load_set(contract, name) for name in names(contract))
-    same = next((one for one in sets if one.requirements == requirements), None)
+    same = next((set_ for set_ in sets if set_.requirements == requirements), None)
     return same or RequirementSet(_UNFROZEN, requirements)
 
 

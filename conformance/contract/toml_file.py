@@ -129,7 +129,7 @@ def _item(kind: Any, index: int) -> inspect.Type:
 def _bare(kind: inspect.Type) -> inspect.Type:
     """Return the type of an optional key without None."""
     if isinstance(kind, inspect.UnionType):
-        kinds = tuple(one for one in kind.types if not isinstance(one, inspect.NoneType))
+        kinds = tuple(type_ for type_ in kind.types if not isinstance(type_, inspect.NoneType))
         return kinds[0] if len(kinds) == 1 else inspect.UnionType(kinds)
     return kind
 
@@ -179,9 +179,9 @@ _WORDS: dict[type[inspect.Type], Callable[[Any, str], str]] = {
     inspect.StrType: _text,
     inspect.DateType: lambda _, __: "a date: YYYY-MM-DD, without quotes",
     inspect.LiteralType: lambda kind, _: f"one of {', '.join(map(str, kind.values))}",
-    inspect.EnumType: lambda kind, _: f"one of {', '.join(str(one.value) for one in kind.cls)}",
+    inspect.EnumType: lambda kind, _: f"one of {', '.join(str(item.value) for item in kind.cls)}",
     inspect.StructType: lambda _, name: f"a table: [{name}]",
     inspect.TupleType: lambda kind, _: f"{len(kind.item_types)} numbers",
     inspect.VarTupleType: _list,
-    inspect.UnionType: lambda kind, name: " or ".join(_wanted(one, name) for one in kind.types),
+    inspect.UnionType: lambda kind, name: " or ".join(_wanted(item, name) for item in kind.types),
 }

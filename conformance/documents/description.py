@@ -281,13 +281,13 @@ class _Bundle:
 def _base_url(source: str, document: Schema, trust: Trust) -> tuple[str, tuple[str, ...]]:
     """Return the URL below which the operations are, and a remark where the description names another server."""
     given = document.get("servers")
-    servers = [one for one in given if isinstance(one, dict)] if isinstance(given, list) else []
-    urls = [_with_defaults(one) for one in servers] or ["/"]
+    servers = [item for item in given if isinstance(item, dict)] if isinstance(given, list) else []
+    urls = [_with_defaults(server) for server in servers] or ["/"]
     if not is_url(source):
         wholes = [f"http:{url}" if url.startswith("//") else url for url in urls]
         return next(filter(is_url, wholes), "").rstrip("/"), ()
     wholes = [joined(source, url) for url in urls]
-    known = [one for one in wholes if is_same(one, source)] or [one for one in wholes if trust.trusts(one)]
+    known = [text for text in wholes if is_same(text, source)] or [text for text in wholes if trust.trusts(text)]
     if known:
         return trust.place(known[0]).partition("?")[0].rstrip("/"), ()
     here = f"{urlsplit(source).scheme}://{urlsplit(source).netloc}{path_of(wholes[0])}".rstrip("/")

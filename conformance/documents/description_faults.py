@@ -48,8 +48,8 @@ def misplaced(original: Schema) -> list[tuple[str, str]]:
 
 def _deepest(error: Any) -> Any:
     """Return the violation that lies deepest, of several alternatives as well."""
-    inner = (_deepest(one) for alternative in getattr(error.kind, "context", ()) for one in alternative)
-    return max((error, *inner), key=lambda one: len(one.instance_path))
+    inner = (_deepest(item) for alternative in getattr(error.kind, "context", ()) for item in alternative)
+    return max((error, *inner), key=lambda item: len(item.instance_path))
 
 
 def _pointer(path: Iterable[object]) -> str:
@@ -113,7 +113,7 @@ def _path_parameters(document: Schema) -> Iterator[str]:
     for path, method, operation, shared in _operations(document):
         own = operation.get("parameters", [])
         given = [*shared, *(own if isinstance(own, list) else [])]
-        declared = {str(one.get("name")) for one in given if isinstance(one, dict) and one.get("in") == "path"}
+        declared = {str(item.get("name")) for item in given if isinstance(item, dict) and item.get("in") == "path"}
         used = set(PARAMETER.findall(path))
         for name in sorted(used - declared):
             yield f"{method} {path} does not declare its path parameter {name}"
@@ -240,7 +240,7 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
 def _named(given: Schema) -> list[Any]:
     examples = given.get("examples", {})
     named = (
-        [one["value"] for one in examples.values() if isinstance(one, dict) and "value" in one]
+        [example["value"] for example in examples.values() if isinstance(example, dict) and "value" in example]
         if isinstance(examples, dict)
         else []
     )

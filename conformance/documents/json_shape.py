@@ -198,9 +198,9 @@ def _are_plain(found: Iterator[str]) -> bool:
     Raises:
         PatternError: one of them is no regular expression.
     """
-    others = [one for one in found if not patterns.is_plain(one)]
-    for one in others:
-        patterns.check(one)
+    others = [text for text in found if not patterns.is_plain(text)]
+    for other in others:
+        patterns.check(other)
     return not others
 
 
@@ -383,8 +383,8 @@ class Shape:
 
 def _misfit(errors: list[ValidationError]) -> tuple[bool, bool, int]:
     """Return how far a value is from an alternative: another type, another kind by a fixed value, and its errors."""
-    is_another_type = any(one.validator == "type" and not one.relative_path for one in errors)
-    return is_another_type, any(one.validator in {"const", "enum"} for one in errors), len(errors)
+    is_another_type = any(error.validator == "type" and not error.relative_path for error in errors)
+    return is_another_type, any(error.validator in {"const", "enum"} for error in errors), len(errors)
 
 
 def _described(error: ValidationError, where: str) -> str:

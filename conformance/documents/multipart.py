@@ -64,8 +64,8 @@ def parts_of(content_type: str, body: bytes) -> list[Part]:
         raise NotXmlError(f"multipart/related with more than {_MOST_PARTS:,} parts")
     found = [_part(piece.partition(b"\r\n")[2]) for piece in pieces[1:-1]]
     start = parameter(content_type, "start").strip("<>")
-    root = next((one for one in found if start and one.id == start), found[0])
-    return [root, *(one for one in found if one is not root)]
+    root = next((part for part in found if start and part.id == start), found[0])
+    return [root, *(part for part in found if part is not root)]
 
 
 def _part(octets: bytes) -> Part:
@@ -93,7 +93,7 @@ def root_of(content_type: str, body: bytes) -> etree._Element:
         return parse(in_utf_8(content_type, body), doctype=True)
     root, *others = parts_of(content_type, body)
     document = parse(in_utf_8(root.content_type, root.body), doctype=True)
-    by_id = {one.id: one for one in others}
+    by_id = {part.id: part for part in others}
     octets = 0
     for include in list(document.iter(_INCLUDE)):
         wanted, parent = unquote(include.get("href", "")).removeprefix("cid:"), include.getparent()

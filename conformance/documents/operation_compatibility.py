@@ -70,8 +70,8 @@ class Described:
         """Return the parameters with their schemas; those of the path by their place, headers in lower case."""
         names = PARAMETER.findall(self.path)
         found: dict[tuple[str, str], tuple[Parameter, Any]] = {}
-        for one in [*self.item.get("parameters", ()), *self.operation.get("parameters", ())]:
-            given = self.followed(one)
+        for item in [*self.item.get("parameters", ()), *self.operation.get("parameters", ())]:
+            given = self.followed(item)
             parameter = read_parameter({**given, "schema": {}})
             name, where = parameter.name, parameter.where
             if (where == "header" and name.lower() in IGNORED) or (where == "path" and name not in names):
@@ -146,10 +146,12 @@ class _Comparison:
                 yield has != self.by_client, f"{_called(one)} may {'now' if has else 'no longer'} have {word}"
 
     def body(self) -> Iterator[Found]:
-        before, after = (one.followed(one.operation.get("requestBody")) for one in (self.old, self.new))
+        before, after = (
+            operation.followed(operation.operation.get("requestBody")) for operation in (self.old, self.new)
+        )
         old, new = by_media_type(before), by_media_type(after)
         word = "takes" if self.by_client else "has"
-        needed, needs = (bool(one.get("required", False)) for one in (before, after))
+        needed, needs = (bool(item.get("required", False)) for item in (before, after))
         if old and not new:
             yield True, f"{word} no body any more"
             return
@@ -163,9 +165,9 @@ class _Comparison:
 
     def responses(self) -> Iterator[Found]:
         before, after = (
-            {str(key).upper().replace("DEFAULT", "default"): one.followed(value) for key, value in given.items()}
-            for one in (self.old, self.new)
-            for given in (one.operation.get("responses") or {},)
+            {str(key).upper().replace("DEFAULT", "default"): operation.followed(value) for key, value in given.items()}
+            for operation in (self.old, self.new)
+            for given in (operation.operation.get("responses") or {},)
         )
         pairs: dict[tuple[str, str], None] = {}
         for status in before:
@@ -203,7 +205,7 @@ class _Comparison:
                     is_needed != self.by_client,
                     f"{what}, header {name} is {'required' if is_needed else 'optional'} now",
                 )
-            schemas = [_schema_of(one) for one in (header, new[name])]
+            schemas = [_schema_of(item) for item in (header, new[name])]
             for breaks, text in self.both.schema_changes(*schemas, request=not self.by_client):
                 yield breaks, f"{what}, header {name}{text}"
         for name in new:
@@ -230,7 +232,7 @@ class _Comparison:
                 yield False, f"{what} may be {name}"
 
     def _content(self, old: Schema, new: Schema, media_type: str, *, request: bool) -> Iterator[Found]:
-        schemas = [_of_text(_schema_of(one), media_type) for one in (old, new)]
+        schemas = [_of_text(_schema_of(item), media_type) for item in (old, new)]
         yield from self.both.schema_changes(*schemas, request=request, media_type=media_type)
         if _is_form(media_type) and read_encoding(old) != read_encoding(new):
             yield None, ": not compared: encoding"
@@ -299,7 +301,7 @@ def security_changes(old: tuple[Schema, Schema], new: tuple[Schema, Schema]) -> 
         new: likewise.
     """
     before, after = _alternatives(*old), _alternatives(*new)
-    if all(one in after for one in before) and all(one in before for one in after):
+    if all(item in after for item in before) and all(item in before for item in after):
         yield from _flows(old[0], new[0], before)
         return
     # Credentials that sufficed before must still suffice.
@@ -324,8 +326,8 @@ def _schemes(document: Schema) -> Schema:
 def _alternatives(document: Schema, operation: Schema) -> list[_Alternative]:
     schemes = _schemes(document)
     return [
-        {_known(name, schemes.get(name)): frozenset(scopes) for name, scopes in one.items()}
-        for one in _demanded(document, operation)
+        {_known(name, schemes.get(name)): frozenset(scopes) for name, scopes in item.items()}
+        for item in _demanded(document, operation)
     ]
 
 
@@ -337,12 +339,12 @@ def _known(name: str, scheme: Any) -> tuple[str, ...]:
     known = tuple(str(scheme.get(key, "")) for key in _KNOWN.get(kind, ()))
     # Header fields and the names of schemes are the same in any case (RFC 9110, 5.1 and 11.1).
     blind = kind == "http" or known[:1] == ("header",)
-    return (kind, *(one.lower() if blind else one for one in known))
+    return (kind, *(text.lower() if blind else text for text in known))
 
 
 def _flows(old: Schema, new: Schema, demanded: list[_Alternative]) -> Iterator[tuple[bool, str]]:
     """Yield the ways to an OAuth token that are gone or lead elsewhere."""
-    if not any(("oauth2",) in one for one in demanded):
+    if not any(("oauth2",) in item for item in demanded):
         return
     before, after = (
         {
@@ -363,9 +365,9 @@ def _flows(old: Schema, new: Schema, demanded: list[_Alternative]) -> Iterator[t
 
 def _text(document: Schema, operation: Schema) -> str:
     return " or ".join(
-        " with ".join(f"{name} ({', '.join(scopes)})" if scopes else name for name, scopes in one.items())
+        " with ".join(f"{name} ({', '.join(scopes)})" if scopes else name for name, scopes in item.items())
         or "no credentials"
-        for one in _demanded(document, operation)
+        for item in _demanded(document, operation)
     )
 
 

@@ -105,8 +105,8 @@ def judged_value(schema: Schema, reading: Reading) -> str:
     """Return whether a value whose scalars are texts is valid by a schema."""
     shape = shape_of(schema)
     said = set()
-    for one in _alternatives(schema):
-        value, sure = _typed(one, reading.value)
+    for alternative in _alternatives(schema):
+        value, sure = _typed(alternative, reading.value)
         if shape.holds(value):
             return VALID if reading.sure and has_formats(schema, value) else UNCLEAR
         said.add(sure)
@@ -202,7 +202,9 @@ def _typed(schema: Schema, value: Any) -> tuple[Any, bool]:
         return {name: item for name, (item, _) in members.items()}, sure
     readings, sure = _scalars(schema, value)
     shape = shape_of(schema)
-    return next((one for one in readings if shape.holds(one)), value), sure or any(map(shape.holds, readings))
+    return next((reading for reading in readings if shape.holds(reading)), value), sure or any(
+        map(shape.holds, readings)
+    )
 
 
 def _typed_part(schema: Any, value: Any) -> tuple[Any, bool]:
@@ -211,7 +213,7 @@ def _typed_part(schema: Any, value: Any) -> tuple[Any, bool]:
 
 def _alternatives(schema: Schema) -> Iterator[Schema]:
     """Yield a schema once with each alternative of its union."""
-    unions = [(key, one) for key in ("anyOf", "oneOf") for one in schema.get(key, ())]
+    unions = [(key, item) for key in ("anyOf", "oneOf") for item in schema.get(key, ())]
     for key, one in unions:
         yield flat({**schema, key: [one]})
     if not unions:
@@ -220,7 +222,7 @@ def _alternatives(schema: Schema) -> Iterator[Schema]:
 
 def _agreed(schema: Schema, readings: Iterator[Reading]) -> str:
     """Return the verdict on a value that readers may take in several ways: unclear if it depends on the way."""
-    said = {judged_value(schema, one) for one in readings}
+    said = {judged_value(schema, reading) for reading in readings}
     return said.pop() if len(said) == 1 else UNCLEAR
 
 
@@ -275,7 +277,7 @@ def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
         return
     yield Reading([plain(part) for part in text.split(separator)])
     delimiters = (separator, "=") if pairs else (separator,)
-    if any(decode(text).count(one) != text.count(one) for one in delimiters):
+    if any(decode(text).count(delimiter) != text.count(delimiter) for delimiter in delimiters):
         yield Reading(decode(text).split(separator))  # some servers decode before they split
     if parameter.style == "label" and not parameter.explode:
         # Before 3.1.1, the specification's table had a full stop between the items too.

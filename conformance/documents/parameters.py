@@ -90,7 +90,9 @@ def read_parameter(given: dict[str, Any]) -> Parameter:
         next(iter(by_media_type(given)), ""),
         bool(given.get("allowReserved", False)),
         bool(given.get("allowEmptyValue", False)),
-        " ".join(str(one.get("description", "")) for one in (given, given.get("schema", {})) if isinstance(one, dict)),
+        " ".join(
+            str(item.get("description", "")) for item in (given, given.get("schema", {})) if isinstance(item, dict)
+        ),
     )
 
 

@@ -84,7 +84,9 @@ class Growth:
             return f"a value of {longest:,} characters in enum, const or default; the limit is {_LARGEST:,}"
         names = schema.get("patternProperties")
         patterns = [schema.get("pattern"), *(names if isinstance(names, dict) else ())]
-        return next(filter(None, (self._pattern_fault(one) for one in patterns if isinstance(one, str))), "")
+        return next(
+            filter(None, (self._pattern_fault(pattern) for pattern in patterns if isinstance(pattern, str))), ""
+        )
 
     def _pattern_fault(self, pattern: str) -> str:
         if pattern not in self._patterns:
@@ -274,7 +276,7 @@ def unrolls(document: Schema, value: Any) -> bool:
             except UnresolvedError:
                 continue
         inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
-        beside = [(one, depth) for one in inner if isinstance(one, dict | list)]
+        beside = [(item, depth) for item in inner if isinstance(item, dict | list)]
         if len(beside) > _MOST_BESIDE:
             return True
         waiting += beside

@@ -84,7 +84,7 @@ class _Comparison:
             self.open[key] = False
             known = set(self.found)
             result = self._compared(before, after)
-            if self.open.pop(key) and any(one.breaks is not False for one in result):
+            if self.open.pop(key) and any(finding.breaks is not False for finding in result):
                 # Discard results that assumed that this pair is compatible.
                 for other in self.found.keys() - known:
                     del self.found[other]
@@ -117,18 +117,22 @@ class _Comparison:
         else:
             found = list(self._by_alternative(old, new, before, after))
         found = list(dict.fromkeys(found))
-        if any(one.breaks is not False for one in found) and self._is_covered(old, new):
+        if any(finding.breaks is not False for finding in found) and self._is_covered(old, new):
             # A change that breaks by one keyword may be compensated by another.
             kept = [
-                replace(one, breaks=one.breaks and one.always) for one in found if one.breaks is not None or one.always
+                replace(finding, breaks=finding.breaks and finding.always)
+                for finding in found
+                if finding.breaks is not None or finding.always
             ]
-            return [one if one.always else replace(one, breaks=False) for one in kept]
-        if any(one.breaks for one in found) or all(one.breaks is False or one.always for one in found):
+            return [finding if finding.always else replace(finding, breaks=False) for finding in kept]
+        if any(finding.breaks for finding in found) or all(
+            finding.breaks is False or finding.always for finding in found
+        ):
             return found
         example = self._witness(old, new)
         if example is None:
             return found
-        known = [one for one in found if one.breaks is False or one.always]
+        known = [finding for finding in found if finding.breaks is False or finding.always]
         return [Finding(breaks=True, text=f": {self._now()} {cut(example)}"), *known]
 
     def _now(self) -> str:
@@ -144,32 +148,34 @@ class _Comparison:
             or self._may_overlap(sender, taken)
             or are_apart([(other, side) for other in taken])
         )
-        for one in sent:
+        for item in sent:
             if len(sent) > 1:
-                yield from self._gone(one, taken)
+                yield from self._gone(item, taken)
             # Compare each value that may be sent in this form with all values that are accepted.
-            if self._is_covered(*self._ordered(one, whole)):
+            if self._is_covered(*self._ordered(item, whole)):
                 continue
-            like = [other for other in taken if kind_in(one) == kind_in(other) or "" in (kind_in(one), kind_in(other))]
-            found = [self.findings(*self._ordered(one, other)) for other in like]
+            like = [
+                other for other in taken if kind_in(item) == kind_in(other) or "" in (kind_in(item), kind_in(other))
+            ]
+            found = [self.findings(*self._ordered(item, other)) for other in like]
             if sure and any(all(change.breaks is False for change in changes) for changes in found):
                 continue
-            example = self._witness(*self._ordered(one, whole))
+            example = self._witness(*self._ordered(item, whole))
             if example is None:
                 yield Finding(None, f": not compared: {differing(old, new) or 'alternatives'}")
             elif len(found) == 1 and any(change.breaks for change in found[0]):
                 yield from (change for change in found[0] if change.breaks)
             else:
                 yield Finding(
-                    breaks=True, text=f" may {'no longer' if self.request else 'now'} be {name_of(one, example)}"
+                    breaks=True, text=f" may {'no longer' if self.request else 'now'} be {name_of(item, example)}"
                 )
-        for one in taken:
-            if not any(kind_in(one) == kind_in(other) for other in sent):
-                yield Finding(breaks=False, text=f" may {'now' if self.request else 'no longer'} be {name_of(one)}")
+        for item in taken:
+            if not any(kind_in(item) == kind_in(other) for other in sent):
+                yield Finding(breaks=False, text=f" may {'now' if self.request else 'no longer'} be {name_of(item)}")
 
     def _may_overlap(self, sender: Any, taken: list[Any]) -> bool:
         """Return whether a client takes an object that fits several alternatives, as both schemas have oneOf."""
-        return not self.request and _has(sender, "oneOf") and all(kind_in(one) == "object" for one in taken)
+        return not self.request and _has(sender, "oneOf") and all(kind_in(item) == "object" for item in taken)
 
     def _gone(self, one: Any, taken: list[Any]) -> Iterator[Finding]:
         """Yield the members that are gone from the one shape that has values of a shape that is sent."""
@@ -180,7 +186,7 @@ class _Comparison:
     def _by_word(self, old: Any, new: Any) -> Iterator[Finding]:
         """Yield the changes between two schemas without alternatives."""
         if isinstance(old, bool) or isinstance(new, bool):
-            old, new = ({} if one is True else {"enum": []} if one is False else one for one in (old, new))
+            old, new = ({} if item is True else {"enum": []} if item is False else item for item in (old, new))
         kinds = types_in(old), types_in(new)
         if kinds[0] != kinds[1]:
             one, other = ({"type": list(kind)} if kind else True for kind in kinds)
@@ -210,7 +216,7 @@ class _Comparison:
             yield Finding(None, ": not compared: allOf")
 
     def _group(self, old: Schema, new: Schema, words: tuple[str, ...]) -> Iterator[Finding]:
-        before, after = ({word: one[word] for word in words if word in one} for one in (old, new))
+        before, after = ({word: item[word] for word in words if word in item} for item in (old, new))
         if is_same(before, after, self.old, self.new, set()):
             return
         one, other = (
@@ -240,9 +246,9 @@ class _Comparison:
     def _members(self, old: Schema, new: Schema) -> Iterator[Finding]:
         """Yield changes of an object's members."""
         before, after = (
-            {name: part for name, part in one.get("properties", {}).items() if part != UNSENT} for one in (old, new)
+            {name: part for name, part in item.get("properties", {}).items() if part != UNSENT} for item in (old, new)
         )
-        needed, needs = (frozenset(one.get("required", ())) for one in (old, new))
+        needed, needs = (frozenset(item.get("required", ())) for item in (old, new))
         for name in sorted(needed ^ needs):
             introduced = name not in before and name in after
             word = "new, and required" if introduced else "required now" if name in needs else "optional now"
@@ -254,7 +260,9 @@ class _Comparison:
                 yield from self._against_others(old, name, schema, old_has=False)
         for name, schema in before.items():
             if name in after:
-                yield from (replace(one, text=below(name, one.text)) for one in self.findings(schema, after[name]))
+                yield from (
+                    replace(finding, text=below(name, finding.text)) for finding in self.findings(schema, after[name])
+                )
             elif schema is not False:
                 yield Finding(breaks=True, text=f", member {name} is gone", always=True)
                 yield from self._against_others(new, name, schema, old_has=True)
@@ -270,37 +278,37 @@ class _Comparison:
             # Clients send no undescribed members, and ignore those that they do not know.
             return
         pair = (schema, rest) if old_has else (rest, schema)
-        yield from (replace(one, text=below(name, one.text)) for one in self.findings(*pair))
+        yield from (replace(finding, text=below(name, finding.text)) for finding in self.findings(*pair))
 
     def _other_members(self, old: Schema, new: Schema) -> Iterator[Finding]:
         """Yield changes of the members that have no name of their own."""
-        patterns = [one.get("patternProperties", {}) for one in (old, new)]
+        patterns = [item.get("patternProperties", {}) for item in (old, new)]
         if patterns[0].keys() == patterns[1].keys():
             for pattern, schema in patterns[0].items():
                 found = self.findings(schema, patterns[1][pattern])
-                yield from (replace(one, text=below(pattern, one.text)) for one in found)
+                yield from (replace(finding, text=below(pattern, finding.text)) for finding in found)
         else:
             one, other = ({word: given[word] for word in _MEMBERS if word in given} for given in (old, new))
             if not self._is_covered(one, other, (old, new)):
                 shown = self._witness(one, other, (old, new)) is not None
                 text = ": other members by patternProperties" if shown else ": not compared: patternProperties"
                 yield Finding(breaks=shown or None, text=text)
-        rest, others = (one.get("additionalProperties", True) for one in (old, new))
+        rest, others = (item.get("additionalProperties", True) for item in (old, new))
         if (rest is False) != (others is False):
             closes = others is False
             word = "refused" if closes else "allowed"
             yield Finding(breaks=self.request and closes, text=f": members that are not described are {word} now")
         elif not is_same(rest, others, self.old, self.new, set()):
-            yield from (replace(one, text=below("*", one.text)) for one in self.findings(rest, others))
+            yield from (replace(finding, text=below("*", finding.text)) for finding in self.findings(rest, others))
 
     def _items(self, old: Schema, new: Schema) -> Iterator[Finding]:
         """Yield changes of the items: each of the first ones with its own schema, then the others."""
-        first = [one.get("prefixItems", []) for one in (old, new)]
-        rest = [one.get("items", True) for one in (old, new)]
+        first = [item.get("prefixItems", []) for item in (old, new)]
+        rest = [item.get("items", True) for item in (old, new)]
         for number in range(max(map(len, first))):
             pair = [some[number] if number < len(some) else other for some, other in zip(first, rest, strict=True)]
-            yield from (replace(one, text=f"[{number}]{one.text}") for one in self.findings(*pair))
-        yield from (replace(one, text=f"[]{one.text}") for one in self.findings(*rest))
+            yield from (replace(finding, text=f"[{number}]{finding.text}") for finding in self.findings(*pair))
+        yield from (replace(finding, text=f"[]{finding.text}") for finding in self.findings(*rest))
 
 
 def _has(schema: Any, word: str) -> bool:
@@ -341,20 +349,20 @@ def change_text(word: str, old: Schema, new: Schema, *, request: bool) -> str:
     before, after = old.get(word), new.get(word)
     if word == "uniqueItems":
         return f": items must {'' if after else 'not '}differ"
-    if all(one is None or isinstance(one, _SIMPLE) for one in (before, after)):
+    if all(item is None or isinstance(item, _SIMPLE) for item in (before, after)):
         return f": {word} {_shown(before)} → {_shown(after)}"
     return f": {word} is {'new' if before is None else 'gone' if after is None else 'another'}"
 
 
 def _values(old: Schema, new: Schema, *, request: bool) -> str:
-    before, after = (one.get("enum", [one["const"]] if "const" in one else None) for one in (old, new))
+    before, after = (item.get("enum", [item["const"]] if "const" in item else None) for item in (old, new))
     if [] in (before, after):
         # the schema `false`
         return f": {'no value is' if after == [] else 'values are'} allowed now"
     if before is None or after is None:
         return f": values {_shown(before)} → {_shown(after)}"
-    fewer = [one for one in before if one not in after]
-    more = [one for one in after if one not in before]
+    fewer = [item for item in before if item not in after]
+    more = [item for item in after if item not in before]
     # Breaking changes come first.
     texts = [f"may no longer be {_shown(fewer)}" if fewer else "", f"may now be {_shown(more)}" if more else ""]
     return " " + ", and ".join(text for text in (texts if request else texts[::-1]) if text)

@@ -337,7 +337,7 @@ def _joined(parts: list[list[Any]]) -> Iterator[Any]:
     found: list[dict[str, Any]] = [{}]
     for values in objects:
         if values:
-            found = [{**one, **other} for one in found for other in values][:_MOST]
+            found = [{**item, **other} for item in found for other in values][:_MOST]
     yield from found
 
 

@@ -140,7 +140,7 @@ class Side:
         target = self._followed(part)
         inner = [*(part.get("allOf") or ()), target] + (target.get("allOf") or [] if isinstance(target, dict) else [])
         return any(
-            isinstance(one, dict) and one.get(self._absent) is True for one in (part, *map(self._followed, inner))
+            isinstance(item, dict) and item.get(self._absent) is True for item in (part, *map(self._followed, inner))
         )
 
     def _followed(self, value: Any) -> Any:
@@ -263,12 +263,12 @@ def alternatives(schema: Any, side: Side, depth: int = 0) -> list[Any]:
     if key is not None and not ({"anyOf", "oneOf", "allOf", "$ref"} - {key}) & given.keys():
         base = {word: value for word, value in given.items() if word != key}
         parts = [plain({"allOf": [base, part]} if base else part, side) for part in given[key]]
-        found = [one for part in parts for one in alternatives(part, side, depth + 1)]
+        found = [alternative for part in parts for alternative in alternatives(part, side, depth + 1)]
         found = found if len(found) <= _MOST else [given]
     return [
-        {**one, "type": kind} if kind else one
-        for one in found
-        for kind in (one["type"] if isinstance(one, dict) and isinstance(one.get("type"), list) else ("",))
+        {**item, "type": kind} if kind else item
+        for item in found
+        for kind in (item["type"] if isinstance(item, dict) and isinstance(item.get("type"), list) else ("",))
     ]
 
 

@@ -49,7 +49,7 @@ def is_http_authentication(document: Schema, operation: Operation) -> bool:
     """Return whether an operation demands credentials by HTTP's own authentication in each alternative."""
     schemes = schemes_of(document)
     kinds = [{schemes.get(name, {}).get("type") for name in names} for names in operation.security]
-    return bool(kinds) and all(_OF_HTTP & one for one in kinds)
+    return bool(kinds) and all(_OF_HTTP & kind for kind in kinds)
 
 
 def without_credentials(document: Schema, given: Collection[Place] = ()) -> Schema:
@@ -68,7 +68,7 @@ def without_credentials(document: Schema, given: Collection[Place] = ()) -> Sche
     def kept(given: Any, taken: Collection[Place]) -> Any:
         if not isinstance(given, dict) or not isinstance(given.get("parameters"), list):
             return given
-        return {**given, "parameters": [one for one in given["parameters"] if _place(document, one) not in taken]}
+        return {**given, "parameters": [item for item in given["parameters"] if _place(document, item) not in taken]}
 
     found = {}
     for path, item in paths.items():

@@ -85,17 +85,19 @@ def _followed(document: Schema, value: Schema) -> Schema:
 
 
 def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
-    own = [_followed(document, one) for one in given.get("parameters", [])]
-    names = {(one["name"], one["in"]) for one in own}
-    parameters = [one for one in shared if (one["name"], one["in"]) not in names] + own
+    own = [_followed(document, item) for item in given.get("parameters", [])]
+    names = {(item["name"], item["in"]) for item in own}
+    parameters = [item for item in shared if (item["name"], item["in"]) not in names] + own
     consumes = given.get("consumes", document.get("consumes", _JSON))
     produces = given.get("produces", document.get("produces", _JSON))
     found = {
         key: value for key, value in given.items() if key not in {"parameters", "responses", "consumes", "produces"}
     }
-    found["parameters"] = [_parameter(one) for one in parameters if one["in"] not in {"body", "formData"}]
-    body = next((one for one in parameters if one["in"] == "body"), None)
-    form = [one for one in parameters if one["in"] == "formData"]
+    found["parameters"] = [
+        _parameter(parameter) for parameter in parameters if parameter["in"] not in {"body", "formData"}
+    ]
+    body = next((parameter for parameter in parameters if parameter["in"] == "body"), None)
+    form = [parameter for parameter in parameters if parameter["in"] == "formData"]
     if body is not None:
         content = {name: {"schema": _renamed(body.get("schema", {}))} for name in consumes or _JSON}
         found["requestBody"] = {"required": body.get("required", False), "content": content}
@@ -140,15 +142,15 @@ def _collection(given: Schema) -> Schema:
 
 
 def _form(fields: list[Schema], consumes: Any) -> Schema:
-    is_multipart = any(one.get("type") == "file" for one in fields) or (
+    is_multipart = any(field.get("type") == "file" for field in fields) or (
         _MULTIPART in consumes and _FORM not in consumes
     )
     schema = {
         "type": "object",
-        "properties": {str(one["name"]): _schema_of(one) for one in fields},
-        "required": [str(one["name"]) for one in fields if one.get("required")],
+        "properties": {str(field["name"]): _schema_of(field) for field in fields},
+        "required": [str(field["name"]) for field in fields if field.get("required")],
     }
-    encoding = {str(one["name"]): _collection(one) for one in fields if one.get("type") == "array"}
+    encoding = {str(field["name"]): _collection(field) for field in fields if field.get("type") == "array"}
     return {
         "required": bool(schema["required"]),
         "content": {_MULTIPART if is_multipart else _FORM: {"schema": schema, "encoding": encoding}},

@@ -154,10 +154,12 @@ def multipart_body(value: dict[str, Any], encoding: Mapping[str, Encoding] | Non
     parts: list[bytes] = []
     for name, item in value.items():
         given = (encoding or {}).get(name, Encoding()).media_type
-        for one in item if isinstance(item, list) and not given.endswith("json") else [item]:
-            is_file = isinstance(one, bytes)
-            as_json = isinstance(one, dict | list) or given.endswith("json")
-            content = one if isinstance(one, bytes) else (json_text(one) if as_json else _plain(one)).encode()
+        for octets in item if isinstance(item, list) and not given.endswith("json") else [item]:
+            is_file = isinstance(octets, bytes)
+            as_json = isinstance(octets, dict | list) or given.endswith("json")
+            content = (
+                octets if isinstance(octets, bytes) else (json_text(octets) if as_json else _plain(octets)).encode()
+            )
             usual = "application/octet-stream" if is_file else "application/json" if as_json else ""
             media_type = given if given and "*" not in given else usual
             head = f'Content-Disposition: form-data; name="{name.translate(_IN_QUOTES)}"'

@@ -139,13 +139,13 @@ class Wsdl:
         found: list[etree._Element] = []
         for root in self.definitions:
             result = root.xpath(path, namespaces=_PREFIXES)
-            found += [one for one in result if etree.iselement(one)] if isinstance(result, list) else []
+            found += [element for element in result if etree.iselement(element)] if isinstance(result, list) else []
         return found
 
     @property
     def soap_address(self) -> str:
         """Return the first soap:address as written, even if the rest is broken; empty if there is none."""
-        written = ((one.get("location") or "").strip() for one in self.all("//s:address"))
+        written = ((element.get("location") or "").strip() for element in self.all("//s:address"))
         return next(filter(None, written), "")
 
     def find(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
@@ -223,7 +223,9 @@ class Wsdl:
 
     @cached_property
     def _judged(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        calls = [(f"{one.name} of port {port.name}", one) for port in self.ports for one in port.operations]
+        calls = [
+            (f"{operation.name} of port {port.name}", operation) for port in self.ports for operation in port.operations
+        ]
         named = [(who, tag) for who, one in calls for tag in (one.request, one.response) if tag]
         faults, notes = gaps(self.documents, self.types, self.location, named)
         return tuple(dict.fromkeys([*faults, *self._reader.faults])), tuple(dict.fromkeys(notes))
@@ -243,7 +245,7 @@ class _Reader:
         """Return the component that a QName in an attribute refers to, or None."""
         if path not in self._by_name:
             self._by_name[path] = {  # of two parts with the same name, the first counts
-                clark(_space_of(one), one.get("name") or ""): one for one in reversed(self._all(path))
+                clark(_space_of(element), element.get("name") or ""): element for element in reversed(self._all(path))
             }
         return self._by_name[path].get(qname(reference, reference.get(attribute)) or "")
 
@@ -277,7 +279,7 @@ class _Reader:
 
     def _ports(self) -> Iterator[SoapPort]:
         for port in self._all("w:service/w:port"):
-            address = next((one for space in _SPACES for one in port.iterfind(clark(space, "address"))), None)
+            address = next((element for space in _SPACES for element in port.iterfind(clark(space, "address"))), None)
             if address is None:
                 continue
             url = address.get("location", "").strip()
@@ -293,7 +295,7 @@ class _Reader:
             operations = tuple(self._operations(binding, soap, kind))
             places = [binding, *([] if port is None else [port])]
             if not wants_addressing(places, self._all("//*[local-name()='Policy']")):
-                operations = tuple(replace(one, addressed="") for one in operations)
+                operations = tuple(replace(operation, addressed="") for operation in operations)
             service = None if port is None else port.getparent()
             envelope = _SPACES[etree.QName(soap).namespace or ""]
             own = name(binding if port is None else port)
@@ -303,7 +305,7 @@ class _Reader:
     def _operations(
         self, binding: etree._Element, soap: etree._Element, kind: etree._Element
     ) -> Iterator[SoapOperation]:
-        abstract = {one.get("name"): one for one in kind.iterfind(clark(WSDL, "operation"))}
+        abstract = {element.get("name"): element for element in kind.iterfind(clark(WSDL, "operation"))}
         for bound in binding.iterfind(clark(WSDL, "operation")):
             declared = abstract.get(bound.get("name"))
             if declared is None:
@@ -349,7 +351,7 @@ class _Reader:
             actions.get("input"),
             actions.get("output"),
             tuple(map(name, messages)),
-            tuple(tuple(map(name, one.iterfind(clark(WSDL, "part")))) for one in messages),
+            tuple(tuple(map(name, element.iterfind(clark(WSDL, "part")))) for element in messages),
             frozenset(self._faults(declared)),
         )
 
@@ -362,7 +364,9 @@ class _Reader:
     def _headers(self, bound: etree._Element) -> Iterator[str]:
         """Yield the tags of the header blocks of a request (WSDL 1.1, 3.7)."""
         for block in [
-            one for space in _SPACES for one in bound.iterfind(f"{clark(WSDL, 'input')}/{clark(space, 'header')}")
+            element
+            for space in _SPACES
+            for element in bound.iterfind(f"{clark(WSDL, 'input')}/{clark(space, 'header')}")
         ]:
             message = self._named("w:message", block, "message")
             for part in message.iterfind(clark(WSDL, "part")) if message is not None else ():
@@ -378,7 +382,7 @@ class _Reader:
         if listed is not None:
             parts = [part for part in parts if part.get("name") in listed.split()]
         elif bound is not None and len(parts) > 1:
-            blocks = {one.get("part") for one in bound.iter("{*}header")}
+            blocks = {element.get("part") for element in bound.iter("{*}header")}
             parts = [part for part in parts if part.get("name") not in blocks]
         if style == "rpc":
             return self._wrapper(wrapper, (body.get("namespace") if body is not None else None) or "", parts)
@@ -402,7 +406,7 @@ def _soap(parent: etree._Element, kind: str) -> etree._Element | None:
     # SOAP with attachments has the body inside a mime:part (WSDL 1.1, 5.9).
     tags = [clark(space, kind) for space in _SPACES]
     found = (parent.find(f"{place}{tag}") for tag in tags for place in ("", f"{_MULTIPART}/{_PART}/"))
-    return next((one for one in found if one is not None), None)
+    return next((element for element in found if element is not None), None)
 
 
 def name(element: etree._Element) -> str:
@@ -515,8 +519,10 @@ def wants_addressing(places: Sequence[etree._Element], policies: Sequence[etree.
         places: the binding, and the port.
         policies: all policies of the WSDL, which those may refer to.
     """
-    wanted = {one.get("URI", "").removeprefix("#") for place in places for one in place.iter("{*}PolicyReference")}
-    named = [one for one in policies if set(one.attrib.values()) & wanted]
+    wanted = {
+        element.get("URI", "").removeprefix("#") for place in places for element in place.iter("{*}PolicyReference")
+    }
+    named = [element for element in policies if set(element.attrib.values()) & wanted]
     marks = (clark(WSAW, "UsingAddressing"), clark(WSAM, "Addressing"))
     return any(_required(mark) for place in (*places, *named) for mark in place.iter(*marks))
 

@@ -211,20 +211,23 @@ def gaps(
         f"{place} could not be read: {reason}. {as_any}" for place, reason in found.missing.items() if place not in gone
     ]
     for space in found.lacking:
-        if not found.imported[space] and any(one.space == space for one in types.unknown):
+        if not found.imported[space] and any(component.space == space for component in types.unknown):
             notes += [f"No location leads to a schema of {space}. {as_any}"]
     if not found.missing:
         faults += [
-            f"its schemas name the {one.kind} {one.tag}, which no document declares"
-            for one in types.unknown
-            if one.space not in found.lacking
+            f"its schemas name the {component.kind} {component.tag}, which no document declares"
+            for component in types.unknown
+            if component.space not in found.lacking
         ]
     faults += [
         f"{who} names the element {tag}, which no schema declares"
         for who, tag in named
         if types.shape(tag) is None and namespace(tag) not in found.lacking
     ]
-    faults += [f"two of its schemas declare the {one.kind} {one.tag}, each in its own way" for one in types.twice]
+    faults += [
+        f"two of its schemas declare the {component.kind} {component.tag}, each in its own way"
+        for component in types.twice
+    ]
     if types.is_11 or (types.problems and all(any(words in one for words in _AMBIGUOUS) for one in types.problems)):
         notes.append(f"Its schemas are ambiguous or XSD 1.1, and one of two validators judges: {types.problems[0]}")
     else:

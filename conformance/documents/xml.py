@@ -156,7 +156,7 @@ class Node:
             return whole
         index, rest = path[0], path[1:]
         if index < 0:
-            given = tuple((one.tag, one.text) for one in new)
+            given = tuple((node.tag, node.text) for node in new)
             return replace(self, attributes=(*self.attributes[:~index], *given, *self.attributes[~index + 1 :]))
         inside = (self.children[index].replaced(rest, *new),) if rest else new
         return replace(self, children=(*self.children[:index], *inside, *self.children[index + 1 :]))

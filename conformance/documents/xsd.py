@@ -144,7 +144,7 @@ class Types:
 
     def _without_unknown_types(self, element: etree._Element) -> etree._Element:
         """Return a copy without any xsi:type whose type no document declares."""
-        alone, spaces = copy.deepcopy(element), {one.space for one in self.unknown}
+        alone, spaces = copy.deepcopy(element), {component.space for component in self.unknown}
         for one in alone.iter(etree.Element):
             prefix, _, name = one.get(_TYPE, "").strip().rpartition(":")
             space = one.nsmap.get(prefix or None)
@@ -168,7 +168,7 @@ def _without_slow_patterns(folder: Path) -> bool:
     found = False
     for path in folder.glob("*.xsd"):
         root = etree.parse(path).getroot()
-        for pattern in [one for one in root.iter(_PATTERN) if _SLOW.search(one.get("value", ""))]:
+        for pattern in [item for item in root.iter(_PATTERN) if _SLOW.search(item.get("value", ""))]:
             parent = pattern.getparent()
             if parent is not None:
                 parent.remove(pattern)
@@ -240,9 +240,9 @@ def _times(model: etree._Element) -> int:
 
 def _patterns(documents: Sequence[SchemaDocument]) -> str:
     total = 0
-    for pattern in [one for document in documents for one in document.root.iter(_PATTERN)]:
+    for pattern in [element for document in documents for element in document.root.iter(_PATTERN)]:
         text = pattern.get("value", "")
-        operators = sum(1 for one in _OPERATOR.finditer(text) if one[1])
+        operators = sum(1 for match in _OPERATOR.finditer(text) if match[1])
         if len(text) > _LONGEST_PATTERN or operators > _MOST_OPERATORS:
             return f"a pattern of {len(text):,} characters and {operators:,} groups, quantifiers and alternatives"
         total += operators
@@ -287,7 +287,7 @@ def _sizes(found: Mapping[Component, etree._Element]) -> str:
         for part in whole.iter(*_PARTICLES, _UNION, _EXTENSION):
             refers = part.tag in {_UNION, _EXTENSION} or (part.tag in _GROUPS and part.get("ref"))
             inner = list(references(part, spaces[whole.getroottree().getroot()], deep=False)) if refers else []
-            yield from (size(one) if one in found else 1 for one in inner)
+            yield from (size(component) if component in found else 1 for component in inner)
             if not refers:
                 yield 1
 

@@ -99,21 +99,27 @@ def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
             made.twice += _declare(known, root, space, drop=outer and len(spaces[document.location]) == 1)
     for document, root in zip(documents, roots, strict=True):
         for space in spaces[document.location]:
-            made.unknown += (one for one in references(root, space) if one not in known and one not in made.unknown)
+            made.unknown += (
+                component
+                for component in references(root, space)
+                if component not in known and component not in made.unknown
+            )
     for root in roots:
-        _import(root, {one.space for one in made.unknown})
+        _import(root, {component.space for component in made.unknown})
     spaces_of = [one.namespace for one in documents]
-    allow_anything(spaces_of, roots, {one.tag for one in made.unknown if one.kind == "type"})
-    for space in dict.fromkeys(one.space for one in made.unknown):
+    allow_anything(spaces_of, roots, {component.tag for component in made.unknown if component.kind == "type"})
+    for space in dict.fromkeys(component.space for component in made.unknown):
         name = f"unknown{len(names)}.xsd"
         names[name] = name
-        (folder / name).write_bytes(stand_ins(space, [one for one in made.unknown if one.space == space], roots))
+        (folder / name).write_bytes(
+            stand_ins(space, [component for component in made.unknown if component.space == space], roots)
+        )
         members.setdefault(space, []).append(name)
     collected = {space: f"namespace{number}.xsd" for number, space in enumerate(sorted(members))}
     for document, root in zip(documents, roots, strict=True):
         _relocate(document, root, collected, names, keep=document.location in inner)
         (folder / names[document.location]).write_bytes(etree.tostring(root))
-    made.unknown = [one for one in made.unknown if one.space != _XML]
+    made.unknown = [component for component in made.unknown if component.space != _XML]
     for space, place in collected.items():
         (folder / place).write_bytes(_schema_of(space, includes=members[space]))
     imports = {space: place for space, place in collected.items() if space}
@@ -147,8 +153,8 @@ def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
 
 def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
     """Return the documents that others redefine, with those they include: no other document may include them."""
-    by_place = {one.location: one for one in documents}
-    waiting = [target for one in documents for target in one.targets(*_REDEFINE)]
+    by_place = {document.location: document for document in documents}
+    waiting = [target for document in documents for target in document.targets(*_REDEFINE)]
     found: set[str] = set()
     while waiting:
         place = waiting.pop()
@@ -162,7 +168,9 @@ def _declare(known: dict[Component, bytes], root: etree._Element, space: str, *,
     """Add a document's components, skip equal ones that exist, and return those that differ."""
     differ: list[Component] = []
     parents = [root, *root.iterchildren(*_REDEFINE)]
-    for child in [one for parent in parents for one in parent.iterchildren(etree.Element) if one.get("name")]:
+    for child in [
+        element for parent in parents for element in parent.iterchildren(etree.Element) if element.get("name")
+    ]:
         component = Component(kind_of(child.tag), space, child.get("name", ""))
         text = etree.tostring(child, method="c14n", exclusive=True)
         if child.getparent() is root and component in known and drop:
@@ -195,7 +203,7 @@ def _import(root: etree._Element, spaces: set[str]) -> None:
     """Let a document import those of some namespaces that it refers to."""
     own = root.get("targetNamespace") or ""
     there = {reference.get("namespace") or "" for reference in root.iterchildren(_IMPORT)}
-    for space in sorted(({one.space for one in references(root, own)} & spaces) - there - {own}):
+    for space in sorted(({component.space for component in references(root, own)} & spaces) - there - {own}):
         root.insert(0, etree.Element(_IMPORT, {"namespace": space} if space else {}))
 
 

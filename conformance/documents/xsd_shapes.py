@@ -179,7 +179,7 @@ def _least(part: Element | Group) -> int:
     """Return the number of elements in a message with the least occurrences, and each optional element once."""
     inner = part.type.content if isinstance(part, Element) and isinstance(part.type, Complex) else None
     items = (part.items[:1] if part.model == "choice" else part.items) if isinstance(part, Group) else (inner,)
-    own = sum(_least(one) for one in items if one is not None) + isinstance(part, Element)
+    own = sum(_least(item) for item in items if item is not None) + isinstance(part, Element)
     return max(part.minimum, 1) * own
 
 
@@ -284,7 +284,7 @@ def _children(declared: Element, value: Mapping[str, Any]) -> Iterator[Node]:
     for child in declared.children:
         given = value.get(local(child.tag))
         if given is not None:
-            yield from (node_of(child, one) for one in (given if isinstance(given, list) else [given]))
+            yield from (node_of(child, item) for item in (given if isinstance(given, list) else [given]))
 
 
 def _text_of_value(value: Any, simple: Simple | None) -> str:

@@ -168,7 +168,7 @@ def _concluded(
     run.unshown = robot.nothing_shown
     remarks += run.remarks
     seen, causes = draw_verdicts(run)
-    remarks += [one["text"] for one in left_out(robot).values()]
+    remarks += [item["text"] for item in left_out(robot).values()]
     remarks += SECRETS.notes
     mask((cause.finding for cause in causes), robot.connection.credentials)
     if run.requirement_set is not None and run.scored is not None:
@@ -217,8 +217,8 @@ def _concluded(
 
 def _all_hold(verdicts: Iterable[Verdict], selection: Selection) -> bool:
     """Return whether a selected requirement passed, and none failed or would keep its class from passing."""
-    own = [one for one in verdicts if selection.has(one.requirement.id)]
-    values = {one.value for one in own}
+    own = [verdict for verdict in verdicts if selection.has(verdict.requirement.id)]
+    values = {verdict.value for verdict in own}
     return Value.PASS in values and not values & {Value.FAIL, Value.ERROR} and not any(map(is_unjudged, own))
 
 

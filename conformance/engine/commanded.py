@@ -137,7 +137,7 @@ def direction_line(number: Commanded) -> str:
 def is_velocity(operation: Operation, numbers: Sequence[Commanded]) -> bool:
     """Return whether an operation commands velocities, by its name or by those of its numbers; else positions."""
     return bool(_DRIVES.search(f"{operation.template} {operation.id}")) or all(
-        FAST.search(one.place) for one in numbers
+        FAST.search(command.place) for command in numbers
     )
 
 
@@ -155,11 +155,11 @@ def commanded_by(operation: Operation) -> list[Commanded]:
     schema = body_schema(operation) or {}
     inside = [(at, at, part) for at, part in numbers_in(schema) if is_axis(at.rpartition("/")[2])]
     found = [
-        (f"{{{one.name}}}", one.name, one.schema)
-        for one in operation.parameters
-        if f"{{{one.name}}}" in operation.template and is_numeric(one.schema) and is_axis(one.name)
+        (f"{{{parameter.name}}}", parameter.name, parameter.schema)
+        for parameter in operation.parameters
+        if f"{{{parameter.name}}}" in operation.template and is_numeric(parameter.schema) and is_axis(parameter.name)
         # Beside numbers in a body, a whole number in the path is an id.
-        if not (inside and one.schema.get("type") == "integer")
+        if not (inside and parameter.schema.get("type") == "integer")
     ]
     found += inside
     velocities = _DRIVES.search(f"{operation.template} {operation.id}")
@@ -176,7 +176,9 @@ def _signs(schema: Schema) -> tuple[str, str, str] | None:
     """Return where a body says in a word which way to go, and the words for both ways."""
     for part in parts_of(schema):
         for name, member in part.get("properties", {}).items():
-            words = {str(one).lower(): str(one) for one in member.get("enum", ())} if isinstance(member, dict) else {}
+            words = (
+                {str(item).lower(): str(item) for item in member.get("enum", ())} if isinstance(member, dict) else {}
+            )
             for positive, negative in _OPPOSITES:
                 if {positive, negative} <= words.keys():
                     return f"/{name}", words[positive], words[negative]

@@ -21,8 +21,8 @@ def compared(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
     """
     connection = Connection()
     descriptions = [
-        _of_result(one) if _is_of_result(one) else fetch_description(one, (), connection, allow_files=allow_files)
-        for one in (old, new)
+        _of_result(text) if _is_of_result(text) else fetch_description(text, (), connection, allow_files=allow_files)
+        for text in (old, new)
     ]
     # The target of an unread reference may have changed, even if the reference did not.
     unread = [

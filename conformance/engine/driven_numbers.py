@@ -53,7 +53,7 @@ def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
 
 def _angles(value: Mapping[str, Any]) -> dict[str, float]:
     """Return the angles of a value that is a quaternion; empty if it is none."""
-    if set(value) != set("xyzw") or not all(isinstance(one, int | float) for one in value.values()):
+    if set(value) != set("xyzw") or not all(isinstance(item, int | float) for item in value.values()):
         return {}
     if abs(math.hypot(*map(float, value.values())) - 1) > _UNIT:
         return {}

@@ -64,13 +64,15 @@ class Plan:
     def told(self) -> Iterator[str]:
         """Yield the planned steps as lines for the user."""
         yield f"{self.drive.label} commands, by its description:"
-        for one in self.numbers:
+        for command in self.numbers:
             declared = (
-                f"{one.declared[0]:g} to {one.declared[1]:g}, as declared" if one.declared else "no limits declared"
+                f"{command.declared[0]:g} to {command.declared[1]:g}, as declared"
+                if command.declared
+                else "no limits declared"
             )
-            yield f"  {one.name:<16} {declared}; tried at {one.little:g}"
-        yield f"Read meanwhile: {', '.join(one.label for one in self.reads)}."
-        far = max(abs(end) for one in self.numbers for end in one.limits)
+            yield f"  {command.name:<16} {declared}; tried at {command.little:g}"
+        yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
+        far = max(abs(end) for command in self.numbers for end in command.limits)
         room = max(ROOM_M, ROOM_S * far)
         driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
         yield f"Then it is judged: {driven if self.is_velocity else 'within the limits of the map that is found'}."
@@ -106,9 +108,10 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
         bodies = ", ".join(chosen.bodies) or "none"
         raise NotPossibleError(f"--drive {drive!r}: its path and body (declared: {bodies}) have no numbers to command")
     if missing := [
-        one.name
-        for one in chosen.parameters
-        if f"{{{one.name}}}" in chosen.template and f"{{{one.name}}}" not in {number.place for number in numbers}
+        parameter.name
+        for parameter in chosen.parameters
+        if f"{{{parameter.name}}}" in chosen.template
+        and f"{{{parameter.name}}}" not in {number.place for number in numbers}
     ]:
         raise NotPossibleError(
             f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}, "
@@ -118,7 +121,7 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
     # A position is read by its name; a number called as a velocity may only repeat what was commanded.
     drives = is_velocity(chosen, numbers)
     named_alike = () if drives else numbers
-    names = frozenset(one.place.strip("{}").rpartition("/")[2].lower() for one in named_alike)
+    names = frozenset(command.place.strip("{}").rpartition("/")[2].lower() for command in named_alike)
     reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
@@ -138,18 +141,24 @@ def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, 
 def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
     """Return the operation in the same folder that is called stop or the like and does not latch."""
     folder = posixpath.dirname(drive.template)
-    for one in operations:
-        named = posixpath.basename(one.template)
-        if posixpath.dirname(one.template) == folder and _STOP.fullmatch(named) and one.method in {"POST", "PUT"}:
-            return None if one.never or one.parameters else one
+    for operation in operations:
+        named = posixpath.basename(operation.template)
+        if (
+            posixpath.dirname(operation.template) == folder
+            and _STOP.fullmatch(named)
+            and operation.method in {"POST", "PUT"}
+        ):
+            return None if operation.never or operation.parameters else operation
     return None
 
 
 def _named(operations: Sequence[Operation], label: str, option: str) -> Operation:
-    labels = named_by([label.strip()], [one.label for one in operations])
-    found = next((one for one in operations if one.label in labels or one.id == label.strip()), None)
+    labels = named_by([label.strip()], [operation.label for operation in operations])
+    found = next(
+        (operation for operation in operations if operation.label in labels or operation.id == label.strip()), None
+    )
     if found is None:
-        near = difflib.get_close_matches(label, [one.label for one in operations], 1, 0)
+        near = difflib.get_close_matches(label, [operation.label for operation in operations], 1, 0)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise NotPossibleError(f"{option} {label!r} is no operation of the description{hint}")
     return found
@@ -168,24 +177,25 @@ def _reads(
         names: of the numbers that it commands, in lower case.
     """
     found = [
-        one
-        for one in operations
-        if one.method == "GET"
-        and rules.decide(one).may
-        and not harmful_words(one)
-        and any(map(is_json, one.formats))
-        and not any(item.required and item.name not in values for item in one.parameters)
+        operation
+        for operation in operations
+        if operation.method == "GET"
+        and rules.decide(operation).may
+        and not harmful_words(operation)
+        and any(map(is_json, operation.formats))
+        and not any(item.required and item.name not in values for item in operation.parameters)
     ]
     filled_in = [
-        replace(one, template=re.sub(r"\{([^{}]+)\}", lambda name: values[name[1]], one.template)) for one in found
+        replace(operation, template=re.sub(r"\{([^{}]+)\}", lambda name: values[name[1]], operation.template))
+        for operation in found
     ]
     beside = posixpath.dirname(drive)
     yield from sorted(
         filled_in,
-        key=lambda one: (
-            -len(names & {at.rpartition("/")[2].lower() for at, _ in numbers_in(one.shape or {})}),
-            not one.template.startswith(f"{beside.rstrip('/')}/"),
-            not _STATE.search(f"{one.template.removeprefix(beside)} {one.id}"),
+        key=lambda operation: (
+            -len(names & {at.rpartition("/")[2].lower() for at, _ in numbers_in(operation.shape or {})}),
+            not operation.template.startswith(f"{beside.rstrip('/')}/"),
+            not _STATE.search(f"{operation.template.removeprefix(beside)} {operation.id}"),
         ),
     )
 
@@ -209,7 +219,7 @@ class Finder(ABC):
         self._api, self._binding, self._plan, self._clock = api, binding, plan, clock
         self._looks, self._turn = Looks(), 0
         schema = body_schema(plan.drive)
-        named = {place: value for one in plan.numbers for place, value in one.templates.items()}
+        named = {place: value for command in plan.numbers for place, value in command.templates.items()}
         self._body = template_of(schema, named) if schema is not None else None
         self._reads = list(plan.reads)
         self._found = Found()
@@ -253,11 +263,11 @@ class Finder(ABC):
 
     def _command(self, values: Mapping[str, float]) -> Exchange:
         """Command some numbers; the others are 0, or as near as their limits allow."""
-        zero = {one.name: min(max(0.0, one.limits[0]), one.limits[1]) for one in self._plan.numbers}
+        zero = {command.name: min(max(0.0, command.limits[0]), command.limits[1]) for command in self._plan.numbers}
         written = {**zero, **values, "seconds": self.seconds}
-        for one in self._plan.numbers:
-            if one.schema.get("type") == "integer":
-                written[one.name] = round(written[one.name])
+        for command in self._plan.numbers:
+            if command.schema.get("type") == "integer":
+                written[command.name] = round(written[command.name])
         try:
             return self._send(filled(self._plan.drive.label, written), filled(self._body, written))
         except NoValueError as error:

@@ -94,7 +94,10 @@ def write_described_statement(
             values="".join(f"{line}\n" for line in _values(operations)) or "# id = [1, 2]\n",
             ros=_ROS
             + "".join(
-                f"{line}\n" for line in ros([one for one in operations if one.method != "GET" or rules.decide(one).may])
+                f"{line}\n"
+                for line in ros(
+                    [operation for operation in operations if operation.method != "GET" or rules.decide(operation).may]
+                )
             )
             if ros
             else "",
@@ -114,7 +117,7 @@ def _motion(operations: Sequence[Operation]) -> list[str]:
 
 def _api(folder: Path, found: Description, api: Api) -> Iterator[str]:
     yield f"openapi = {basic_string(_beside(folder, found.source))}"
-    overlays = ", ".join(basic_string(_beside(folder, one)) for one in api.overlays)
+    overlays = ", ".join(basic_string(_beside(folder, overlay)) for overlay in api.overlays)
     yield f"overlays = [{overlays}]" if overlays else '# overlays = ["overlay.yaml"]  # OpenAPI Overlays to apply to it'
     if api.base_url:
         yield f"base_url = {basic_string(api.base_url)}"

@@ -71,7 +71,7 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
         yield ""
         yield "[motion.goto]"
         yield from _sent(goes)
-        if any(one.is_relative for one in goes.places.values()):
+        if any(command.is_relative for command in goes.places.values()):
             yield "relative = true"
         yield "tolerance = 0.05"
         yield from _stop(operations, goes.sent)
@@ -91,15 +91,16 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
 
 def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
     """Yield a sentence on each operation that may move the device, where no map is proposed."""
-    for one in operations:
-        numbers = [] if one.safe else commanded_by(one)
-        if one.safe or not (_GOES.search(one.label) or (numbers and is_velocity(one, numbers))):
+    for operation in operations:
+        numbers = [] if operation.safe else commanded_by(operation)
+        if operation.safe or not (_GOES.search(operation.label) or (numbers and is_velocity(operation, numbers))):
             continue
-        if one.never or not numbers:
-            yield f"{one.label}: {'it must never be called' if one.never else 'it takes no numbers'}."
+        if operation.never or not numbers:
+            yield f"{operation.label}: {'it must never be called' if operation.never else 'it takes no numbers'}."
             continue
         named = ", ".join(number.name for number in numbers)
-        yield f"{one.label}: no GET tells numbers called {named}; --drive '{one.label}' finds what shows them."
+        way = f"--drive '{operation.label}' finds what shows them"
+        yield f"{operation.label}: no GET tells numbers called {named}; {way}."
 
 
 def _sent(pair: _Pair) -> Iterator[str]:
@@ -107,8 +108,8 @@ def _sent(pair: _Pair) -> Iterator[str]:
     yield f"send = {basic_string(pair.sent.label)}"
     schema, numbers = body_schema(pair.sent), list(pair.places.values())
     if schema is not None:
-        yield f"body = {inline(template_of(schema, {one.place: f'{{{one.name}}}' for one in numbers}))}"
-    yield from (direction_line(one) for one in numbers if one.direction)
+        yield f"body = {inline(template_of(schema, {command.place: f'{{{command.name}}}' for command in numbers}))}"
+    yield from (direction_line(command) for command in numbers if command.direction)
 
 
 def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
@@ -139,9 +140,9 @@ def _best(
     for state in reading:
         told = [at for at, _ in numbers_in(state.shape or {})]
         for sent, numbers in sending:
-            places = {at: one for one in numbers if (at := place_of(one, told)) is not None}
+            places = {at: command for command in numbers if (at := place_of(command, told)) is not None}
             found.append(_Pair(state, sent, places))
-    best = max(found, key=lambda one: len(one.places), default=None)
+    best = max(found, key=lambda pair: len(pair.places), default=None)
     return best if best and best.places else None
 
 

@@ -161,15 +161,21 @@ def proposed_ros_map(
     followers: set[str] = set()
     written: set[str] = set()
     # Topics that the gateway publishes come first: another operation hardly reads one of them.
-    for one in sorted(operations, key=lambda item: item.method == "GET"):
-        if "{" in one.template:
+    for operation in sorted(operations, key=lambda item: item.method == "GET"):
+        if "{" in operation.template:
             continue
-        if one.method in _SENDS:
-            proposal = _goal(one, operations, graph, followers) or _call(one, graph) or _topic(one, graph, written)
+        if operation.method in _SENDS:
+            proposal = (
+                _goal(operation, operations, graph, followers)
+                or _call(operation, graph)
+                or _topic(operation, graph, written)
+            )
         else:
-            proposal = _lists(one, graph, read.get(one.label)) or _topic(one, graph, written, read.get(one.label))
+            proposal = _lists(operation, graph, read.get(operation.label)) or _topic(
+                operation, graph, written, read.get(operation.label)
+            )
         if proposal:
-            found[one.label] = proposal
+            found[operation.label] = proposal
             written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
     sure = [one for one in found.values() if not one.guess]
     sign = "" if sure else "# "
@@ -180,14 +186,15 @@ def proposed_ros_map(
         yield from (f"{name} = {basic_string(form)}" for form in forms if len(forms) == 1)
     yield ""
     yield f"{sign}[ros.operations]"
-    for one in operations:
-        if one.label in found:
-            proposal = found[one.label]
+    for operation in operations:
+        if operation.label in found:
+            proposal = found[operation.label]
             comment = "# " if proposal.guess else ""
             yield from [f"# A guess: {proposal.guess}"] if proposal.guess else []
-            yield f"{comment}{basic_string(one.label)} = {inline(proposal.keys)}"
-        elif one.label not in followers:
-            yield f"# {''.join(char if char.isprintable() else ' ' for char in one.label)}: {_why_not(one, graph)}"
+            yield f"{comment}{basic_string(operation.label)} = {inline(proposal.keys)}"
+        elif operation.label not in followers:
+            label = "".join(char if char.isprintable() else " " for char in operation.label)
+            yield f"# {label}: {_why_not(operation, graph)}"
 
 
 def _why_not(one: Operation, graph: Graph) -> str:
@@ -319,7 +326,7 @@ def _places(schema: Schema) -> dict[str, dict[str, Schema]]:
     """Return each object in a schema by its position: the fields below it, by their positions in it."""
     leaves = dict(_leaves(schema))
     steps = [at.split("/")[:-1] for at in leaves]
-    places = sorted({"/".join(one[:end]) for one in steps for end in range(1, len(one) + 1)})
+    places = sorted({"/".join(step[:end]) for step in steps for end in range(1, len(step) + 1)})
     return {
         place: {at.removeprefix(place): leaf for at, leaf in leaves.items() if at.startswith(f"{place}/")}
         for place in places[:_PLACES]

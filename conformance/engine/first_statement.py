@@ -125,7 +125,7 @@ def _doubts(robot: RobotUnderTest) -> dict[str, str]:
         for name, missing in robot.run.statement.lacking(robot.run.contract).items()
     }
     for name, item in robot.run.contract.classes.items():
-        silent = [one for one in item.interfaces if one in unreached]
+        silent = [interface for interface in item.interfaces if interface in unreached]
         if silent:
             doubts.setdefault(name, f"{' and '.join(silent)} did not answer")
     doubts = {**robot.device.doubts, **doubts}

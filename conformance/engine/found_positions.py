@@ -66,21 +66,21 @@ class PositionFinder(Finder):
         """Return the map; see Finder.found()."""
         self._refused: list[str] = []
         self._watch(_BEFORE_S)
-        counts = {one.label: self._named_places(one.label) for one in self._reads}
+        counts = {operation.label: self._named_places(operation.label) for operation in self._reads}
         read = max(counts, key=lambda label: (len(counts[label]), self._is_called_alike(label)))
         if not counts[read]:
-            wanted = ", ".join(one.name for one in self._plan.numbers)
+            wanted = ", ".join(command.name for command in self._plan.numbers)
             raise NotPossibleError(
                 f"{self._plan.drive.label} takes {wanted}, and {', '.join(counts)} tell no number of such a name: "
                 "give --read, or write a map (docs/motion.md)"
             )
-        self._reads = [one for one in self._reads if one.label == read]
-        self._relative = all(one.is_relative for one in self._plan.numbers if one.name in counts[read])
+        self._reads = [operation for operation in self._reads if operation.label == read]
+        self._relative = all(command.is_relative for command in self._plan.numbers if command.name in counts[read])
         schemas = dict(numbers_in(self._reads[0].shape or {}))
         self._schemas = {name: schemas.get(place, {}) for name, place in counts[read].items()}
         # Optional inputs are left out, so that other parts of the robot stay where they are.
         schema = body_schema(self._plan.drive)
-        named = {one.place: f"{{{one.name}}}" for one in self._plan.numbers if one.name in counts[read]}
+        named = {command.place: f"{{{command.name}}}" for command in self._plan.numbers if command.name in counts[read]}
         self._body = None if schema is None else template_of(schema, named)
         begun = self._clock.now() - _BEFORE_S
         start = {
@@ -111,7 +111,7 @@ class PositionFinder(Finder):
     def _is_called_alike(self, operation: str) -> bool:
         """Return whether an operation is called as something that is commanded."""
         called = operation.rpartition("/")[2].lower()
-        return any(one.place.strip("{}").rpartition("/")[2].lower() == called for one in self._plan.numbers)
+        return any(command.place.strip("{}").rpartition("/")[2].lower() == called for command in self._plan.numbers)
 
     def _named_places(self, operation: str) -> dict[str, str]:
         """Return the places of an operation's numbers, by the name of the commanded number they share."""
@@ -119,12 +119,12 @@ class PositionFinder(Finder):
         for number in self._plan.numbers:
             words = number.place.strip("{}").split("/")
             own = words[-1].lower()
-            same = [one for one in places if one.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
-            same = same or [one for one in places if not FAST.search(one) and axis_of(one) == axis_of(own)]
+            same = [place for place in places if place.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
+            same = same or [place for place in places if not FAST.search(place) and axis_of(place) == axis_of(own)]
             if own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
-                same += [one for one in places if one.lower() in {"", "/value", f"/{own}/value"}]
+                same += [place for place in places if place.lower() in {"", "/value", f"/{own}/value"}]
             # Of several members, prefer the one whose path is most like the command's.
-            same.sort(key=lambda one: (bool(ECHO.search(one)), -len(set(words) & set(one.split("/")))))
+            same.sort(key=lambda text: (bool(ECHO.search(text)), -len(set(words) & set(text.split("/")))))
             if same and same[0] not in found.values():
                 found[number.name] = same[0]
         return found
@@ -150,11 +150,11 @@ class PositionFinder(Finder):
                 break
             found = Moved(
                 tries[0].place,
-                max(one.took_s for one in tries),
-                max(one.off for one in tries),
-                max(one.sigma for one in tries),
+                max(move.took_s for move in tries),
+                max(move.off for move in tries),
+                max(move.sigma for move in tries),
                 little,
-                tuple(one.ways[0] for one in tries),
+                tuple(move.ways[0] for move in tries),
             )
         if found is None:
             self._found.notes.append(f"{number.name} stays where it is: {why}.")
@@ -193,7 +193,7 @@ class PositionFinder(Finder):
 
         def is_there() -> bool:
             last = [value for _, value in self._looks.samples(read, place, sent)[-SEVERAL:]]
-            return len(last) == SEVERAL and all(abs(one - goal) < near for one in last)
+            return len(last) == SEVERAL and all(abs(number - goal) < near for number in last)
 
         while self._clock.now() < sent + _MOVES_S and not is_there():
             self._look()
@@ -208,13 +208,13 @@ class PositionFinder(Finder):
         if abs(ends[number.name] - goal) > near:
             return f"sent to {goal:.4g}, it came to {ends[number.name]:.4g}"
         for name, end in ends.items():
-            own = next(one.little for one in self._plan.numbers if one.name == name)
+            own = next(command.little for command in self._plan.numbers if command.name == name)
             if name != number.name and abs(end - start[name]) > max(_FOLLOWS * own, _FOLLOWS * abs(way)):
                 return f"with it {name} went from {start[name]:.4g} to {end:.4g}"
         return Moved(place, took_s, abs(ends[number.name] - goal), sigma, abs(way), (way,))
 
     def _goto_lines(self, read: str, start: Mapping[str, float], moved: Mapping[str, Moved]) -> Iterator[str]:
-        numbers = {one.name: one for one in self._plan.numbers if one.name in moved}
+        numbers = {command.name: command for command in self._plan.numbers if command.name in moved}
         still = {name: round(start[name], 5) for name in start.keys() - moved.keys()}
         yield "[motion.state]"
         yield f"read = {string(read)}"
@@ -246,14 +246,14 @@ class PositionFinder(Finder):
         if self._relative:
             yield "relative = true"
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'
-        slowest = max(one.took_s for one in moved.values())
+        slowest = max(move.took_s for move in moved.values())
         if lasts:
             settle_s = max(0.5, slowest - self.seconds + 0.3)
             yield f"seconds = {self.seconds}  # the suite's: the duration that it asks for"
             yield f"settle_s = {settle_s:.2f}  # seen: a move of {self.seconds} s took {slowest:.2f} s"
         else:
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
-        off = max(max(2 * one.off, 8 * one.sigma) for one in moved.values())
+        off = max(max(2 * move.off, 8 * move.sigma) for move in moved.values())
         yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
         if REFUSED & self._plan.drive.responses.keys() and all(map(self._limits, numbers.values())):
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'

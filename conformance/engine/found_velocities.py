@@ -50,7 +50,9 @@ class VelocityFinder(Finder):
             shown = self._measured(responses)
             name, (place, response) = next(iter(shown.items()))
             settle_s = self._settle_s
-            hold_s = self._hold_s(next(one for one in self._plan.numbers if one.name == name), place, response)
+            hold_s = self._hold_s(
+                next(command for command in self._plan.numbers if command.name == name), place, response
+            )
         finally:
             self._command({})
         self._found.lines = list(self._lines(responses, shown, settle_s, hold_s))
@@ -167,7 +169,7 @@ class VelocityFinder(Finder):
         }
         read = max(counts, key=lambda label: counts[label])
         if not counts[read]:
-            tried = ", ".join(f"{one.name} at {one.little:g}" for one in self._plan.numbers)
+            tried = ", ".join(f"{command.name} at {command.little:g}" for command in self._plan.numbers)
             raise NotPossibleError(
                 f"{self._plan.drive.label} was accepted ({tried}), and no number of {', '.join(counts)} changed with it"
             )
@@ -176,8 +178,10 @@ class VelocityFinder(Finder):
             name: {place: one for (operation, place), one in given.items() if operation == read}
             for name, given in responses.items()
         }
-        turns = {one.name for one in self._plan.numbers if one.turns and own[one.name]}
-        shown = {one.name: self._shown(one, own[one.name], turning=bool(turns)) for one in self._plan.numbers}
+        turns = {command.name for command in self._plan.numbers if command.turns and own[command.name]}
+        shown = {
+            command.name: self._shown(command, own[command.name], turning=bool(turns)) for command in self._plan.numbers
+        }
         if turns and not any(shown[name] for name in shown.keys() - turns):
             # A drive shows one direction only: without turning, the direction ahead.
             ahead = {name: self._shown_as_position(own[name]) for name in shown.keys() - turns}
@@ -258,7 +262,7 @@ class VelocityFinder(Finder):
         hold_s: float | None,
     ) -> Iterator[str]:
         """Yield the lines of the map, each figure with where it comes from."""
-        read, numbers = self._reads[0].label, {one.name: one for one in self._plan.numbers}
+        read, numbers = self._reads[0].label, {command.name: command for command in self._plan.numbers}
         places = {
             place: one
             for name in shown
@@ -287,7 +291,7 @@ class VelocityFinder(Finder):
         yield ""
         yield "[motion.velocity]"
         yield f"send = {string(self._plan.drive.label)}"
-        still = {one.name: 0 for one in self._plan.numbers if one.name not in shown}
+        still = {command.name: 0 for command in self._plan.numbers if command.name not in shown}
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in shown}
             yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1}))}"

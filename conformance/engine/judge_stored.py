@@ -73,7 +73,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     for evidence in run.judge.evidence.values():
         # Parts that need an experiment cannot be judged again from records.
         evidence.parts = {part: cases for part, cases in evidence.parts.items() if cases}
-    judged = tuple(one for one in draw_verdicts(run)[0] if one.evidence.cases)
+    judged = tuple(verdict for verdict in draw_verdicts(run)[0] if verdict.evidence.cases)
     return Judged(judged, requests, ended, tuple(run.judge.faults), lacking)
 
 
@@ -121,9 +121,9 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Lis
     device = api.device if api is not None else device_of(run)
     yield CheckerListener(run.judge, device.checkers(api, services), by_rule=False)
     if api is not None:
-        checkers.append(RestCheckers(run.contract, api.client.base_url, [one.endpoint for one in services]))
+        checkers.append(RestCheckers(run.contract, api.client.base_url, [service.endpoint for service in services]))
     if services:
-        checkers.append(SoapCheckers({one.endpoint: answers_of(one.contract) for one in services}))
+        checkers.append(SoapCheckers({service.endpoint: answers_of(service.contract) for service in services}))
     if (found := services_of(run.contract)) is not None:
         checkers.append(SoapMemory(found))
     yield CheckerListener(run.judge, checkers)

@@ -220,7 +220,9 @@ class LostDevice:
         problems: dict[NoAnswer | None, str] = {
             NoAnswer.TIMEOUT: f"no response within {self._connection.timeout_s:g} s",
             None: "no connection after the response to this request",
-            **{one: f"a gateway responded {one} in the device's place" for one in OF_GATEWAY.values()},
+            **{
+                no_answer: f"a gateway responded {no_answer} in the device's place" for no_answer in OF_GATEWAY.values()
+            },
         }
         problem = problems.get(kind, "the server closed the connection without a response")
         operation = self._operation_of(last)
@@ -265,7 +267,7 @@ def _suspects(recent: Sequence[Sending]) -> tuple[list[Request], NoAnswer | None
     end = unanswered[0] if unanswered else first - 1
     if end < 0:
         return [], None
-    return [one.request for one in recent[: end + 1]], recent[end].kind
+    return [sending.request for sending in recent[: end + 1]], recent[end].kind
 
 
 def _named(request: Request) -> str:

@@ -37,9 +37,11 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
     The picture is what ``reports`` calls the drive or move: its name in the traces.
     """
     judged = {
-        one.requirement.id.removeprefix(f"{MOTION}/"): one for one in verdicts if one.requirement.class_ == MOTION
+        verdict.requirement.id.removeprefix(f"{MOTION}/"): verdict
+        for verdict in verdicts
+        if verdict.requirement.class_ == MOTION
     }
-    if motion is None or all(one.value is Value.NOT_CLAIMED for one in judged.values()):
+    if motion is None or all(verdict.value is Value.NOT_CLAIMED for verdict in judged.values()):
         return []
     figures = (_moves, _stops, _vanishes, _refuses)
     found = []
@@ -55,20 +57,20 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
             value, said = "no", said.removeprefix("no: ")
         elif value == "not seen" and said != _NO_LIMITS:
             # A requirement that could not be tried says more than one that the map does not declare.
-            tried = sorted(own, key=lambda one: one.value is Value.NOT_CLAIMED)
-            said = next((one.reason for one in tried if one.reason), "") or said or "nothing was tried"
+            tried = sorted(own, key=lambda verdict: verdict.value is Value.NOT_CLAIMED)
+            said = next((verdict.reason for verdict in tried if verdict.reason), "") or said or "nothing was tried"
         found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
     return found
 
 
 def _answer(verdicts: Sequence[Verdict]) -> str:
-    values = {one.value for one in verdicts}
+    values = {verdict.value for verdict in verdicts}
     return "no" if values & _BROKEN else "yes" if "pass" in values else "not seen"
 
 
 def _fault(verdicts: Sequence[Verdict], picture: str) -> tuple[str, str]:
     """Return the first finding's expected and observed texts, and its picture."""
-    findings = [one for item in verdicts if item.value in _BROKEN for one in item.evidence.findings.values()]
+    findings = [finding for item in verdicts if item.value in _BROKEN for finding in item.evidence.findings.values()]
     if not findings:
         return "", picture
     said = f"{findings[0].observed}; expected {findings[0].expected}"
@@ -84,7 +86,7 @@ def _parts(recordings: Recordings, *scenarios: Scenario) -> Iterator[Any]:
 
 
 def _drives(recordings: Recordings, *scenarios: Scenario) -> list[Drive]:
-    return [one for one in _parts(recordings, *scenarios) if isinstance(one, Drive)]
+    return [drive for drive in _parts(recordings, *scenarios) if isinstance(drive, Drive)]
 
 
 def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
@@ -93,7 +95,7 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     count = 0
     for drive in _drives(recordings, velocities):
         begun = drive.settled(motion.velocity.settle_s if motion.velocity else 0.0)
-        seen = [one for one in drive.under_way if one.sent >= begun]
+        seen = [reading for reading in drive.under_way if reading.sent >= begun]
         for name, wanted in drive.wanted.items():
             found = measured(seen, name, motion) if wanted else None
             if found is not None:
@@ -117,7 +119,7 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
 
 def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     """Return how long a device took to rest at most."""
-    ended = [(one, one.end) for one in _drives(recordings, velocities) if one.end is not None]
+    ended = [(drive, drive.end) for drive in _drives(recordings, velocities) if drive.end is not None]
     took = [(took_s, one.what) for one, end in ended if (took_s := _rested_s(one, end.answered, motion)) is not None]
     if took:
         longest, what = max(took)
@@ -125,7 +127,7 @@ def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
             f"it went on for {max(0.0, longest):.2f} s after velocity 0 at most, in {counted(len(took), 'drive')}",
             what,
         )
-    stopped = [one for one in _parts(recordings, stops) if isinstance(one, Leg)]
+    stopped = [leg for leg in _parts(recordings, stops) if isinstance(leg, Leg)]
     return (f"stopped under way {counted(len(stopped), 'time')}", stopped[0].what) if stopped else ("", "")
 
 
@@ -161,13 +163,15 @@ def _drives_on(drive: Drive, motion: MotionMap) -> bool:
 
 def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
     """Return how long after a moment a device came to rest, s, by its remaining way; None if that was not seen."""
-    name = max(drive.wanted, key=lambda one: abs(drive.wanted[one]), default="")
+    name = max(drive.wanted, key=lambda text: abs(drive.wanted[text]), default="")
     speed = motion.velocity.axes.get(name) if motion.velocity else None
     if speed is None or not drive.under_way or len(drive.after) < SEVERAL:
         return None
     if not speed.of:
         moving = [
-            one.received for one in drive.after if abs(one.speeds.get(name, 0.0)) > _DRIVES_ON * abs(drive.wanted[name])
+            reading.received
+            for reading in drive.after
+            if abs(reading.speeds.get(name, 0.0)) > _DRIVES_ON * abs(drive.wanted[name])
         ]
         return max(moving) - since if moving else 0.0 if drive.after[0].sent - since < 0.1 else None  # noqa: PLR2004
     under_way, after = _samples(drive.under_way, speed.of), _samples(drive.after, speed.of)
@@ -176,25 +180,25 @@ def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
         return None
     end = sorted(value for _, value in after[-SEVERAL:])[SEVERAL // 2]
     # Use the middle of the last readings while moving, because a single one has noise.
-    there = sorted(under_way[-SEVERAL:], key=lambda one: one[1])[SEVERAL // 2]
+    there = sorted(under_way[-SEVERAL:], key=lambda pair: pair[1])[SEVERAL // 2]
     return there[0] + (end - there[1]) / rate - since
 
 
 def _samples(readings: Sequence[Reading], axis: str) -> list[Sample]:
-    return [((one.sent + one.received) / 2, one.values[axis]) for one in readings if one.values]
+    return [((reading.sent + reading.received) / 2, reading.values[axis]) for reading in readings if reading.values]
 
 
 def _refuses(_motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     """Return how many targets and velocities beyond the limits were refused."""
     tried = [
-        one
+        attempt
         for quiet in _parts(recordings, attempts_at_rest)
         if isinstance(quiet, Quiet)
-        for one in quiet.tried
-        if one.kind == "beyond" and one.exchange is not None
+        for attempt in quiet.tried
+        if attempt.kind == "beyond" and attempt.exchange is not None
     ]
     if not tried:
         clamped = next(_parts(recordings, clamped_targets, clamped_velocities), None)
         return ("they are clamped" if clamped else _NO_LIMITS), ""
-    refused = sum(not one.exchange.response.ok for one in tried if one.exchange)
+    refused = sum(not attempt.exchange.response.ok for attempt in tried if attempt.exchange)
     return f"{refused} of {len(tried)} beyond the limits were refused, the first {tried[0].what}", ""

@@ -128,7 +128,7 @@ def _asks(request: Request) -> bool:
     except NotSoapError:
         return False
     places, questions = _questions()
-    asked = {str(one.tag) for one in message.payload}
+    asked = {str(element.tag) for element in message.payload}
     return urlsplit(request.url).path in places and len(message.payload) == 1 and asked <= questions
 
 

@@ -102,7 +102,7 @@ def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
             finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request), response=response)
         elif finding.exchange is not None:
             finding.exchange = finding.exchange._replace(request=masked(finding.exchange.request))
-        finding.sequence = tuple(one._replace(request=masked(one.request)) for one in finding.sequence)
+        finding.sequence = tuple(message._replace(request=masked(message.request)) for message in finding.sequence)
         for label, one in finding.operations.items():
             finding.operations[label] = one._replace(request=one.request and masked(one.request))
 
@@ -289,4 +289,4 @@ def fails_by_description(contract: Contract, base_url: str, requirement: str, ex
         return False
     trace = (exchange,) if requirement == SECURITY else Survey((Probe(operation.label, Kind.USUAL, exchange=exchange),))
     run = Run(empty_statement(contract), contract)
-    return any(isinstance(one, Case) and not one.holds for one in rule.outcomes(trace, {"run": run}.__getitem__))
+    return any(isinstance(case, Case) and not case.holds for case in rule.outcomes(trace, {"run": run}.__getitem__))

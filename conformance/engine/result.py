@@ -161,7 +161,7 @@ def left_out(robot: RobotUnderTest) -> dict[str, Any]:
 def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:
     """Return the verdicts on the web server, under their key; empty if they are in the verdict, or none was judged."""
     found = web_server(aside, robot.rest.server if robot.rest else "")
-    return {"web_server": {**found, "requirements": [_requirement(one) for one in aside]}} if found else {}
+    return {"web_server": {**found, "requirements": [_requirement(verdict) for verdict in aside]}} if found else {}
 
 
 def _shown(value: Any) -> Any:

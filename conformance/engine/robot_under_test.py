@@ -130,7 +130,7 @@ class RobotUnderTest:
         self.connection.overload.ended = self._end
         self._connect_rest()
         self._connect_soap()
-        kinds = [one.kind for one in self.connection.recent]
+        kinds = [sending.kind for sending in self.connection.recent]
         # The robot was there, and one of the first requests was too much for it.
         lost = not self.reached and NoAnswer.CLOSED in kinds and kinds[-1] is NoAnswer.REFUSED
         if lost and self.alive():
@@ -143,7 +143,11 @@ class RobotUnderTest:
         ros = self.run.statement.ros_map
         client = HttpClient(where.rest, self.connection)
         if ros is not None and ros.rosbridge:
-            published = {one.publishes: one.type for one in ros.operations.values() if isinstance(one, Publishes)}
+            published = {
+                publishes.publishes: publishes.type
+                for publishes in ros.operations.values()
+                if isinstance(publishes, Publishes)
+            }
             client = BridgeClient(where.rest, self.connection, published)
         self.rest = RestInterface(self.run, client, self.alive)
         if self.run.statement.motion_map is not None and self.run.allow_motion:
@@ -333,7 +337,7 @@ class RobotUnderTest:
         # Imported late: the survey and what it needs cost time that --help need not pay.
         from conformance.scenarios.estimate import estimate  # noqa: PLC0415
 
-        operations = [one for one in operations_of(run.contract) if CallRules.of(run).decide(one).may]
+        operations = [operation for operation in operations_of(run.contract) if CallRules.of(run).decide(operation).may]
         # The first requests call no WSDL operation, so they do not show its response time.
         measured = measured and SOAP not in run.contract.classes
         said = estimate(run, operations).text(run.effort.usual_ms if measured else None)
@@ -368,7 +372,7 @@ class RobotUnderTest:
         # Several targets, because one endpoint that hangs does not mean a dead robot; the one that last responded comes
         # first.
         targets = [("GET", path), ("OPTIONS", path), ("GET", "/")]
-        for method, target in sorted(targets, key=lambda one: one != self._answered):
+        for method, target in sorted(targets, key=lambda pair: pair != self._answered):
             try:
                 client.send(method, target, fresh=True, timeout_s=min(self._grace_s, self.connection.timeout_s))
             except NoAnswerError as none:

@@ -56,8 +56,13 @@ class RosEnds:
 
     def document(self, findings: Iterable[Finding]) -> list[dict[str, Any]]:
         """Return a row for each operation: its end on ROS, how many cases were judged, and the first finding."""
-        of_ros = sorted((one for one in findings if one.requirement.startswith(f"{ROS}/")), key=lambda one: one.number)
-        return list(self._rows([(one, self._calls(one.exchange.request)) for one in of_ros if one.exchange]))
+        of_ros = sorted(
+            (finding for finding in findings if finding.requirement.startswith(f"{ROS}/")),
+            key=lambda finding: finding.number,
+        )
+        return list(
+            self._rows([(finding, self._calls(finding.exchange.request)) for finding in of_ros if finding.exchange])
+        )
 
     def _rows(self, findings: list[tuple[Finding, list[str]]]) -> Iterator[dict[str, Any]]:
         for call, one in self._ros.operations.items():

@@ -82,8 +82,8 @@ def known(pack: str | None = None) -> dict[str, Any]:
     """Return the facts with which a verifier checks this suite's certificates: digests, sets, ledger, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
     sets = {
-        one.name: one
-        for one in (current(contract, contract.ledger), *map(partial(load_set, contract), names(contract)))
+        set_.name: set_
+        for set_ in (current(contract, contract.ledger), *map(partial(load_set, contract), names(contract)))
     }
     return {
         "suite": suite_digest(contract),

@@ -47,10 +47,12 @@ def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
         verdicts: on the rules of the class.
         server: the value of the Server field; empty: the server sends none.
     """
-    judged = [one for one in verdicts if one.evidence.cases]
+    judged = [verdict for verdict in verdicts if verdict.evidence.cases]
     if not judged:
         return {}
-    failed = {one.requirement.id: one.requirement for one in judged if one.value in {Value.FAIL, Value.WARN}}
+    failed = {
+        verdict.requirement.id: verdict.requirement for verdict in judged if verdict.value in {Value.FAIL, Value.WARN}
+    }
     tricked = [id_ for id_ in failed if id_ in _known().smuggling]
     text = " ".join(_sentences(failed.values(), len(judged), tricked, server))
     return {"server": server or None, "text": text, "smuggling": tricked}
@@ -62,14 +64,14 @@ def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str],
         yield f"Its web server, {name}, meets each of the {counted(judged, 'rule')} judged."
         return
     count = f"{len(failed)} of {counted(judged, 'rule')}"
-    named = ", ".join(f"{one.id} ({one.level}, {one.source})" for one in failed)
+    named = ", ".join(f"{requirement.id} ({requirement.level}, {requirement.source})" for requirement in failed)
     yield f"Its web server, {name}, does not meet {count}: {named}."
     if tricked:
         yield (
             f"This weighs most behind a proxy or a firewall: {', '.join(tricked)}. Where two servers read such a "
             "request differently, a client can hide a second request in it (request smuggling)."
         )
-    yield from _remedies([one.id for one in failed], server)
+    yield from _remedies([requirement.id for requirement in failed], server)
     yield "Most often the server does this, not the API, and the verdict stays; --class web-server judges by it."
 
 

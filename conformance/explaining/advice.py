@@ -84,7 +84,9 @@ def _norms() -> dict[str, _Norm]:
 
 def topic_of(requirement: str) -> Topic | None:
     """Return the first advice with a pattern that fits the id, or None, as for a pack's own class."""
-    return next((one for one in topics() if any(fnmatchcase(requirement, name) for name in one.requirements)), None)
+    return next(
+        (topic for topic in topics() if any(fnmatchcase(requirement, name) for name in topic.requirements)), None
+    )
 
 
 def sources_of(source: str) -> tuple[Source, ...]:

@@ -40,7 +40,11 @@ def fleet_document(
     results: Sequence[MemberResult], *, started: dt.datetime, finished: dt.datetime, parallel: int, interrupted: bool
 ) -> dict[str, Any]:
     """Return the content of fleet.json."""
-    titles = {name: title for one in results for name, title in (one.document or {}).get("class_titles", {}).items()}
+    titles = {
+        name: title
+        for member_result in results
+        for name, title in (member_result.document or {}).get("class_titles", {}).items()
+    }
     return {
         "format": FLEET_FORMAT,
         "suite": {"version": suite_version()},

@@ -72,7 +72,7 @@ class HistoryWriter(Recorder):
     def saw(self, eye: str, at_s: float, values: Sequence[float | int | str]) -> None:
         """Add an observation of an eye, such as a ROS probe."""
         # JSON has no infinity or NaN.
-        told = (str(one) if isinstance(one, float) and not math.isfinite(one) else one for one in values)
+        told = (str(value) if isinstance(value, float) and not math.isfinite(value) else value for value in values)
         self._queue.put(Seen(self._since(at_s), eye, tuple(told)))
 
     def eye(self, eye: str, state: EyeState) -> None:

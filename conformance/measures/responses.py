@@ -52,7 +52,7 @@ def response_to(
     noise = Noise.of([value for _, value in before])
     start, end = median(value for _, value in before), median(value for _, value in after[-SEVERAL:])
     begun = during[0][0] + _RISES * (during[-1][0] - during[0][0])
-    steady = [one for one in during if one[0] >= begun]
+    steady = [pair for pair in during if pair[0] >= begun]
     rate, by_itself = slope(steady), slope(before)
     level = median(value for _, value in steady) - start
     least = max(_FAR * noise.sigma, _LEAST, 1e-9 * abs(start))
@@ -71,13 +71,13 @@ def response_to(
 
 def agreed(responses: Sequence[Response | None]) -> Response | None:
     """Return a number's response, if drives forth and back at one velocity agree; else None."""
-    found = [one for one in responses if one is not None]
-    if len(found) < len(responses) or not found or len({one.is_position for one in found}) > 1:
+    found = [response for response in responses if response is not None]
+    if len(found) < len(responses) or not found or len({response.is_position for response in found}) > 1:
         return None
-    ratio = sum(one.ratio for one in found) / len(found)
-    if any(abs(one.ratio - ratio) > _ALIKE * abs(ratio) for one in found):
+    ratio = sum(response.ratio for response in found) / len(found)
+    if any(abs(response.ratio - ratio) > _ALIKE * abs(ratio) for response in found):
         return None
-    return Response(found[0].is_position, ratio, max(one.sigma for one in found))
+    return Response(found[0].is_position, ratio, max(response.sigma for response in found))
 
 
 def rests_from(samples: Sequence[Sample], sigma: float, moving: float) -> float | None:

@@ -33,12 +33,12 @@ class _Timed(Protocol):
 
 def usual_s(readings: Sequence[_Timed]) -> float:
     """Return how long a reading takes, by the median, s."""
-    return median(one.received - one.sent for one in readings) if readings else 0.0
+    return median(sample.received - sample.sent for sample in readings) if readings else 0.0
 
 
 def longest_s(readings: Sequence[_Timed]) -> float:
     """Return how long the slowest reading took, s: a loaded machine or link may delay anything else by as much."""
-    return max((one.received - one.sent for one in readings), default=0.0)
+    return max((sample.received - sample.sent for sample in readings), default=0.0)
 
 
 def middle(values: Iterable[Sequence[float]]) -> tuple[float, ...]:
@@ -70,7 +70,7 @@ class Noise(NamedTuple):
         if not values:
             return cls(0.0, declared)
         centre = median(values)
-        return cls(abs(centre), max(declared, _SIGMA * median(abs(one - centre) for one in values)))
+        return cls(abs(centre), max(declared, _SIGMA * median(abs(value - centre) for value in values)))
 
     def room(self, samples: Sequence[Sample]) -> float:
         """Return how far the median of such samples may be off zero; repeated values count once."""
@@ -100,7 +100,7 @@ def goes_on(
     begin, length = samples[0][0], (samples[-1][0] - samples[0][0]) / SEVERAL
     found: list[float] = []
     for part in range(SEVERAL):
-        within = [one for one in samples if begin + part * length <= one[0] <= begin + (part + 1) * length]
+        within = [pair for pair in samples if begin + part * length <= pair[0] <= begin + (part + 1) * length]
         seen = rate(within) if len(within) >= SEVERAL else None
         if seen is None or abs(seen) <= most(within):
             return 0.0

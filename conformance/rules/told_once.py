@@ -54,7 +54,10 @@ def told_once(
     for cause, found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
         probe, fault = min(found, key=lambda pair: (_oddness(pair[0].kind), pair[0].attempt.request.size))
-        showing = {probe.operation: Showing(probe.operation, 0), **{one: Showing(one, 0) for one in _labels(found)}}
+        showing = {
+            probe.operation: Showing(probe.operation, 0),
+            **{label: Showing(label, 0) for label in _labels(found)},
+        }
         for one, _ in found:
             was = showing[one.operation]
             sent = min(filter(None, (was.request, one.attempt.request)), key=lambda request: request.size)

@@ -13,7 +13,7 @@ from conformance.api.rest.things import collection_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.documents.openapi import Operation, operations_of
 from conformance.documents.security import demands
-from conformance.scenarios.own_things import created_path
+from conformance.scenarios.creating import created_path
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Surveyor
@@ -50,7 +50,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
             # Nearly right credentials are used in rotation.
             near = nearly[number % len(nearly) :][:1] if nearly else []
             tried: list[tuple[HttpClient | Stranger, bool]] = [(api.client, False)]
-            tried += [(one, True) for one in ([unknown, *near] if own else [])]
+            tried += [(stranger, True) for stranger in ([unknown, *near] if own else [])]
             if operation.label in api.streams:
                 continue
             request = written(operation, usual_inputs(operation, values)[0])
@@ -79,7 +79,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
 
 def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
     """Send requests without credentials on a connection that has just carried them: they count for one request."""
-    read = next((one for one in api.working.values() if one.operation.safe), None)
+    read = next((item for item in api.working.values() if item.operation.safe), None)
     for operation in api.run.effort.subsample(closed, _KEPT) if read is not None else ():
         if operation.label in api.streams or read is None:
             continue
@@ -119,8 +119,10 @@ def _life_of(item: str) -> tuple[tuple[str, str], ...]:
 def _beyond_ascii(api: RestInterface, values: Values, closed: list[Operation]) -> Iterator[Exchange]:
     """Send one read with a non-ASCII key in the query: functions that compare secrets fail on such a text."""
     schemes = api.run.contract.openapi.get("components", {}).get("securitySchemes", {})
-    names = [one["name"] for one in schemes.values() if (one.get("type"), one.get("in")) == ("apiKey", "query")]
-    reads = [one for one in closed if one.method == "GET" and one.label not in api.streams]
+    names = [
+        scheme["name"] for scheme in schemes.values() if (scheme.get("type"), scheme.get("in")) == ("apiKey", "query")
+    ]
+    reads = [operation for operation in closed if operation.method == "GET" and operation.label not in api.streams]
     for name in names[:1] if reads else ():
         target = written(reads[0], usual_inputs(reads[0], values)[0]).target
         with suppress(NoAnswerError):

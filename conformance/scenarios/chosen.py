@@ -85,7 +85,7 @@ class Chosen:
             return
         if thing.id not in lists[was].ids:
             # Other things are listed for this value, so the filter chooses by this member.
-            is_by = lists[was].is_whole and any(members_of(one).get(name) == was for one in lists[was].items)
+            is_by = lists[was].is_whole and any(members_of(item).get(name) == was for item in lists[was].items)
             if is_by and thing.id in self._list(listing, thing, {}).ids:
                 other, expected = "a list without it", f"a list with {thing.id} by {parameter.name}={was}, as it reads"
                 self.living.note(Kind.CHOSEN, listing.operation.label, lists[was].exchange, expected, other, thing)
@@ -99,7 +99,7 @@ class Chosen:
         for value, is_in in ((usable[0], True), (was, False)):
             found = self.living.writer.until(
                 partial(self._list, listing, thing, {parameter.name: value}),
-                lambda one, is_in=is_in: (thing.id in one.ids) is is_in,  # type: ignore[misc] # bound in its round
+                lambda item, is_in=is_in: (thing.id in item.ids) is is_in,  # type: ignore[misc] # bound in its round
             )
             lists[value] = found
             other = "" if (thing.id in found.ids) is is_in else f"a list with{'out' if is_in else ''} it"
@@ -121,7 +121,7 @@ class Chosen:
         """Give a member of a thing another value; return the request if it reads so, else None."""
         living, media_type = self.living, next(iter(change.bodies), "")
         now = members(thing.last, ())
-        own = next((one for one in now if members_of({one: 0}).keys() == {name}), "")
+        own = next((text for text in now if members_of({text: 0}).keys() == {name}), "")
         if JSON_PATCH in media_type:
             body: Any = [{"op": "replace", "path": f"/{own}", "value": value}]
         elif change.method == "PATCH":
@@ -135,7 +135,8 @@ class Chosen:
         if not sent.response.ok or sent.response.status == _ACCEPTED:
             return None
         found = living.writer.until(
-            lambda: living.writer.send(living.read, thing.path), lambda one: members(one, (own,)).get(own) == value
+            lambda: living.writer.send(living.read, thing.path),
+            lambda exchange: members(exchange, (own,)).get(own) == value,
         )
         thing.last = found if found.response.ok else thing.last
         if members(found, (own,)).get(own) != value:
@@ -170,7 +171,7 @@ class Chosen:
 
     def _count(self, read: Operation, value: Any, right: int, thing: Thing, after: str) -> None:
         """Read a count until it is that of the list."""
-        found, told = self.living.writer.until(partial(self._counted, read, value), lambda one: one[1] == right)
+        found, told = self.living.writer.until(partial(self._counted, read, value), lambda pair: pair[1] == right)
         expected = f"{right}, as many as the list by {value} has {after}"
         self.living.note(Kind.SHOWN, read.label, found, expected, "" if told == right else str(told), thing)
 
@@ -179,9 +180,9 @@ class Chosen:
         sort = listing.sort
         if sort is None or len(things) < len(_NUMBERS):
             return
-        names = dict.fromkeys(one.member for one in listing.sortings.values())
+        names = dict.fromkeys(sorting.member for sorting in listing.sortings.values())
         numbers = [name for name in names if kinds_of(listing.members[name]) & {"number", "integer"}]
-        for name in (one for one in numbers if all(fits(listing.members[one], value) for value in _NUMBERS)):
+        for name in (number for number in numbers if all(fits(listing.members[number], value) for value in _NUMBERS)):
             done = [self._set(thing, self.changes[0], name, one) for thing, one in zip(things, _NUMBERS, strict=False)]
             texts = [text for text, one in listing.sortings.items() if one.member == name]
             for text in (*texts, *texts) if None not in done and not self.living.is_over else ():
@@ -199,7 +200,7 @@ def _filters(listing: Listing) -> Iterator[tuple[str, Parameter]]:
 def _values(parameter: Parameter, was: Any) -> list[Any]:
     """Return other values of a filter."""
     found = flat(parameter.schema).get("enum", [True, False])
-    return [one for one in found if one not in (was, None) and fitting(parameter, one)][:1]
+    return [item for item in found if item not in (was, None) and fitting(parameter, item)][:1]
 
 
 def _agrees(counts: dict[Any, int], lists: Mapping[Any, WholeList]) -> bool:

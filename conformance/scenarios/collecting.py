@@ -17,7 +17,7 @@ def is_imported(rule: Rule, module: str) -> bool:
     Where a function of another module has only made it, the rule stands nowhere else.
     """
     home = rule.judge.__module__
-    return home != module and any(one is rule for one in vars(sys.modules[home]).values())
+    return home != module and any(item is rule for item in vars(sys.modules[home]).values())
 
 
 class RulesPlugin:

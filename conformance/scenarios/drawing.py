@@ -38,8 +38,8 @@ def drawn(
     valid = list(islice(valid_variations(operation, usual, values), _CASES))
     if not operation.safe:
         valid = together(operation, usual, valid)
-        whole = [one for one in valid if one.parts or one.place.startswith("body /")][:_ACTING]
-        others = [one for one in valid if one not in whole]
+        whole = [variation for variation in valid if variation.parts or variation.place.startswith("body /")][:_ACTING]
+        others = [variation for variation in valid if variation not in whole]
         valid = [*whole, *effort.draw(others, _ACTING, f"{seed}/valid {operation.label}")]
     groups = {
         "valid": [*valid, *unknown_variations(operation, usual)],
@@ -52,10 +52,12 @@ def drawn(
         standard //= SLOW_SHARE if operation.label in slow else 1
         if name == "odd":
             # Some were sent already as valid or invalid values.
-            variations = [one for one in variations if repr(one.inputs) not in sent]  # noqa: PLW2901 - fewer of them
-        own, common = ([one for one in variations if one.is_common is is_common] for is_common in (False, True))
+            variations = [variation for variation in variations if repr(variation.inputs) not in sent]  # noqa: PLW2901 - fewer of them
+        own, common = (
+            [variation for variation in variations if variation.is_common is is_common] for is_common in (False, True)
+        )
         found = effort.draw_first(own, common, standard, f"{seed}/{name} {operation.label}")
-        sent.update(repr(one.inputs) for one in found)
+        sent.update(repr(variation.inputs) for variation in found)
         yield found
 
 

@@ -28,8 +28,9 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
+from conformance.scenarios.creating import located
 from conformance.scenarios.living import ABSENT
-from conformance.scenarios.own_things import located, path_of_usual
+from conformance.scenarios.own_things import path_of_usual
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members
@@ -80,10 +81,10 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         if not actions or len(found) >= _KINDS or not collection_of(path):
             continue
         kind, paths = Ended(read, state, actions), list[str]()
-        begins = [one for one in actions if not _ends(one)][:_BEGINNING]
-        ends = [one for one in actions if _ends(one)]
-        pauses = [one for one in ends if words_of(one.template.rpartition("/")[2]) & _PAUSING][:1]
-        ends = [one for one in ends if one not in pauses][:1]
+        begins = [operation for operation in actions if not _ends(operation)][:_BEGINNING]
+        ends = [operation for operation in actions if _ends(operation)]
+        pauses = [operation for operation in ends if words_of(operation.template.rpartition("/")[2]) & _PAUSING][:1]
+        ends = [operation for operation in ends if operation not in pauses][:1]
         for steps in (
             [*begins, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)],
             begins,
@@ -105,7 +106,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
     """Read again the activities that were started and ended, and try to end a finished thing."""
     writer = Writer(api, values)
     for kind in begun:
-        ends = [one for one in kind.actions if _ends(one)][:1]
+        ends = [operation for operation in kind.actions if _ends(operation)][:1]
         with suppress(NoAnswerError):
             done = ""
             for path in kind.paths:
@@ -136,7 +137,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
 
 def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
     """Return operations one after another, each until it is refused for sure, and twice in the opposite order."""
-    forth = [one for one in actions for _ in range(OFTEN + 1 if KEEPS.search(one.text) else 2)]
+    forth = [operation for operation in actions for _ in range(OFTEN + 1 if KEEPS.search(operation.text) else 2)]
     return [*forth, *reversed(actions), *reversed(actions)]
 
 
@@ -144,9 +145,9 @@ def _listed_as_done(writer: Writer, kind: Ended) -> str:
     """Return the path of a listed thing that is done."""
     lister = callable_operations(writer.api).get(("GET", collection_of(kind.read.template)))
     items = listed(read_json(writer.send(lister).response.body).value) if lister is not None else None
-    for one in items or []:
-        id_ = identified(one, kind.read)[1]
-        if isinstance(one, dict) and id_ is not None and one.get(kind.state) in FINAL:
+    for item in items or []:
+        id_ = identified(item, kind.read)[1]
+        if isinstance(item, dict) and id_ is not None and item.get(kind.state) in FINAL:
             return f"{collection_of(kind.read.template)}/{id_}"
     return ""
 

@@ -96,11 +96,11 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
         return Estimate(_FIRST + len(operations) * requests_of(effort))
     surveyed = covering = fuzzed = 0
     if {"description", "robustness"} & set(run.claims):
-        reads = [one for one in operations if one.method == "GET"]
-        surveyed = sum(_surveyed(one, effort, run.seed) for one in operations) + TIMED_AGAIN * len(reads)
+        reads = [operation for operation in operations if operation.method == "GET"]
+        surveyed = sum(_surveyed(operation, effort, run.seed) for operation in operations) + TIMED_AGAIN * len(reads)
         surveyed += max(FEWEST_REPEATS, effort.cases(REPEATS)) if reads else 0
-        generated = [_generated(one, effort) for one in operations]
-        covering, fuzzed = sum(one[0] for one in generated), sum(one[1] for one in generated)
+        generated = [_generated(operation, effort) for operation in operations]
+        covering, fuzzed = sum(pair[0] for pair in generated), sum(pair[1] for pair in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
     slow = tuple(name for name in (MOTION, ROS) if name in run.claims)
     return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow)
@@ -134,7 +134,7 @@ def _members(schema: object) -> int:
 def _http(operations: Iterable[Operation], effort: Effort) -> tuple[int, int]:
     """Return how many requests the checks of HTTP send, and how many of these come from several clients at once."""
     operations = list(operations)
-    reads = min(_READS, sum(one.method == "GET" for one in operations))
+    reads = min(_READS, sum(operation.method == "GET" for operation in operations))
     if not reads:
         return len(operations), 0
     on_one = _FEWEST * reads if effort.slow else max(_LEAST_ON_ONE, reads * effort.cases(_ON_ONE_CONNECTION))

@@ -17,7 +17,7 @@ from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.changes import ANOTHER
 from conformance.documents.openapi import Operation
-from conformance.scenarios.own_things import created_path
+from conformance.scenarios.creating import created_path
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
@@ -58,15 +58,21 @@ class _Held:
 
     def __post_init__(self) -> None:
         self.item = self.operation.template.rpartition("}")[0] + "}"
-        below = [one for one in self.actions if one.template.startswith(f"{self.item}/") and one is not self.operation]
-        self._endings = [one for one in below if words_of(one.template[len(self.item) :]) & _FINAL]
+        below = [
+            operation
+            for operation in self.actions
+            if operation.template.startswith(f"{self.item}/") and operation is not self.operation
+        ]
+        self._endings = [operation for operation in below if words_of(operation.template[len(self.item) :]) & _FINAL]
         # Operations that the description names come before others on the same thing.
         said = words_of(self.operation.text)
-        named = [one for one in self.actions if "{" not in one.template and one is not self.operation]
-        found = sorted(named, key=lambda one: -len(said & words_of(one.template)))
-        found = [one for one in found if said & words_of(one.template)]
+        named = [
+            operation for operation in self.actions if "{" not in operation.template and operation is not self.operation
+        ]
+        found = sorted(named, key=lambda operation: -len(said & words_of(operation.template)))
+        found = [operation for operation in found if said & words_of(operation.template)]
         # Twice, because one of them may need another one before it.
-        self._others = [*found, *([one for one in below if one not in self._endings] * 2)][:_OTHERS]
+        self._others = [*found, *([operation for operation in below if operation not in self._endings] * 2)][:_OTHERS]
 
     def called(self) -> None:
         """Call it until it is accepted, and then on another thing, where the description speaks of a second one."""
@@ -84,8 +90,8 @@ class _Held:
             self._call(self.operation, second)
             self._read(path)
         for ending in self._endings:
-            for one in filter(None, (second, path)):
-                self._call(ending, one)
+            for text in filter(None, (second, path)):
+                self._call(ending, text)
 
     def _made(self) -> str:
         """Create a thing for it; return where it is, or nothing."""

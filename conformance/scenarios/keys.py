@@ -23,7 +23,7 @@ from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
-from conformance.scenarios.own_things import located
+from conformance.scenarios.creating import located
 from conformance.scenarios.refusing import is_ours, is_refused
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.special_bodies import half_valid
@@ -85,9 +85,9 @@ def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
         with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
             rounds = _Rounds(Writer(api, values), operation, key, by_key)
             first = list(rounds.play(0))
-            wrong = [one for one in first if one.fault]
-            again = {one.way for one in rounds.play(1) if one.fault} if wrong else set[str]()
-            found += [one for one in first if not one.fault or one.way in again]
+            wrong = [creation for creation in first if creation.fault]
+            again = {creation.way for creation in rounds.play(1) if creation.fault} if wrong else set[str]()
+            found += [creation for creation in first if not creation.fault or creation.way in again]
     if not found:
         raise NoOccasionError("no operation with a parameter Idempotency-Key answered with what it has made")
     return tuple(found)
@@ -95,7 +95,11 @@ def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
 
 def key_of(operation: Operation) -> Parameter | None:
     """Return the header parameter of an operation that is its idempotency key, or None."""
-    named = (one for one in operation.parameter("header") if plain_name(one.name).endswith("idempotencykey"))
+    named = (
+        parameter
+        for parameter in operation.parameter("header")
+        if plain_name(parameter.name).endswith("idempotencykey")
+    )
     return next(named, None)
 
 
@@ -111,7 +115,7 @@ class _Rounds:
     def __post_init__(self) -> None:
         collection = self.operation.template.rstrip("/")
         reads = [one for (method, path), one in self.operations.items() if method == "GET"]
-        self._item = next((one for one in reads if collection_of(one.template) == collection), None)
+        self._item = next((operation for operation in reads if collection_of(operation.template) == collection), None)
         self._lister = self.operations.get(("GET", collection))
         self._delete = (
             self.operations.get(("DELETE", self._item.template.rstrip("/"))) if self._item is not None else None
@@ -146,7 +150,7 @@ class _Rounds:
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
                 # A retry may come after other keys; without a promise, a device may remember few keys.
                 more = keys[_KEYS : _KEYS + 1] if _FIRST.search(self._promised()) else []
-                made += [self._send(self._request(one, bodies[-1])) for one in more]
+                made += [self._send(self._request(text, bodies[-1])) for text in more]
                 again = self._send(request)
                 made.append(again)
                 yield self._repeated(first, again, name, before)
@@ -197,7 +201,7 @@ class _Rounds:
     def _later(self, request: Outgoing, first: Exchange, item: Operation, path: str) -> Iterator[Keyed]:
         """Judge a retry after its thing has changed: by the description it gets the first response."""
         changes = (self.operations.get((method, item.template.rstrip("/"))) for method in ("PUT", "PATCH"))
-        written = (self.writer.change(one, item, path, _TURN) for one in changes if one is not None)
+        written = (self.writer.change(operation, item, path, _TURN) for operation in changes if operation is not None)
         write = next((one for one in written if one is not None), None)
         again = self._send(request) if write is not None else first
         was, now = members(first, ()), members(again, ())
@@ -219,7 +223,7 @@ class _Rounds:
         for _ in range(2 * _KEYS + 1):
             text = str(uuid.uuid4())
             candidates = (text, f'"{text}"', text.replace("-", ""), text[:8])
-            found += [next((one for one in candidates if fits(self.key.schema, one)), "")]
+            found += [next((candidate for candidate in candidates if fits(self.key.schema, candidate)), "")]
         return [one for one in found if one]
 
     def _bodies(self, turn: int) -> list[Inputs]:
@@ -251,7 +255,7 @@ class _Rounds:
 
     def _tidied(self, made: list[Exchange]) -> None:
         """Delete the things that these exchanges created."""
-        names = {self._name(one): None for one in made if one.response.ok}
+        names = {self._name(exchange): None for exchange in made if exchange.response.ok}
         for path in names:
             if self._delete is not None and self._item is not None and path.startswith("/"):
                 self.writer.conditional(self._delete, self._item, path)

@@ -107,7 +107,7 @@ class _Cycle:
         self.living = Living(self.writer, self.read, lister, until)
         self.item = self.read.template.rstrip("/")
         changes = (self.operations.get((name, self.item)) for name in ("PUT", "PATCH"))
-        self._changes = [one for one in changes if one is not None]
+        self._changes = [operation for operation in changes if operation is not None]
 
     def run(self) -> list[Life]:
         """Create, change and delete things of a collection; return the record of each thing."""
@@ -124,7 +124,7 @@ class _Cycle:
             if delete is not None:
                 self._delete_all(delete)
                 self._create_at_once(delete, count)
-        return [replace(one.life, looks=tuple(self.living.looks) if one is things[0] else ()) for one in things]
+        return [replace(thing.life, looks=tuple(self.living.looks) if thing is things[0] else ()) for thing in things]
 
     def changes_alone(self, seconds: float) -> bool:
         """Return whether a thing that was created changes, or is gone, after a time without any request."""
@@ -132,10 +132,10 @@ class _Cycle:
         try:
             self._create(_FEW * self.round)
             time.sleep(seconds)
-            found = [self.living.other(one, self.writer.send(self.read, one.path)) for one in things]
+            found = [self.living.other(thing, self.writer.send(self.read, thing.path)) for thing in things]
             if delete is not None:
-                for one in things:
-                    self._deleted(one, delete)
+                for thing in things:
+                    self._deleted(thing, delete)
         except NoAnswerError:
             return True
         return any(found)
@@ -180,7 +180,7 @@ class _Cycle:
             for (method, path), one in self.operations.items()
             if method == "POST" and path.startswith(f"{self.item}/")
         ]
-        usable = [one for one in acting if one.template.count("{") == self.item.count("{")]
+        usable = [operation for operation in acting if operation.template.count("{") == self.item.count("{")]
         for action in usable[:_ACTIONS]:
             thing = next(reversed(self.living.of(State.ALIVE)), None)
             if thing is not None and self._is_item(thing.path) and not self.living.is_over:
@@ -236,7 +236,7 @@ class _Cycle:
             expected = f"status 201 for what was created by {self.create.label} and deleted before"
             self.living.note(Kind.THERE, self.create.label, sent, expected, "" if is_same else sent.came, thing)
             there = self.writer.until(
-                lambda: self.writer.send(self.read, thing.path), lambda one: one.response.status not in ABSENT
+                lambda: self.writer.send(self.read, thing.path), lambda exchange: exchange.response.status not in ABSENT
             )
             other = there.came if there.response.status in ABSENT else ""
             self.living.note(Kind.THERE, self.create.label, there, "the thing that was created again", other, thing)
@@ -276,8 +276,8 @@ class _Cycle:
             return
         bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
         requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
-        if len({one.body for one in requests}) == len(turns):
-            for created in send_together([[(writer.api.client, one) for one in requests]])[0]:
+        if len({request.body for request in requests}) == len(turns):
+            for created in send_together([[(writer.api.client, request) for request in requests]])[0]:
                 if isinstance(created, Exchange) and created.response.status == HTTPStatus.CREATED:
                     self._taken(created, None)
             for thing in self.living.of(State.ALIVE):
@@ -292,24 +292,24 @@ class _Cycle:
             status == HTTPStatus.OK and before is not None and bool(id_) and id_.casefold() not in before
         )
         paths = dict.fromkeys(self._paths(created, id_)) if is_new else {}
-        for one in paths:
-            again = next((thing for thing in self.living.of(State.ALIVE) if thing.path == one), None)
+        for path in paths:
+            again = next((thing for thing in self.living.of(State.ALIVE) if thing.path == path), None)
             if again is not None:
-                expected, sent = f"another path than {one}, where an earlier thing is", again.life.created.request.body
-                other = f"{one} once more" if sent != created.request.body else ""
+                expected, sent = f"another path than {path}, where an earlier thing is", again.life.created.request.body
+                other = f"{path} once more" if sent != created.request.body else ""
                 self.living.note(Kind.THERE, self.create.label, created, expected, other, again)
                 return False
-            self._found(created, one, id_)
+            self._found(created, path, id_)
             # Two paths may lead to one thing.
             is_known = any(thing.life.created is created for thing in self.living.of(State.ALIVE)[:-1])
-            is_old = is_known or unquote(one.rstrip("/").rpartition("/")[2]).casefold() in (before or ())
+            is_old = is_known or unquote(path.rstrip("/").rpartition("/")[2]).casefold() in (before or ())
             self.living.things[-1].is_own = not is_old
         return bool(paths)
 
     def _found(self, created: Exchange, path: str, id_: str) -> None:
         """Read a thing that was created, and compare it with the request."""
         absent = self.writer.until(
-            lambda: self.writer.send(self.read, path), lambda one: one.response.status not in ABSENT
+            lambda: self.writer.send(self.read, path), lambda exchange: exchange.response.status not in ABSENT
         )
         write = None if not absent.response.ok else self.writer.read_back(self.create, self.read, path, created)
         found = absent if write is None else write.found
@@ -325,7 +325,7 @@ class _Cycle:
         deleted = self.writer.conditional(delete, self.read, thing.path)
         is_done = deleted.response.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT}
         gone = self.writer.until(
-            lambda: self.writer.send(self.read, thing.path), lambda one: not is_done or not one.response.ok
+            lambda: self.writer.send(self.read, thing.path), lambda exchange: not is_done or not exchange.response.ok
         )
         thing.state = State.GONE if is_done and gone.response.status in ABSENT else State.UNKNOWN
         thing.life = replace(thing.life, delete=delete.label, deleted=deleted, gone=gone)
@@ -339,7 +339,7 @@ class _Cycle:
             return set(self.living.listing.ids)
         listing = self.writer.send(self.living.lister)
         items = listed(read_json(listing.response.body).value) or []
-        ids = {identifier_of(one, self.read) for one in items if isinstance(one, dict)}
+        ids = {identifier_of(item, self.read) for item in items if isinstance(item, dict)}
         return ids if listing.response.ok else None
 
     def _paths(self, created: Exchange, id_: str) -> list[str]:

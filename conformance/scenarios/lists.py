@@ -87,9 +87,11 @@ class Paged:
 def lists_of(api: RestInterface) -> list[Listing]:
     """Return the lists that may be read and that end."""
     found = [
-        listing_of(one) for one in operations_of(api.run.contract) if one.label not in api.streams and allowed(api, one)
+        listing_of(operation)
+        for operation in operations_of(api.run.contract)
+        if operation.label not in api.streams and allowed(api, operation)
     ]
-    return [one for one in found if one is not None]
+    return [listing for listing in found if listing is not None]
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
@@ -130,7 +132,9 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
             yield {listing.sort.name: text}, listing.sortings[text].member
     for name, parameter in listing.filters.items():
         there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
-        chosen = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
+        chosen = [
+            choice for choice in _choices(parameter, name, page) if _FEWEST <= there[text_of(choice)] < len(items)
+        ]
         if chosen:
             yield {parameter.name: chosen[-1]}, ""
             break
@@ -151,7 +155,7 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             page, until = reader.page(), reader.until
             if page is not None and page.items:
                 reader.refused()
-                filters, doubted = {one.name for one in listing.filters.values()}, list[dict[str, Any]]()
+                filters, doubted = {parameter.name for parameter in listing.filters.values()}, list[dict[str, Any]]()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
                     found = (
                         page_of(reader.read(query).response, listing.operation) if time.monotonic() < until else None
@@ -215,8 +219,8 @@ class Reader:
 
     def refused(self) -> None:
         """Send an invalid request, after which the valid ones have to be answered as before."""
-        for one in islice(invalid_variations(self.listing.operation, self.usual), 1):
-            self.api.send(written(self.listing.operation, one.inputs))
+        for variation in islice(invalid_variations(self.listing.operation, self.usual), 1):
+            self.api.send(written(self.listing.operation, variation.inputs))
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response, or None."""
@@ -279,15 +283,15 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     rows += [both] if len(rows) > 1 and (both := _together(listing, page)) else []
     for bound in listing.bounds:
         there = {
-            members_of(one).get(bound.member) for one in page.items if members_of(one).get(bound.member) is not None
+            members_of(item).get(bound.member) for item in page.items if members_of(item).get(bound.member) is not None
         }
-        ordered = sorted(there, key=lambda one: bound.rank(str(one)) or 0)
+        ordered = sorted(there, key=lambda item: bound.rank(str(item)) or 0)
         # The middle of several values: items lie on both sides, and one at the bound.
         middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
         rows += [
             {bound.parameter.name: text}
-            for one in middle
-            for text in (one, _elsewhere(one, is_least=bound.is_least))
+            for item in middle
+            for text in (item, _elsewhere(item, is_least=bound.is_least))
             if len(ordered) > 1 and text is not None and fitting(bound.parameter, text)
         ]
     if listing.sort is not None:
@@ -335,11 +339,11 @@ def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:
     """Return values to filter by: the declared ones, or two different ones that items have."""
     schema, is_list = flat(parameter.schema), "array" in kinds_of(parameter.schema)
     schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
-    found = [True, False] if kinds_of(schema) == {"boolean"} else [one for one in schema.get("enum", ()) if one]
+    found = [True, False] if kinds_of(schema) == {"boolean"} else [item for item in schema.get("enum", ()) if item]
     if not found:
-        there = [members_of(one).get(name) for one in page.items]
-        found = list(dict.fromkeys(one for one in there if isinstance(one, str | int) and one != ""))[:2]
-    return [one for one in ([[value] for value in found] if is_list else found) if fitting(parameter, one)]
+        there = [members_of(item).get(name) for item in page.items]
+        found = list(dict.fromkeys(item for item in there if isinstance(item, str | int) and item != ""))[:2]
+    return [item for item in ([[value] for value in found] if is_list else found) if fitting(parameter, item)]
 
 
 @dataclass
@@ -483,7 +487,7 @@ class _Parts:
         """Return the page size for about three pages; 0 if none is allowed."""
         count = self._count(whole)
         sizes = range((count + 2) // 3, count)
-        return next((one for one in sizes if fitting(self.reader.listing.limit, one)), 0)
+        return next((size for size in sizes if fitting(self.reader.listing.limit, size)), 0)
 
     def _count(self, whole: Page) -> int:
         """Return how many items the pages have together: all of the list, as far as its totals tell."""
@@ -491,7 +495,7 @@ class _Parts:
         return (
             count
             if self.reader.always
-            else max([count, *(one for one in whole.totals.values() if one <= _PAGES * count)])
+            else max([count, *(total for total in whole.totals.values() if total <= _PAGES * count)])
         )
 
     def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
@@ -534,7 +538,7 @@ class _Parts:
         # The list may have become shorter meanwhile.
         count = min([self._count(whole), *last[1].totals.values()])
         fault = fault or (ends if len(joined) < max(count, len(whole.items)) else "")
-        twice = next((f"the item {one[:60]} twice" for one in joined if joined.count(one) > 1), "")
+        twice = next((f"the item {text[:60]} twice" for text in joined if joined.count(text) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
         return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
 
@@ -551,7 +555,7 @@ def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
     """Yield values in a response that name the beginning of the next page."""
     name = listing.cursor.name if listing.cursor is not None else ""
     links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
-    texts = [*(one.partition("<")[2].partition(">")[0] for one in links), *_following(page.around, 0, said=False)]
+    texts = [*(link.partition("<")[2].partition(">")[0] for link in links), *_following(page.around, 0, said=False)]
     for text in texts:
         linked = dict(in_link(text))
         if name in linked:

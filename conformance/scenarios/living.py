@@ -178,7 +178,7 @@ class Living:
 
     def of(self, state: State) -> list[Thing]:
         """Return the things of the run in a state."""
-        return [one for one in self.things if one.is_own and one.state is state]
+        return [thing for thing in self.things if thing.is_own and thing.state is state]
 
     def remember(self, thing: Thing, write: Write | None, operation: Operation) -> None:
         """Remember the values that a request has written, as far as they read as written."""
@@ -229,7 +229,7 @@ class Living:
             kind: what it shows if the thing has changed; by default: that it was lost, or what was written.
             said: see other().
         """
-        settled = self.writer.settled(partial(self._read, thing), lambda one: self.other(thing, one, said))
+        settled = self.writer.settled(partial(self._read, thing), lambda exchange: self.other(thing, exchange, said))
         found, wrong = settled.exchange, settled.wrong
         is_lost = found.response.status in ABSENT
         if is_lost:
@@ -262,7 +262,7 @@ class Living:
     def _is_ended(thing: Thing) -> bool:
         """Return whether a thing has ended by itself, by its last read."""
         now = members(thing.last, _STATES)
-        return any(isinstance(one, str) and one.casefold() in _ENDED for one in now.values())
+        return any(isinstance(item, str) and item.casefold() in _ENDED for item in now.values())
 
     def _is_dropped(self, thing: Thing, after: Exchange) -> bool:
         """Return whether a lost thing was the oldest of a full collection, and something was created."""
@@ -285,7 +285,7 @@ class Living:
             self.check(thing, after, operation, said=said)
         deleted = [one for one in self.of(State.GONE) if one is not own]
         for thing in deleted[-_LOOKED:]:
-            found = self.writer.until(partial(self._read, thing), lambda one: not one.response.ok)
+            found = self.writer.until(partial(self._read, thing), lambda exchange: not exchange.response.ok)
             other = f"status {found.response.status}" if found.response.ok else ""
             thing.state = State.UNKNOWN if other else thing.state
             self.note(Kind.GONE, operation, found, f"status 404 or 410, as before {_said(after)}", other, thing)
@@ -296,7 +296,9 @@ class Living:
         """Read the list until it has each living thing, once, and none that was deleted."""
         thing = self.things[-1]
         before, is_new = self.listing, after is thing.life.created
-        self.listing = listing = self.writer.until(lambda: self.list_of(thing), lambda one: not self._wrong(one))
+        self.listing = listing = self.writer.until(
+            lambda: self.list_of(thing), lambda whole_list: not self._wrong(whole_list)
+        )
         # A long list that does not grow may have a limit of its own.
         self._capped |= is_new and before is not None and _MANY <= len(listing.items) <= len(before.items)
         wrong = self._wrong(listing)
@@ -348,7 +350,7 @@ class Living:
     def _is_listable(self, found: Exchange, name: str, listing: WholeList) -> bool:
         """Return whether a thing has the identifier, is not marked as deleted, and in the state of a listed one."""
         value = read_json(found.response.body).value
-        states = [{one.get(key) for key in _STATES} for one in (represented(value, _STATES), *listing.items)]
+        states = [{item.get(key) for key in _STATES} for item in (represented(value, _STATES), *listing.items)]
         return identifier_of(value, self.read) == name and not is_marked_deleted(value) and states[0] in states[1:]
 
     def list_of(self, thing: Thing) -> WholeList:
@@ -384,8 +386,8 @@ class Living:
 def alike_members(read: Operation, lister: Operation) -> frozenset[str]:
     """Return the members that a list and its items have by the same schema, and that read alike wherever they are."""
     own, whole = parts_of(read.shape or {}), flat(lister.shape or {})
-    inner = [whole, *(flat(one) for one in whole.get("properties", {}).values() if isinstance(one, dict))]
-    items: Schema = next((one["items"] for one in inner if isinstance(one.get("items"), dict)), {})
+    inner = [whole, *(flat(item) for item in whole.get("properties", {}).values() if isinstance(item, dict))]
+    items: Schema = next((item["items"] for item in inner if isinstance(item.get("items"), dict)), {})
     listed = flat(items).get("properties", {})
     return frozenset(
         name

@@ -98,7 +98,7 @@ def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange 
     """Where the last read had an entity tag, read by conditions of clients that have that copy, or another one."""
     tag = (last.response.header("etag") or "") if last is not None else ""
     request = written(read, inputs)
-    conditions = [("GET", one) for one in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG)]
+    conditions = [("GET", text) for text in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG)]
     for method, tags in (*conditions, ("HEAD", tag)) if tag else ():
         conditional = replace(request, method=method, headers=(*request.headers, ("If-None-Match", tags)))
         surveyor.send(read, Variation(Kind.ODD, "", "", inputs), conditional, fresh=False)
@@ -130,7 +130,7 @@ def _head(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:
 def _queries(read: Operation, usual: Inputs, values: Values) -> Iterator[Inputs]:
     """Yield the usual request with one parameter more in its query, each once."""
     seen: set[str] = set()
-    for one in valid_variations(read, usual, values):
-        if one.place.startswith("query ") and one.place not in seen:
-            seen.add(one.place)
-            yield one.inputs
+    for variation in valid_variations(read, usual, values):
+        if variation.place.startswith("query ") and variation.place not in seen:
+            seen.add(variation.place)
+            yield variation.inputs

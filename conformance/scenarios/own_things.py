@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-import re
 import time
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Final
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
 from conformance.api.rest.applicable import allowed, callable_operations
-from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body, written
+from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
 from conformance.api.rest.patches import same
-from conformance.api.rest.references import is_free_text, singular
+from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, identified, identifier_of, path_chosen
+from conformance.api.rest.things import another, collection_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.memory import ending_with
 from conformance.documents.files import file_of, keeps_octets
-from conformance.documents.json_schema import Schema
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import shown
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
+from conformance.scenarios.creating import created_path, other_texts, with_texts
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
 from conformance.scenarios.refusing import NO_FORMAT
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
-from conformance.scenarios.special_bodies import TEXTS, is_list_of_changes, special_bodies, with_owned
+from conformance.scenarios.special_bodies import is_list_of_changes, special_bodies
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 from conformance.transport.parallel import send_together
-from conformance.transport.reach import is_same, joined, path_of
 
 #: Way by which a list below another thing is read.
 ANOTHER: Final = "another thing"
@@ -88,7 +86,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             thing_path = make(surveyor, create, read) if is_item and create is not None and collection_of(path) else ""
             # Without a way to create one, what is there is written, and restored.
             is_fixed = not is_item or (bool(collection_of(path)) and (create is None or make is _put))
-            free = [one for one in changes if not is_item or is_free(one, path)]
+            free = [operation for operation in changes if not is_item or is_free(operation, path)]
             if free and is_fixed and not thing_path:
                 _Thing(surveyor, read, path_of_usual(read, values), is_own=False).written(free)
             if create is not None and thing_path:
@@ -117,50 +115,6 @@ def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     if not path or thing.get(place="path of what does not exist").status not in ABSENT:
         return ""
     return path if thing.sent(create, None).ok else ""
-
-
-def created_path(
-    surveyor: Surveyor, create: Operation, read: Operation, statuses: Container[int] = frozenset({201})
-) -> str:
-    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing.
-
-    Args:
-        surveyor: sends the requests.
-        create: operation that creates it.
-        read: operation that reads it.
-        statuses: of a creation that counts. With 202, a thing may come later, or end by itself.
-    """
-    made: Probe | None = None
-    usual = usual_inputs(create, surveyor.values)[:2]
-    body = _with_texts(create, usual[0].body)
-    # Create it with all members, so that each can be written and removed.
-    whole = whole_body(create, surveyor.values)[1]
-    whole = whole if isinstance(whole, dict) else usual[0].body
-    whole = _with_texts(create, whole) or whole
-    owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
-    for inputs in (*(replace(usual[0], body=one) for one in (owned, body) if one), *usual):
-        made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
-        if made.ok:
-            break
-    if made is None or made.exchange is None or made.status not in statuses:
-        return ""
-    return located(surveyor.api, read, made.exchange)
-
-
-def located(api: RestInterface, read: Operation, made: Exchange) -> str:
-    """Return the path of a created thing, as far as the response tells its location, or an empty text."""
-    sent, answer = made.request.url, made.response
-    location, targets = answer.header("location"), []
-    if location and is_same(joined(sent, location), sent):
-        targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
-    if id_ := identified(read_json(answer.body).value, read)[1]:
-        base = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/")
-        targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
-    pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
-    usable = list(dict.fromkeys(one for one in targets if re.fullmatch(pattern, one)))
-    # The Location header may be wrong, so try it.
-    found = (one for one in usable if len(usable) == 1 or api.send(Outgoing("GET", one)).response.ok)
-    return next(found, "")
 
 
 @dataclass
@@ -195,7 +149,7 @@ class _Thing:
         inputs = inputs if body is None else replace(inputs, body=body)
         request = written(operation, inputs)
         given = {name.lower() for name, _ in fields}
-        headers = (*(one for one in request.headers if one[0].lower() not in given), *fields)
+        headers = (*(pair for pair in request.headers if pair[0].lower() not in given), *fields)
         kind = Kind.ODD if given or place else Kind.AGAIN
         request = replace(request, target=self.target, headers=headers)
         return self.surveyor.send(operation, Variation(kind, "", place, inputs), request)
@@ -258,7 +212,7 @@ class _Thing:
 
         That is a wrong condition or none, no format that the device has, and no credentials.
         """
-        names = {one.name.lower() for one in change.parameter("header")}
+        names = {parameter.name.lower() for parameter in change.parameter("header")}
         # Twice, because a device may take the second try for a wish to overwrite.
         tried: list[tuple[tuple[str, str], ...]] = [(("If-Match", NO_TAG),)] * 2 if self.tag else []
         if self._current() and "if-match" in names:
@@ -293,15 +247,15 @@ class _Thing:
 
         What they have changed is restored, so that each write after it changes its member, whoever was first.
         """
-        names = {one.name.lower() for one in change.parameter("header")}
+        names = {parameter.name.lower() for parameter in change.parameter("header")}
         now = self._members()
         others = [one for one in bodies if any(not same(now.get(name), one[name]) for name in one)]
         if self._current() and "if-match" in names and len(others) > 1:
             inputs = usual_inputs(change, self.surveyor.values)[0]
             own = [written(change, replace(inputs, body=body)) for body in others[:2]]
-            fields = [tuple(one for one in own[0].headers if one[0].lower() != "if-match"), self._current()]
-            requests = [replace(one, target=self.target, headers=(*fields[0], *fields[1])) for one in own]
-            send_together([[(self.api.client, one) for one in requests]])
+            fields = [tuple(pair for pair in own[0].headers if pair[0].lower() != "if-match"), self._current()]
+            requests = [replace(request, target=self.target, headers=(*fields[0], *fields[1])) for request in own]
+            send_together([[(self.api.client, request) for request in requests]])
             self.get()
             self.sent(change, bodies[-1], *self._current())
             self.get()
@@ -309,8 +263,8 @@ class _Thing:
     def _other(self, bodies: Sequence[Any]) -> Any:
         """Return a body that would change it; None without any."""
         now = self._members()
-        objects = (one for one in bodies if isinstance(one, dict))
-        others = (one for one in objects if any(not same(now.get(name), one[name]) for name in one))
+        objects = (body for body in bodies if isinstance(body, dict))
+        others = (item for item in objects if any(not same(now.get(name), item[name]) for name in item))
         return next(others, bodies[0] if bodies else None)
 
     def _behind(self, change: Operation, body: Any, old: str) -> None:
@@ -324,13 +278,15 @@ class _Thing:
     def filled(self) -> None:
         """Upload files to a thing or to a sub-resource, and read them back: all bytes must be the same."""
         own = self.read.template.rstrip("/")
-        operations = {(one.method, one.template): one for one in operations_of(self.api.run.contract)}
+        operations = {
+            (operation.method, operation.template): operation for operation in operations_of(self.api.run.contract)
+        }
         for (method, template), read in operations.items():
             put = operations.get(("PUT", template))
             below = template.rstrip("/").removeprefix(own)
             if method != "GET" or put is None or not f"{template}/".startswith(f"{own}/") or "{" in below:
                 continue
-            media_type = next((one for one in put.bodies if keeps_octets(one)), "")
+            media_type = next((body for body in put.bodies if keeps_octets(body)), "")
             if not (media_type or _TEXT in put.bodies) or not (allowed(self.api, put) and allowed(self.api, read)):
                 continue
             path = self.target.rstrip("/") + below
@@ -361,12 +317,12 @@ class _Thing:
             if method != "POST" or read is None or not template.startswith(f"{own}/") or "{" in below:
                 continue
             usual = usual_inputs(create, values)[0]
-            bodies = [usual.body, _with_texts(create, usual.body)] if listing is not None else []
+            bodies = [usual.body, with_texts(create, usual.body)] if listing is not None else []
             made = [self._at(create, replace(usual, body=body), below) for body in bodies if body is not None]
             if not made or listing is None:
                 continue
-            known = (str(one) for one in values.known_ids(self.read, self.read.parameter("path")[-1]))
-            others = (f"{self.target.rstrip('/').rpartition('/')[0]}/{quote(one, safe='')}{below}" for one in known)
+            known = (str(item) for item in values.known_ids(self.read, self.read.parameter("path")[-1]))
+            others = (f"{self.target.rstrip('/').rpartition('/')[0]}/{quote(text, safe='')}{below}" for text in known)
             other = next((one for one in others if one != self.target.rstrip("/") + below), "")
             before = self._items(listing, other)
             for outgoing, inputs in made:
@@ -379,7 +335,7 @@ class _Thing:
             page = page_of(found.response, read) if found is not None else None
             after = self._items(listing, other) if before is not None and page is not None else None
             if after is not None and before is not None and page is not None:
-                both = [one for one in after[1] if one in page.items and one not in before[1]]
+                both = [item for item in after[1] if item in page.items and item not in before[1]]
                 expected, fault = f"no item that was created at {outgoing.target}", f"{shown(both[0])}" if both else ""
                 self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
             self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
@@ -407,13 +363,13 @@ class _Thing:
     ) -> None:
         """Write to a file that is there as if it were not, delete it, and write it again; read it after each."""
         steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = []
-        if any(one.name.lower() == "if-none-match" for one in put.parameter("header")):
+        if any(parameter.name.lower() == "if-none-match" for parameter in put.parameter("header")):
             steps.append((put, request, (("If-None-Match", "*"),)))
         if delete is not None and allowed(self.api, delete):
             own = written(delete, usual_inputs(delete, self.surveyor.values)[0])
             steps.append((delete, replace(own, target=whole.target), ()))
         for operation, outgoing, fields in steps:
-            headers = (*(one for one in outgoing.headers if one[0].lower() != "if-none-match"), *fields)
+            headers = (*(pair for pair in outgoing.headers if pair[0].lower() != "if-none-match"), *fields)
             odd = Variation(Kind.ODD, "", "", Inputs())
             done = self.surveyor.send(operation, odd, replace(outgoing, headers=headers))
             if operation is delete and done.ok:
@@ -528,7 +484,7 @@ class _Thing:
             is_last = time.monotonic() - began > _SETTLES_S
             found = self.surveyor.send(listing.operation, Variation(Kind.AGAIN, "", "", inputs)).exchange
             page = page_of(found.response, listing.operation) if found is not None else None
-            if is_last or page is None or id_ not in {identifier_of(one, self.read) for one in page.items}:
+            if is_last or page is None or id_ not in {identifier_of(item, self.read) for item in page.items}:
                 return
             time.sleep(_PAUSE_S)
 
@@ -543,7 +499,7 @@ class _Thing:
         whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
         values = another(schema, whole, 1, self.surveyor.values.collections)
         chosen = {name: value for name, value in values.items() if value != whole.get(name)}
-        chosen |= {name: one for name, one in _texts(schema, whole).items() if name in chosen}
+        chosen |= {name: one for name, one in other_texts(schema, whole).items() if name in chosen}
         found = []
         is_there = not self.is_own and bool(self.read.parameter("path"))
         parts, collections = flat(schema).get("properties", {}), self.surveyor.values.collections
@@ -563,7 +519,9 @@ def _by_format(change: Operation) -> list[Operation]:
 
 def _fits(change: Operation, tags: str) -> bool:
     """Return whether an operation's declared If-Match allows these tags."""
-    return all(fits(one.schema, tags) for one in change.parameter("header") if one.name.lower() == "if-match")
+    return all(
+        fits(parameter.schema, tags) for parameter in change.parameter("header") if parameter.name.lower() == "if-match"
+    )
 
 
 def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -577,23 +535,5 @@ def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]
     yield from ({one.name: value, **many} for one, value in usable)
 
 
-def _with_texts(create: Operation, body: Any) -> Any:
-    """Return a JSON object with non-ASCII texts in place of its texts, or None."""
-    media_type = next(iter(create.bodies), "")
-    if not is_json(media_type) or not isinstance(body, dict):
-        return None
-    schema = create.bodies[media_type].schema
-    changed = {**body, **_texts(schema, body)}
-    return changed if changed != body and fits(schema, changed) else None
-
-
-def _texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
-    """Return another text, beyond ASCII, for each free text of an object."""
-    parts = flat(schema).get("properties", {})
-    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
-    found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
-    return {name: texts[0] for name, texts in found.items() if texts}
-
-
 def _is_beyond_ascii(body: dict[str, Any]) -> bool:
-    return any(isinstance(one, str) and not one.isascii() for one in body.values())
+    return any(isinstance(item, str) and not item.isascii() for item in body.values())

@@ -49,7 +49,7 @@ class Reaching:
         With any other tag in If-Match, the device would refuse it (RFC 9110 13.1.1).
         """
         request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
-        others = tuple(one for one in request.headers if one[0].lower() != _IF_MATCH)
+        others = tuple(pair for pair in request.headers if pair[0].lower() != _IF_MATCH)
         needs = len(others) < len(request.headers) or operation.label in self.wants_tag
         if operation.safe or not needs or variation.place.lower() == f"header {_IF_MATCH}":
             return request

@@ -79,7 +79,7 @@ def refuse_creation(living: Living, create: Operation, turn: int) -> None:
         tried.append(writer.send(create, "", other[0], media_type=_TEXT))
         if "406" in create.responses:
             tried.append(writer.send(create, "", other[1], headers=(("Accept", NO_FORMAT),)))
-    refused = [one for one in tried if is_refused(one, create)]
+    refused = [exchange for exchange in tried if is_refused(exchange, create)]
     before = living.listing.ids
     listing = living.list_of(living.things[-1]) if refused else living.listing
     for sent in refused:

@@ -97,11 +97,11 @@ class Rule:
 def _by_operation(trace: Any) -> dict[str, Any]:
     """Return the part of a trace that each operation has; empty if its parts do not name operations."""
     whole: tuple[Any, ...] = trace if isinstance(trace, tuple) else getattr(trace, "probes", ())
-    if not all(hasattr(one, "operation") for one in whole):
+    if not all(hasattr(item, "operation") for item in whole):
         return {}
     parts: dict[str, tuple[Any, ...]] = {}
-    for one in whole:
-        parts[one.operation] = (*parts.get(one.operation, ()), one)
+    for item in whole:
+        parts[item.operation] = (*parts.get(item.operation, ()), item)
     return {label: part if isinstance(trace, tuple) else replace(trace, probes=part) for label, part in parts.items()}
 
 
@@ -112,15 +112,15 @@ def rule(requirement: str, *, on: tuple[Scenario, ...]) -> Callable[[Callable[..
 
 def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
     """Record the outcomes of a rule as evidence."""
-    for one in outcomes:
-        match one:
+    for outcome in outcomes:
+        match outcome:
             case Case():
-                judge.record(one, requirement)
+                judge.record(outcome, requirement)
             case NotTested():
-                judge.skip(requirement, one.reason)
+                judge.skip(requirement, outcome.reason)
             case NotSeen():
-                judge.not_seen(requirement, one.reason)
+                judge.not_seen(requirement, outcome.reason)
             case NotClaimed():
-                judge.unclaimed(requirement, one.reason)
+                judge.unclaimed(requirement, outcome.reason)
             case Note():
-                judge.note(requirement, one.remark)
+                judge.note(requirement, outcome.remark)

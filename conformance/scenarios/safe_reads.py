@@ -24,8 +24,8 @@ from conformance.api.rest.values import Values
 from conformance.documents.json_text import shown
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
+from conformance.scenarios.creating import created_path
 from conformance.scenarios.living import ABSENT
-from conformance.scenarios.own_things import created_path
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -113,7 +113,7 @@ class _Watch:
     def _resource(self, path: str, read: Operation) -> list[_Resource]:
         """Return a resource to watch: one that always exists and is written, or one that is created."""
         writes = [self._operations[name, path] for name in ("PUT", "PATCH") if (name, path) in self._operations]
-        writes = [one for one in writes if is_json(next(iter(one.bodies), ""))]
+        writes = [operation for operation in writes if is_json(next(iter(operation.bodies), ""))]
         write = writes[0] if writes else None
         if not read.parameter("path"):
             single = write is not None and is_free(write, path) and write
@@ -140,27 +140,27 @@ class _Watch:
     def play(self) -> list[Watched]:
         """Return the record of each resource."""
         try:
-            self.resources = [one for one in self.resources if self._settled(one)]
+            self.resources = [resource for resource in self.resources if self._settled(resource)]
             # An earlier safe request may already have undone a change, so write something just before them.
-            for one in self.resources:
-                self._changed(one)
+            for resource in self.resources:
+                self._changed(resource)
             found = dict[str, Watched]()
             # HEAD may undo what GET changed, so each method is tried apart.
             for methods in (("GET",), ("HEAD", "OPTIONS")):
                 began = time.monotonic()
                 self._send(self._safe(methods))
                 took = min(_MOST_S, max(_LEAST_S, time.monotonic() - began))
-                for one in self.resources:
-                    if not (one.read.label in found and found[one.read.label].fault):
-                        found[one.read.label] = self._judged(one, methods, took)
+                for resource in self.resources:
+                    if not (resource.read.label in found and found[resource.read.label].fault):
+                        found[resource.read.label] = self._judged(resource, methods, took)
             return list(found.values())
         finally:
-            for one in self.resources:
-                if one.first:
-                    one.was = one.first
-                    self._restored(one)
-                if one.delete is not None:
-                    self.writer.conditional(one.delete, one.read, one.path)
+            for resource in self.resources:
+                if resource.first:
+                    resource.was = resource.first
+                    self._restored(resource)
+                if resource.delete is not None:
+                    self.writer.conditional(resource.delete, resource.read, resource.path)
 
     def _settled(self, one: _Resource) -> bool:
         """Note how a resource reads, twice alike; return whether it can be watched."""
@@ -195,12 +195,12 @@ class _Watch:
 
     def _safe(self, methods: Sequence[str]) -> Iterator[Outgoing]:
         """Yield safe requests: for each reading operation, on a thing that this run created if possible."""
-        made = {one.read.template.rstrip("/"): one.path for one in self.resources if one.path}
+        made = {resource.read.template.rstrip("/"): resource.path for resource in self.resources if resource.path}
         for (method, template), read in self._operations.items():
             if method != "GET":
                 continue
             request = written(read, usual_inputs(read, self.writer.values)[0])
-            own = next((one for one in made if f"{template}/".startswith(f"{one}/")), "")
+            own = next((text for text in made if f"{template}/".startswith(f"{text}/")), "")
             if own and "{" not in template[len(own) :]:
                 rest = "".join(request.target.partition("?")[1:])
                 request = replace(request, target=made[own].rstrip("/") + template[len(own) :] + rest)

@@ -172,7 +172,7 @@ def is_changeable(name: str, schema: Schema, collections: frozenset[str]) -> boo
 def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterator[Any]:
     """Yield other values of a member that its schema allows: each of an enumeration, at its edges, and falsy ones."""
     given, kinds = flat(schema), kinds_of(schema)
-    found: list[Any] = [one for one in given.get("enum", ()) if one is not None][:_MOST_VALUES]
+    found: list[Any] = [item for item in given.get("enum", ()) if item is not None][:_MOST_VALUES]
     if not found and isinstance(first, bool):
         found = [not first]
     elif not found and is_number(first):
@@ -185,5 +185,5 @@ def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterat
         found = ["roaas 1", ""]
     elif isinstance(first, dict):
         found = [another(schema, first, turn, collections) for turn in range(_TURNS)]
-    usable = [one for one in found if one is not None and one != first and fits(schema, one)]
+    usable = [item for item in found if item is not None and item != first and fits(schema, item)]
     yield from (one for index, one in enumerate(usable) if one not in usable[:index])

@@ -233,8 +233,8 @@ class _Changes:
     def _refuse(self, act: Act, declared: Element, node: Node, turn: int) -> None:
         """Send new values with one that the schema forbids."""
         kind = ("lexical", "missing", "unknown")[turn % _REFUSALS]
-        tried = sorted(mutations(declared, node), key=lambda one: one.kind != kind)
-        tried = [one for one in tried if one.kind in {"lexical", "missing", "unknown"}]
+        tried = sorted(mutations(declared, node), key=lambda mutation: mutation.kind != kind)
+        tried = [mutation for mutation in tried if mutation.kind in {"lexical", "missing", "unknown"}]
         for wrong in islice(invalid_ones(tried, self.caller.messages.found.types), 1):
             self.caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)
         if turn % 2:
@@ -296,7 +296,7 @@ class _Changes:
                 probe = self.caller.ask(act, node, "a message that creates")
             told = {name: texts[0] for name, texts in _told(probe).items() if len(texts) == 1}
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
-            asks = [Node("", "", tuple(Node(*one) for one in told.items())), *asks]
+            asks = [Node("", "", tuple(Node(*pair) for pair in told.items())), *asks]
             if not turn:
                 # The first thing shows that things last longer than the others exist before they are removed.
                 time.sleep(_LASTS_S)
@@ -362,7 +362,7 @@ class _Changes:
                 self.caller.ask(act, node, "the values that were there before")
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
             # Comments are sent to no device that rejects them: client libraries write none.
-            for says, style in [one for one in single_changes() if "comment" not in one[0]]:
+            for says, style in [pair for pair in single_changes() if "comment" not in pair[0]]:
                 self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
             for says, text, actor in _BLOCKS:
                 block = mandatory(act.port, text, actor)
@@ -414,7 +414,7 @@ def _told(probe: SoapProbe) -> dict[str, list[str]]:
         inside = probe.inside() if probe.succeeded else []
     except NotSoapError:
         return {}
-    return {name: texts for one in inside for name, texts in texts_of(one).items()}
+    return {name: texts for element in inside for name, texts in texts_of(element).items()}
 
 
 def _asked(node: Node | None, written: Node) -> Node | None:
@@ -471,7 +471,7 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
             if simple.builtin == "boolean"
             else []
         )
-        others += [plain(one) for one in simple.others if name.lower() in free]
+        others += [plain(type_) for type_ in simple.others if name.lower() in free]
         # Two values of one type may bound each other.
         if types.count(simple) == 1 and simple.builtin in NUMBERS and name.lower() in free:
             others += [f"{bound:f}" for bound in (simple.minimum, simple.maximum) if bound is not None]

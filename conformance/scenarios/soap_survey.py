@@ -121,7 +121,7 @@ class SoapProbe:
             raise NotSoapError(f"the root element {root.tag}")
         if has_doctype(root) or has_instruction(root):
             raise NotSoapError("a DOCTYPE or a processing instruction, which SOAP forbids")
-        body = [one for one in elements(root) if one.tag == clark(self.envelope, "Body")]
+        body = [element for element in elements(root) if element.tag == clark(self.envelope, "Body")]
         if len(body) != 1:
             raise NotSoapError(f"an Envelope with {len(body)} Body elements")
         return elements(body[0])
@@ -130,7 +130,7 @@ class SoapProbe:
     def fault(self) -> etree._Element | None:
         """The fault in the response, or None."""
         try:
-            return next((one for one in self.inside() if one.tag == clark(self.envelope, "Fault")), None)
+            return next((element for element in self.inside() if element.tag == clark(self.envelope, "Fault")), None)
         except NotSoapError:
             return None
 
@@ -322,9 +322,11 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
     until = time.monotonic() + _BUDGET_S
     tried = list(mutations(declared, node)) if declared and node else []
     drawn = [
-        one
+        mutation
         for kind in _FORBIDDEN
-        for one in effort.draw([each for each in tried if each.kind == kind], _MOST, f"{caller.api.run.seed}/{kind}")
+        for mutation in effort.draw(
+            [each for each in tried if each.kind == kind], _MOST, f"{caller.api.run.seed}/{kind}"
+        )
     ]
     types = caller.messages.found.types
     near = list(invalid_ones(facets(declared, node), types)) if declared and node else []
@@ -415,7 +417,7 @@ def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
         return
     texts = {node.at(path).name.lower(): node.at(path).text for path in node.paths()} if node else {}
     with contextlib.suppress(NotSoapError):
-        texts |= {name: found[0] for one in probe.inside() for name, found in texts_of(one).items()}
+        texts |= {name: found[0] for element in probe.inside() for name, found in texts_of(element).items()}
     for reader in caller.acts.values():
         is_its = reader.role is Role.READS and reader.needs and reader.needs <= texts.keys()
         if is_its and reader.label not in caller.lost:

@@ -86,7 +86,7 @@ def special_bodies(
     ]
     rich = {name: one for name, one in _rich(parts, there, values.collections).items() if may(name)}
     empty: dict[str, Any] = {name: [] for name in rich.keys() | changed.keys() if isinstance(there[name], list)}
-    yield from (one for one in (changed, *zoned, rich, empty) if one and fits(schema, one))
+    yield from (item for item in (changed, *zoned, rich, empty) if item and fits(schema, item))
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
         yield restored
@@ -146,7 +146,7 @@ def _replacing(
         least |= {name: one for name, one in other.items() if may(name)}
         left_out = [flat(one) for name, one in parts_of(schema).items() if name not in least]
         goes = needed is not None and any(name not in least and name not in needed for name in base)
-        if (goes or any("default" in one for one in left_out)) and fits(schema, least):
+        if (goes or any("default" in item for item in left_out)) and fits(schema, least):
             yield least
     if fits(schema, base):
         yield base
@@ -155,13 +155,13 @@ def _replacing(
 def half_valid(change: Operation, usual: Inputs, valid: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield valid bodies with one value that the description forbids: of the last member, and of the first."""
     names = list(flat(change.bodies[usual.media_type].schema).get("properties", {}))
-    ordered = {name: valid[name] for name in sorted(valid, key=lambda one: names.index(one) if one in names else 0)}
+    ordered = {name: valid[name] for name in sorted(valid, key=lambda text: names.index(text) if text in names else 0)}
     by_place: dict[str, Any] = {}
-    for one in invalid_variations(change, replace(usual, body=ordered)):
-        if one.kind is Kind.INVALID and isinstance(one.inputs.body, dict):
-            by_place.setdefault(one.place, one.inputs.body)
+    for variation in invalid_variations(change, replace(usual, body=ordered)):
+        if variation.kind is Kind.INVALID and isinstance(variation.inputs.body, dict):
+            by_place.setdefault(variation.place, variation.inputs.body)
     wrong = [by_place[f"body /{name}"] for name in ordered if f"body /{name}" in by_place]
-    yield from {id(one): one for one in (wrong[-1:] + wrong[:1])}.values()
+    yield from {id(item): item for item in (wrong[-1:] + wrong[:1])}.values()
 
 
 def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
@@ -174,7 +174,7 @@ def telling(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
         if isinstance(body[name], dict):
             found[name] = telling(given, body[name], turn, collections)
             continue
-        usable = (one for one in _telling(given, found[name], turn) if one != body[name] and fits(given, one))
+        usable = (item for item in _telling(given, found[name], turn) if item != body[name] and fits(given, item))
         value = next(usable, found[name])
         found[name] = value if fits(schema, {**found, name: value}) else found[name]
     return found
@@ -197,7 +197,7 @@ def _telling(schema: Schema, value: Any, turn: int) -> Iterator[Any]:
     elif isinstance(value, str) and is_free_text(schema):
         # The longest allowed text: a device may cut it, or count bytes.
         most = min(schema.get("maxLength", 0), _LONGEST)
-        yield from (*((one * most)[:most] for one in TEXTS[:1] if most > len(one)), *TEXTS)
+        yield from (*((text * most)[:most] for text in TEXTS[:1] if most > len(text)), *TEXTS)
 
 
 def _nulls(
@@ -213,13 +213,13 @@ def _nulls(
         gone = [name for name in names if now().get(name) is not None]
         rest = {one: value for one, value in usable.items() if one not in nulls and one not in own}
         others = another({"properties": parts}, rest, turn + 3, values.collections)
-        beside = next((one for one in others if others[one] not in (None, now().get(one))), None)
+        beside = next((other for other in others if others[other] not in (None, now().get(other))), None)
         if gone:
             yield {**dict.fromkeys(gone), **({beside: others[beside]} if beside else {})}
     changed = telling({"properties": parts}, {name: usable[name] for name in usable if name not in own}, 1, frozenset())
-    for name in [one for one in changed if isinstance(changed[one], list) and changed[one] != usable[one]][:1]:
+    for name in [text for text in changed if isinstance(changed[text], list) and changed[text] != usable[text]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
-    for name, given in ((one, entry_of(flat(parts[one]))) for one in usable if one not in own):
+    for name, given in ((text, entry_of(flat(parts[text]))) for text in usable if text not in own):
         # Add an entry to a map beside the existing one, then remove all.
         entry = sample(given) if given is not None else None
         if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):
@@ -228,7 +228,7 @@ def _nulls(
             yield {name: dict.fromkeys(_KEYS)}
             break
     for name, value in changed.items():
-        inner = [one for one in value if value[one] != usable[name].get(one)] if isinstance(value, dict) else []
+        inner = [item for item in value if value[item] != usable[name].get(item)] if isinstance(value, dict) else []
         if inner and len(value) > 1:
             # Each member alone: the others must keep the value of the patch before.
             for one in inner[:2]:
@@ -294,7 +294,7 @@ def _patches(
         for name, value in first.items()
         if there.get(name) != value
     ]
-    restored = [one for one in restored if fits(schema, [one])]
+    restored = [item for item in restored if fits(schema, [item])]
     if restored:
         yield restored
 
@@ -351,7 +351,7 @@ def with_owned(change: Operation, read: Operation, body: Any) -> dict[str, Any] 
     schema = change.bodies[media_type].schema
     shown = {**flat(schema).get("properties", {}), **parts_of(read.shape or {})}
     own = {name: _own_value(one) for name, one in shown.items() if isinstance(one, dict) and flat(one).get("readOnly")}
-    identifying = {plain_name(one.name) for one in read.parameter("path")} | {"id"}
+    identifying = {plain_name(parameter.name) for parameter in read.parameter("path")} | {"id"}
     own = {name: one for name, one in own.items() if one is not None and plain_name(name) not in identifying}
     changed = {**body, **own}
     return changed if own and fits(schema, changed) else None
@@ -361,11 +361,11 @@ def _own_value(schema: Schema) -> Any:
     """Return a value that a device hardly chooses itself; None if the schema has few values."""
     given = flat(schema)
     candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
-    return None if "enum" in given else next((one for one in candidates if fits(schema, one)), None)
+    return None if "enum" in given else next((candidate for candidate in candidates if fits(schema, candidate)), None)
 
 
 def parts_of(schema: Schema) -> dict[str, Any]:
     """Return the members of a schema, or of the object in its envelope."""
     outer: dict[str, Any] = flat(schema).get("properties", {})
-    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
+    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
     return inner[0] if len(outer) == 1 and inner[0] else outer

@@ -148,19 +148,19 @@ class Survey:
 
     def of(self, operation: str, *kinds: Kind) -> list[Probe]:
         """Return the probes of one operation, of these kinds or of all."""
-        return [one for one in self._by_operation.get(operation, ()) if not kinds or one.kind in kinds]
+        return [probe for probe in self._by_operation.get(operation, ()) if not kinds or probe.kind in kinds]
 
     @cached_property
     def _by_operation(self) -> dict[str, list[Probe]]:
         found: dict[str, list[Probe]] = {}
-        for one in self.probes:
-            found.setdefault(one.operation, []).append(one)
+        for probe in self.probes:
+            found.setdefault(probe.operation, []).append(probe)
         return found
 
     def held(self, label: str) -> bool:
         """Return whether the device's state kept it from acting on each usual request of an operation."""
-        statuses = {one.status for one in self.of(label, Kind.USUAL) if not one.invents}
-        return bool(statuses) and statuses <= HELD and not any(one.ok for one in self.of(label))
+        statuses = {probe.status for probe in self.of(label, Kind.USUAL) if not probe.invents}
+        return bool(statuses) and statuses <= HELD and not any(probe.ok for probe in self.of(label))
 
     def lacks(self, operation: Operation) -> bool:
         """Return whether the device answered each usual request as if it did not have the operation.
@@ -168,15 +168,15 @@ class Survey:
         A declared 404, or one for an identifier in the path, says that something else is not there. So does a 404 for
         values in query or body, if others were accepted, or if a path that nobody describes is answered otherwise.
         """
-        if has_input(operation) and any(one.ok for one in self.of(operation.label)):
+        if has_input(operation) and any(probe.ok for probe in self.of(operation.label)):
             return False
         named = bool(operation.parameter("path") or {"404", "4XX", "4xx"} & operation.responses.keys())
         absent = _NOT_THERE - {_NOT_FOUND} if named else _NOT_THERE
         usual = self.of(operation.label, Kind.USUAL)
         unknown = self.elsewhere.get(operation.label)
-        if unknown is not None and any(one.exchange and differ(one.exchange, unknown) for one in usual):
+        if unknown is not None and any(probe.exchange and differ(probe.exchange, unknown) for probe in usual):
             return False
-        return bool(usual) and all(one.status in absent for one in usual)
+        return bool(usual) and all(probe.status in absent for probe in usual)
 
 
 @dataclass
@@ -301,8 +301,8 @@ class Surveyor:
         """Where an operation's usual requests were all answered 404, get a path beside it that is not described."""
         if not has_input(operation) or self.api.usual_status.get(operation.label) != _NOT_FOUND:
             return
-        usual = [one for one in self.probes if one.kind is Kind.USUAL and one.operation == operation.label]
-        if any(one.status != _NOT_FOUND for one in usual):
+        usual = [probe for probe in self.probes if probe.kind is Kind.USUAL and probe.operation == operation.label]
+        if any(probe.status != _NOT_FOUND for probe in usual):
             return
         path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
         path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
@@ -374,16 +374,16 @@ class Surveyor:
             began = time.monotonic()
             until = began + left
             self.api.run.tally.planned += len(variations)
-            for one in variations:
+            for variation in variations:
                 if operation.label in self.given_up:
                     return
                 if time.monotonic() > until:
                     self.cut_short(f"survey of {operation.label}")
                     continue
-                sent = self.send(operation, one)
-                for part in one.parts if sent.ok else ():
+                sent = self.send(operation, variation)
+                for part in variation.parts if sent.ok else ():
                     self.probes.append(replace(sent, kind=part.kind, says=part.says, place=part.place))
-                for part in one.parts[:parts] if sent.status in REFUSALS else ():
+                for part in variation.parts[:parts] if sent.status in REFUSALS else ():
                     parts -= 1
                     self.send(operation, part)
             self._time(operation, usual, effort, until)
@@ -437,10 +437,12 @@ class Surveyor:
     def try_again(self, operations: Sequence[Operation]) -> None:
         """Send valid requests that were refused once more in another state, by other values of settings beside them."""
         by_label = {item.label: item for item in operations}
-        enums = [one for one in self.probes if one.ok and one.kind is Kind.ENUM and one.operation in by_label]
-        refused = [one for one in self.probes if one.kind in {Kind.BOUND, Kind.ENUM} and one.status in {400, 422}]
-        for one in [one for one in refused if one.validity == VALID and one.operation in by_label][:_TRIED]:
-            operation = by_label[one.operation]
+        enums = [probe for probe in self.probes if probe.ok and probe.kind is Kind.ENUM and probe.operation in by_label]
+        refused = [
+            probe for probe in self.probes if probe.kind in {Kind.BOUND, Kind.ENUM} and probe.status in {400, 422}
+        ]
+        for probe in [one for one in refused if one.validity == VALID and one.operation in by_label][:_TRIED]:
+            operation = by_label[probe.operation]
             settings = [by_label[other.operation] for other in enums]
             near = [
                 (item, other)
@@ -449,9 +451,8 @@ class Surveyor:
             ]
             for item, other in near[:_STATES]:
                 self.send(item, Variation(Kind.AGAIN, "", "", self.usual[item.label]), self._again(other))
-                self.send(
-                    operation, Variation(one.kind, one.says, one.place, self.usual[operation.label]), self._again(one)
-                )
+                again = Variation(probe.kind, probe.says, probe.place, self.usual[operation.label])
+                self.send(operation, again, self._again(probe))
             for item in dict.fromkeys(item for item, _ in near[:_STATES]):
                 self.send(item, Variation(Kind.AGAIN, "", "", self.usual[item.label]))
 

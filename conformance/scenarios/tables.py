@@ -23,7 +23,7 @@ from conformance.documents.json_text import shown
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.xsd_shapes import number_in
-from conformance.scenarios.own_things import created_path
+from conformance.scenarios.creating import created_path
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Surveyor
@@ -63,7 +63,7 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
     """Read each list that has CSV and JSON in both formats; a difference counts if it appears twice."""
     found, operations = list[Table](), callable_operations(api)
     gets = [one for (method, _), one in operations.items() if method == "GET"]
-    reads = [one for one in gets if _CSV in one.formats and any(map(is_json, one.formats))]
+    reads = [operation for operation in gets if _CSV in operation.formats and any(map(is_json, operation.formats))]
     with _quoted_texts(api, values, operations if reads else {}):
         for read in reads:
             api.run.limit.check()
@@ -71,7 +71,7 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
                 for compare in (_compared, _chosen):
                     first = compare(api, values, read)
                     again = compare(api, values, read) if first is not None and first.fault else first
-                    found += [one for one in (again,) if one is not None]
+                    found += [table for table in (again,) if table is not None]
     if not found:
         raise NoOccasionError("no list is declared as CSV and as JSON, and was the same twice")
     return tuple(found)
@@ -102,21 +102,21 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
     """Read a list as JSON, as CSV and as JSON; None if it has changed meanwhile, or is no list with the same names."""
     request = written(read, usual_inputs(read, values)[0])
     json_type = next(filter(is_json, read.formats))
-    kept = tuple(one for one in request.headers if one[0].lower() != "accept")
+    kept = tuple(pair for pair in request.headers if pair[0].lower() != "accept")
     before, table, after = (
         api.client.send("GET", request.target, headers=(*kept, ("Accept", name)))
         for name in (json_type, _CSV, json_type)
     )
-    pages = [page_of(one.response, read) for one in (before, after)]
+    pages = [page_of(exchange.response, read) for exchange in (before, after)]
     answer = table.response
     if pages[0] is None or pages[1] is None or answer.media_type != _CSV or not (answer.ok and before.response.ok):
         return None
-    items = [one for one in pages[0].items if isinstance(one, dict)]
+    items = [item for item in pages[0].items if isinstance(item, dict)]
     if not items or pages[0].items != pages[1].items or len(items) < len(pages[0].items) or answer.cut:
         return None
     rows = _rows(table)
     columns, head = _columns(rows[0], items) if rows else {}, ",".join(rows[0]) if rows else ""
-    other = next((one for one in ";\t|" if len(_columns(head.split(one), items)) > len(columns)), "")
+    other = next((text for text in ";\t|" if len(_columns(head.split(text), items)) > len(columns)), "")
     if other and _COMMAS.search(read.text):
         expected = "values that commas separate, as the description says (RFC 4180 2)"
         return Table(read.label, table, expected, f"{other!r} between the names in the first line")
@@ -137,14 +137,14 @@ def _chosen(api: RestInterface, values: Values, read: Operation) -> Table | None
         return api.client.send("GET", request.target, headers=request.headers)
 
     page = page_of(ask(json_type).response, read)
-    items = [one for one in page.items if isinstance(one, dict)] if page is not None else []
+    items = [item for item in page.items if isinstance(item, dict)] if page is not None else []
     for name, filter_ in listing.filters.items() if listing is not None else ():
-        texts = list(dict.fromkeys(one[name] for one in items if isinstance(one.get(name), str)))
+        texts = list(dict.fromkeys(item[name] for item in items if isinstance(item.get(name), str)))
         if len(texts) < 2 or not fits(filter_.schema, texts[0]):  # noqa: PLR2004 - one shows no choice
             continue
         page = page_of(ask(json_type, **{filter_.name: texts[0]}).response, read)
         table = ask(_CSV, **{filter_.name: texts[0]})
-        own = {one.get(name) for one in page.items if isinstance(one, dict)} if page is not None else set()
+        own = {item.get(name) for item in page.items if isinstance(item, dict)} if page is not None else set()
         rows = _rows(table)
         place = _columns(rows[0], items).get(name) if rows else None
         if own != {texts[0]} or place is None or not table.response.ok:

@@ -54,7 +54,7 @@ def chooses(lister: Operation) -> bool:
         if listing
         else ()
     )
-    return any(one not in parts for one in lister.parameter("query"))
+    return any(parameter not in parts for parameter in lister.parameter("query"))
 
 
 def read_whole(
@@ -116,7 +116,7 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
     said = [one for part in page.around for name, one in part.items() if plain_name(name) in _LIMITS]
     most = listing.most({name: str(one) for name, one in sent.items()}) if listing is not None else 0
     return bool(count) and (
-        count in {most, *(one for one in said if isinstance(one, int))} or (count >= _FEWEST and count % _ROUND == 0)
+        count in {most, *(item for item in said if isinstance(item, int))} or (count >= _FEWEST and count % _ROUND == 0)
     )
 
 

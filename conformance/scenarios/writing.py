@@ -109,7 +109,7 @@ class Writer:
         request = written(operation, renewed(operation, inputs, self.values))
         rest = "".join(request.target.partition("?")[1:])
         given = {name.lower() for name, _ in headers}
-        kept = [one for one in request.headers if one[0].lower() not in given]
+        kept = [pair for pair in request.headers if pair[0].lower() not in given]
         request = replace(request, headers=(*kept, *headers))
         request = request.having_type(media_type) if media_type else request
         return replace(request, target=path + rest) if path else request
@@ -154,7 +154,7 @@ class Writer:
 
         found = self.until(read, holds)
         lasting = set(seen[-1]).intersection(*seen[-_LAST:])
-        return Settled(found, tuple(one for one in seen[-1] if one in lasting))
+        return Settled(found, tuple(text for text in seen[-1] if text in lasting))
 
     def read_back(
         self,

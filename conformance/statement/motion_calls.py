@@ -64,7 +64,7 @@ def _axes(motion: Mapping[str, Any]) -> set[str]:
     """Return the names of axes and velocities, which templates keep."""
     tables = [motion.get("state"), motion.get("velocity")]
     found = [table.get("axes") for table in tables if isinstance(table, Mapping)]
-    return set().union(*(one for one in found if isinstance(one, Mapping)))
+    return set().union(*(item for item in found if isinstance(item, Mapping)))
 
 
 def _with_values(value: Any, known: Mapping[str, Any]) -> Any:

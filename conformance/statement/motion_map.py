@@ -382,7 +382,7 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("nothing would move: it needs [motion.goto], [motion.velocity] or [motion.switches]")
         axes = set(self.state.axes)
         if self.goto:
-            turns = {f"{name}:/{one}": name for name, axis in self.state.axes.items() if axis.angle for one in "xyzw"}
+            turns = {f"{name}:/{text}": name for name, axis in self.state.axes.items() if axis.angle for text in "xyzw"}
             _check_names("goto", self.goto, axes, {"seconds": "seconds", **turns})
         elif loose := [name for name, axis in self.state.axes.items() if axis.tolerance is None]:
             raise ValueError(f"axis {loose[0]} needs a tolerance, as there is no [motion.goto] that has one")
@@ -417,10 +417,10 @@ class MotionMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
         sent = [call for call, _ in self.bodies]
-        read = [self.state.read, *self.state.agrees, *(one.read for one in self.switches.values())]
-        read += [one.read for one in self.state.axes.values()]
+        read = [self.state.read, *self.state.agrees, *(switch.read for switch in self.switches.values())]
+        read += [axis.read for axis in self.state.axes.values()]
         held = [self.lease.acquire, self.lease.renew, self.lease.release] if self.lease else []
-        steps = [call for one in (*self.before, *self.after) for call in (one.send, one.read)]
+        steps = [call for step in (*self.before, *self.after) for call in (step.send, step.read)]
         return tuple(filter(None, (*read, *sent, *([self.action.read] if self.action else ()), *held, *steps)))
 
     def tolerance(self, axis: str) -> float:

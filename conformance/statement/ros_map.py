@@ -241,9 +241,13 @@ class RosMap(_Forms, frozen=True):
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
-        found = [one for one in self.operations.values() if isinstance(one, Acts | Calls)]
+        found = [operation for operation in self.operations.values() if isinstance(operation, Acts | Calls)]
         states = [one.state.read for one in found if one.state]
-        return (*self.operations, *states, *(one.cancel for one in found if isinstance(one, Acts) and one.cancel))
+        return (
+            *self.operations,
+            *states,
+            *(mapping.cancel for mapping in found if isinstance(mapping, Acts) and mapping.cancel),
+        )
 
     @property
     def described(self) -> tuple[str, ...]:

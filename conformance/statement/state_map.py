@@ -109,8 +109,8 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def states(self) -> tuple[str, ...]:
         """All states that the map names, in the order in which it does."""
-        named = [one for each in self.operations.values() for one in each.states if one]
-        changing = [one for name, each in self.changes.items() for one in (name, *each.to)]
+        named = [state for each in self.operations.values() for state in each.states if state]
+        changing = [text for name, each in self.changes.items() for text in (name, *each.to)]
         return tuple(dict.fromkeys((*named, *changing)))
 
     @property
@@ -128,7 +128,7 @@ class StateMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         found, left = {state}, [state]
         while left:
             change = self.changes.get(left.pop())
-            new = [one for one in (change.to if change else ()) if one not in found]
+            new = [text for text in (change.to if change else ()) if text not in found]
             found.update(new)
             left += new
         return frozenset(found)

@@ -112,7 +112,7 @@ class Statement(msgspec.Struct, frozen=True):
             return tuple(name for name in contract.classes if name in self.claims)
         lacking, described = self.lacking(contract), contract.interfaces
         judged = (item for name, item in contract.classes.items() if name not in lacking)
-        return tuple(item.name for item in judged if any(one in described for one in item.interfaces))
+        return tuple(item.name for item in judged if any(interface in described for interface in item.interfaces))
 
     def lacking(self, contract: Contract) -> dict[str, tuple[Interface, ...]]:
         """Return the classes that are not judged although none were claimed, with the interfaces without an address."""

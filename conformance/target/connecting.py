@@ -76,9 +76,9 @@ def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
         return where
     schemes = document.get("components", {}).get("securitySchemes", {}).values()
     wanted = {
-        f"{one['in']} {one['name']}"
-        for one in schemes
-        if isinstance(one, dict) and one.get("type") == "apiKey" and {"in", "name"} <= one.keys()
+        f"{scheme['in']} {scheme['name']}"
+        for scheme in schemes
+        if isinstance(scheme, dict) and scheme.get("type") == "apiKey" and {"in", "name"} <= scheme.keys()
     }
     if len(wanted) != 1:
         named = f"wants {' and '.join(sorted(wanted))}" if wanted else "names no scheme of type apiKey"
@@ -137,7 +137,7 @@ def _keep_parts(content: bytes) -> None:
         if isinstance(value, dict):
             waiting += value.items()
         elif isinstance(value, list):
-            waiting += [(name, one) for one in value]
+            waiting += [(name, item) for item in value]
         elif isinstance(value, str) and _PROOF.search(name):
             SECRETS.keep(value, "$ROAAS_LOGIN")
 

@@ -132,13 +132,15 @@ def split_args(targets: tuple[str, ...], openapi: str | None, *, new: bool = Fal
     Raises:
         click.UsageError: two descriptions or two statements are named, or there is no such file.
     """
-    for one in targets:
-        if not is_url(one, bridge=True) and not Path(one).exists() and not (new and one.endswith(".toml")):
-            raise click.UsageError(_no_file(one))
+    for target in targets:
+        if not is_url(target, bridge=True) and not Path(target).exists() and not (new and target.endswith(".toml")):
+            raise click.UsageError(_no_file(target))
     described = [
-        one for one in targets if is_url(one, bridge=True) or one.endswith((".json", ".yaml", ".yml", ".wsdl"))
+        target
+        for target in targets
+        if is_url(target, bridge=True) or target.endswith((".json", ".yaml", ".yml", ".wsdl"))
     ]
-    statements = [one for one in targets if one not in described]
+    statements = [target for target in targets if target not in described]
     described += [openapi] if openapi else []
     for what, named in (("descriptions", described), ("statements", statements)):
         if len(named) > 1:

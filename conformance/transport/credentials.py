@@ -275,7 +275,7 @@ class Credentials:
     def nearly(self) -> tuple[Credentials, ...]:
         """The same credentials, each token and key nearly right in one way; none if there are others than these."""
         is_plain = bool(self) and all(item.kind in _PLAIN and not item.scheme for item in self.items)
-        found = [tuple(replace(item, near=one) for item in self.items) for one in (_NEARLY if is_plain else ())]
+        found = [tuple(replace(item, near=text) for item in self.items) for text in (_NEARLY if is_plain else ())]
         return tuple(
             Credentials(items)
             for items in found

@@ -92,7 +92,7 @@ class Hangs:
         """Return whether an endpoint is not called for now."""
         at = self._at.get(endpoint, ())
         within_s = _HANGS_WITHIN_S * float(1 << max(0, len(at) - HANGS))
-        return sum(time.monotonic() - one < within_s for one in at) >= HANGS
+        return sum(time.monotonic() - number < within_s for number in at) >= HANGS
 
     def within_s(self, seconds: float) -> float:
         """Return for how long a request with this deadline is waited for, s."""

@@ -105,9 +105,11 @@ def _sent_apart(to: HttpClient, requests: Sequence[Outgoing], timeout_s: float) 
     own = to.twin(to.connection.unheard(request_rate=None, resent=0))
     attempts: list[Attempt] = []
     try:
-        for one in requests:
+        for request in requests:
             try:
-                came = own.send(one.method, one.target, headers=one.headers, body=one.body, timeout_s=timeout_s)
+                came = own.send(
+                    request.method, request.target, headers=request.headers, body=request.body, timeout_s=timeout_s
+                )
                 attempts.append(came)
             except NoAnswerError as none:
                 attempts.append(none.unanswered)

@@ -99,9 +99,9 @@ class Trust:
             ValueError: a host is no HOST[:PORT].
         """
         hosts = tuple(hosts)
-        for one in hosts:
-            trusted_host(one)
-        return cls(tuple(one for one in named if one and one.lower().startswith(("http://", "https://"))), hosts)
+        for host in hosts:
+            trusted_host(host)
+        return cls(tuple(text for text in named if text and text.lower().startswith(("http://", "https://"))), hosts)
 
     def refusal(self, url: str) -> str:
         """Return why a URL that a description names is not used, or an empty text."""
@@ -109,7 +109,7 @@ class Trust:
             wanted, netloc = Origin.of(url), urlsplit(url).netloc
         except ValueError as error:
             return str(error) or f"{url[:200]!r} is no URL"
-        known = [(Origin.of(one), urlsplit(one).netloc) for one in self.named]
+        known = [(Origin.of(text), urlsplit(text).netloc) for text in self.named]
         if "@" in netloc and netloc not in {named for _, named in known}:
             return "a URL in a description must not name a user"
         if any(wanted == one for one, _ in known):
@@ -136,12 +136,12 @@ class Trust:
         if reason := self.refusal(url):
             raise ElsewhereError(reason)
         parts = urlsplit(url)
-        own = next((urlsplit(one) for one in self.named if Origin.of(one) == Origin.of(url)), parts)
+        own = next((urlsplit(text) for text in self.named if Origin.of(text) == Origin.of(url)), parts)
         return urlunsplit((own.scheme, own.netloc.rpartition("@")[2], parts.path or "/", parts.query, ""))
 
     @property
     def _hosts(self) -> set[tuple[str, int | None]]:
-        return {trusted_host(one) for one in self.hosts}
+        return {trusted_host(host) for host in self.hosts}
 
 
 def is_same(one: str, other: str) -> bool:
@@ -230,7 +230,7 @@ class Folder:
         return octets
 
     def _is_named(self, file: Path) -> bool:
-        return any(file == Path(one) or (Path(one).is_dir() and _is_inside(file, Path(one))) for one in self.named)
+        return any(file == Path(text) or (Path(text).is_dir() and _is_inside(file, Path(text))) for text in self.named)
 
 
 def _is_inside(file: Path, folder: Path) -> bool:

@@ -113,10 +113,10 @@ class BridgeClient(HttpClient):
         if what == "act":
             goal = {"id": id_, "action": said["action"], "status": "running", "feedback": None, "result": None}
             self._goals[id_] = goal
-        got = self._until(link, lambda one: one.get("id") == id_, _AT_ONCE_S if what == "act" else within_s)
+        got = self._until(link, lambda item: item.get("id") == id_, _AT_ONCE_S if what == "act" else within_s)
         if what == "act":
             return HTTPStatus.OK, json.dumps(self._goals[id_]).encode()
-        last = next((one for one in got if one.get("id") == id_), None)
+        last = next((item for item in got if item.get("id") == id_), None)
         status = HTTPStatus.OK if last and last.get("op") == "service_response" else HTTPStatus.BAD_REQUEST
         return (status, last["_octets"]) if last else (None, b"")
 
@@ -128,10 +128,10 @@ class BridgeClient(HttpClient):
         behind = f"behind-{next(self._numbers)}"
         self._say(link, op="call_service", id=behind, service=_BEHIND)
         got = self._until(
-            link, lambda one: one.get("id") == behind and one.get("op") == "service_response", within_s or _BEHIND_S
+            link, lambda item: item.get("id") == behind and item.get("op") == "service_response", within_s or _BEHIND_S
         )
-        errors = [one for one in got if one.get("op") == "status" and one.get("level") == "error"]
-        wrong = next((one for one in errors if one.get("id") != behind), None)
+        errors = [item for item in got if item.get("op") == "status" and item.get("level") == "error"]
+        wrong = next((error for error in errors if error.get("id") != behind), None)
         if wrong:
             return refused, wrong["_octets"]
         return (None if within_s and not got else HTTPStatus.OK), b""

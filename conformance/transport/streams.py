@@ -175,4 +175,4 @@ def _messages(link: socket, url: str, headers: dict[str, str], timeout_s: float)
         )  # fmt: skip
     except import_module("websockets.exceptions").WebSocketException as error:
         raise _Refused(str(error)) from error
-    return ((one if isinstance(one, bytes) else one.encode(), "") for one in opened), opened.send
+    return ((octets if isinstance(octets, bytes) else octets.encode(), "") for octets in opened), opened.send

@@ -258,7 +258,7 @@ class Judge:
         if isinstance(exchange, Unanswered) and exchange.kind is NoAnswer.HURRIED:
             self.skip(requirement, exchange.problem)
             return holds
-        cases = (sum(one.seen for one in operations) if operations else 0) or 1
+        cases = (sum(showing.seen for showing in operations) if operations else 0) or 1
         evidence.cases += cases
         evidence.parts[part] = evidence.parts.get(part, 0) + cases
         evidence.checks.add(self.check_name)

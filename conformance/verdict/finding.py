@@ -109,12 +109,12 @@ class Finding:
     def show(self, operations: Sequence[Showing], *, first: bool = False) -> None:
         """Add operations that show it; those of its own exchange go ``first``."""
         there = self.operations
-        for one in operations:
-            was = there.get(one.operation, Showing(one.operation, 0))
-            smaller = min(filter(None, (was.request, one.request)), key=lambda sent: sent.size, default=None)
-            there[one.operation] = Showing(one.operation, was.seen + one.seen, smaller)
+        for showing in operations:
+            was = there.get(showing.operation, Showing(showing.operation, 0))
+            smaller = min(filter(None, (was.request, showing.request)), key=lambda sent: sent.size, default=None)
+            there[showing.operation] = Showing(showing.operation, was.seen + showing.seen, smaller)
         if first:
-            own = {one.operation: there[one.operation] for one in operations}
+            own = {showing.operation: there[showing.operation] for showing in operations}
             self.operations = own | there
 
     @property
@@ -130,7 +130,7 @@ class Finding:
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
-        others = [f"`{one.operation}`" for one in list(self.operations.values())[1:]]
+        others = [f"`{showing.operation}`" for showing in list(self.operations.values())[1:]]
         if others:
             parts.append(f"The same for {counted(len(others), 'other operation')}: {listed(others)}.")
         if self.rest:

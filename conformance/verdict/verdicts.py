@@ -103,7 +103,7 @@ def verdict_of(
         return verdict(Value.NOT_CLAIMED, f"class {requirement.class_} is not claimed")
     if evidence.unclaimed and not evidence.cases:
         return verdict(Value.NOT_CLAIMED, evidence.unclaimed)
-    unseen = [f"not seen: {one}" for one in evidence.unseen]
+    unseen = [f"not seen: {text}" for text in evidence.unseen]
     optional = Prerequisite.SEEN in requirement.needs
     if evidence.is_unseen or (optional and not evidence.cases and not evidence.errors):
         return verdict(Value.SKIP, "; ".join(unseen) or NOT_SEEN)

@@ -145,7 +145,7 @@ class Declared:
         if media_types is None:
             raise self._undeclared(status, location, body)
         name = (content_type or b"").decode("latin-1").partition(";")[0].strip().lower()
-        if body and media_types and not any(fnmatchcase(name, one) for one in media_types):
+        if body and media_types and not any(fnmatchcase(name, text) for text in media_types):
             raise CallError(
                 "content", f"status {status} with {name or 'no media type'}, declared is {' or '.join(media_types)}"
             )

@@ -63,9 +63,11 @@ class Routes:
         Raises:
             ScenarioError: there is none, or it may not be called.
         """
-        found = next((one for one in self._routes if one.operation.method == method and one.path.fullmatch(path)), None)
+        found = next(
+            (route for route in self._routes if route.operation.method == method and route.path.fullmatch(path)), None
+        )
         if found is None:
-            others = sorted(one.operation.method for one in self._routes if one.path.fullmatch(path))
+            others = sorted(route.operation.method for route in self._routes if route.path.fullmatch(path))
             hint = f"the path has {', '.join(others)}" if others else "no path of it matches"
             raise ScenarioError(f"{method} {path} is not in the description: {hint}")
         return _allowed(found)
@@ -76,7 +78,7 @@ class Routes:
         Raises:
             ScenarioError: there is none, or it may not be called.
         """
-        found = next((one for one in self._routes if one.operation.name == name), None)
+        found = next((route for route in self._routes if route.operation.name == name), None)
         if found is None:
             raise ScenarioError(f"the description has no operation {name!r}: name it as in 'GET /items/{{id}}'")
         return _allowed(found)

@@ -79,7 +79,7 @@ class Named:
     def shown(self) -> str:
         """Return the descriptions as the result names them: URLs, or names of files."""
         sources = filter(None, (self.source, self.wsdl))
-        return " and ".join(one if is_url(one) else Path(one).name for one in sources)
+        return " and ".join(source if is_url(source) else Path(source).name for source in sources)
 
     @classmethod
     def of(cls, targets: tuple[str, ...], options: Mapping[str, Any]) -> Self:

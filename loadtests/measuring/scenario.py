@@ -59,7 +59,7 @@ def read(scenario: Scenario) -> list[type[RobotUser]]:
         raise GeneratorError(f"{named} cannot be used: {_told(error, path)}") from None
     if sha256(text).hexdigest() != scenario.sha256:
         raise GeneratorError(f"{named} differs from the master's: give each worker the same file")
-    found = [one for one in vars(module).values() if isinstance(one, type) and issubclass(one, locust.User)]
+    found = [type_ for type_ in vars(module).values() if isinstance(type_, type) and issubclass(type_, locust.User)]
     own = [one for one in found if one.__module__ == module.__name__ and not one.abstract]
     if wrong := next(filter(None, map(_wrong, own)), ""):
         raise GeneratorError(f"{named}: {wrong}")

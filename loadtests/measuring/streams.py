@@ -101,13 +101,13 @@ def listen(
     jobs: list[tuple[Heard, Callable[[Heard], None]]] = [
         (
             Heard(each.name, each.kind, clock if _same_host(robot, each) or (here and is_here(_host(each))) else None),
-            lambda one, each=each: _HEAR[each.kind](robot, each, one, stamp),  # type: ignore[misc]
+            lambda item, each=each: _HEAR[each.kind](robot, each, item, stamp),  # type: ignore[misc]
         )
         for each in wanted.listen
     ]
     if polled is not None:
         polls = min(rate or _POLLS, _POLLS)
-        jobs.append((Heard(polled, "polling", clock), lambda one: _poll(robot, one, stamp, told, polls)))
+        jobs.append((Heard(polled, "polling", clock), lambda message: _poll(robot, message, stamp, told, polls)))
     work = [gevent.spawn(_guarded, run, one) for one, run in jobs]
     until = time.monotonic() + seconds
     while time.monotonic() < until and not stopped() and not all(job.ready() for job in work):

@@ -265,17 +265,17 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:
     """Return the `streams` of the result: each stream's messages, and the polled responses beside them."""
     here, found = same_machine(outcome.robots[0]), []
-    for one in outcome.heard:
-        offset = None if one.clock is None else SHARED if here else one.clock.offset
+    for message in outcome.heard:
+        offset = None if message.clock is None else SHARED if here else message.clock.offset
         clock = "not known" if offset is None else "shared" if here else "estimated"
-        figures_of = streams.stream_figures(one.moments_ns, one.ages_ms, one.listened_s, offset)
-        found.append({"name": one.name, "kind": one.kind, "clock": clock, "error": one.error} | figures_of)
+        figures_of = streams.stream_figures(message.moments_ns, message.ages_ms, message.listened_s, offset)
+        found.append({"name": message.name, "kind": message.kind, "clock": clock, "error": message.error} | figures_of)
     return found
 
 
 def _silent(outcome: Outcome) -> list[str]:
     """Return which streams could not be listened to for the whole time."""
-    return [f"{one.name} ({one.kind}): {one.error}" for one in outcome.heard if one.error]
+    return [f"{message.name} ({message.kind}): {message.error}" for message in outcome.heard if message.error]
 
 
 class Reasons(NamedTuple):

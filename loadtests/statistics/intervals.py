@@ -256,6 +256,6 @@ def pooled_interval(parts: Sequence[Compared]) -> Interval | None:
         return None
     ratio = math.exp(float(np.mean([math.log(part.ratio) for part in parts])))
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.exp(np.mean([np.log(one.values[1] / one.values[0]) for one in known], axis=0))
-    degrees, wider = sum(one.degrees for one in known), max(one.widening for one in known)
+        ratios = np.exp(np.mean([np.log(replicates.values[1] / replicates.values[0]) for replicates in known], axis=0))
+    degrees, wider = sum(replicates.degrees for replicates in known), max(replicates.widening for replicates in known)
     return replace(known[0], degrees=degrees, widening=wider).interval(ratios, ratio)

@@ -99,7 +99,7 @@ def growth(parts: Sequence[tuple[float, Histogram]]) -> dict[str, Any] | None:
     """
     if len(parts) < _PARTS:
         return None
-    groups = [parts[one[0] : one[-1] + 1] for one in np.array_split(np.arange(len(parts)), _PARTS)]
+    groups = [parts[ndarray[0] : ndarray[-1] + 1] for ndarray in np.array_split(np.arange(len(parts)), _PARTS)]
     times = np.array([np.mean([at_s for at_s, _ in group]) for group in groups])
     medians = np.array([Histogram.sum_of(each for _, each in group).quantile_ms(0.5) for group in groups], float)
     slope, *ends = theil_sen(times, medians)
@@ -119,7 +119,9 @@ def add_growth(measured: Measured, entries: Sequence[Series]) -> list[str]:
     """Add to each series how its median changes over a run with a constant load; return remarks."""
     said = []
     for entry in entries if not measured.plan.load.stages else ():
-        found = growth([(one.start_s, counted(one.cell, "response")) for one in measured.blocks(entry.name, "duel")])
+        found = growth(
+            [(block.start_s, counted(block.cell, "response")) for block in measured.blocks(entry.name, "duel")]
+        )
         entry.growth, usual = found, entry.response_ms["p50"]
         if found is None or usual is None or not found["steady"] or abs(found["over_run_ms"]) < _WORTH * usual:
             continue

@@ -199,7 +199,7 @@ def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
         return []
     short = needs.short or tuple(mutant.name for mutant in needs.mutants[:_SHORT])
     patterns = options["patterns"] or (short if options["short"] else ("*",))
-    found = [mutant for mutant in needs.mutants if any(fnmatch.fnmatch(mutant.name, one) for one in patterns)]
+    found = [mutant for mutant in needs.mutants if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if not found:
         raise click.UsageError(f"no mutant has a name like {', '.join(patterns)}; --list shows them")
     if options["short"] and not options["patterns"]:

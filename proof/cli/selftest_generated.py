@@ -59,10 +59,10 @@ def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) ->
 
     called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
     every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
-    every = tuple(one for one in every if one.exchange.name in called)
+    every = tuple(mutant for mutant in every if mutant.exchange.name in called)
     if options["adversary"]:
         every = composed(every, kinds_in_requests(contract))
-    fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+    fitting = [mutant for mutant in every if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant of an operation that may be called has a name like {', '.join(patterns)}")
     return sample(fitting, options["generated"] or options["adversary"], options["seed"]), len(every)
@@ -110,7 +110,7 @@ def run_api(
             )
             if compared:
                 operations = callable_operations(report.contract, options)
-                mutants = [one.as_mutant() for one in chosen]
+                mutants = [mutant.as_mutant() for mutant in chosen]
                 as_long = partial(best_settings, pool, operations=operations, seconds=unchanged.seconds)
                 compare(report, pool, mutants, progress, as_long)
 
@@ -129,8 +129,8 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
     every = generated_mutants(contract)
     if options["adversary"]:
         made = composed(every, kinds_in_requests(contract))
-        every = tuple(one for one in made if open_place(contract, one) is None)
-    fitting = [one for one in every if any(fnmatch.fnmatch(one.name, pattern) for pattern in patterns)]
+        every = tuple(mutant for mutant in made if open_place(contract, mutant) is None)
+    fitting = [mutant for mutant in every if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant by rule has a name like {', '.join(patterns)}; --list shows them")
     return sample(fitting, options["generated"] or options["adversary"], options["seed"]), len(every)

@@ -188,10 +188,10 @@ def _value(node: ast.expr, words: Mapping[str, Any]) -> Any:
         case ast.Attribute(value=ast.Name(id=module)) if isinstance(words[module], ModuleType):
             found = getattr(words[module], node.attr)
         case ast.Call():
-            named = {one.arg: _value(one.value, words) for one in node.keywords if one.arg}
-            found = _value(node.func, words)(*(_value(one, words) for one in node.args), **named)
+            named = {keyword.arg: _value(keyword.value, words) for keyword in node.keywords if keyword.arg}
+            found = _value(node.func, words)(*(_value(expr, words) for expr in node.args), **named)
         case ast.Tuple() | ast.List():
-            values = [_value(one, words) for one in node.elts]
+            values = [_value(expr, words) for expr in node.elts]
             found = values if isinstance(node, ast.List) else tuple(values)
         case _:
             found = ast.literal_eval(node)

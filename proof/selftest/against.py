@@ -27,16 +27,16 @@ def gathered(runs: Iterable[Mapping[str, Any]]) -> dict[str, Table]:
     seen: dict[str, Counter[str]] = defaultdict(Counter)
     by: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for run in runs:
-        rows = [("mutants", one["name"], one["caught"]) for one in run["faults"] if not one["not_tried"]]
+        rows = [("mutants", item["name"], item["caught"]) for item in run["faults"] if not item["not_tried"]]
         rows += [
-            ("by_rule", one["name"], one["by"])
-            for one in run.get("generated", {}).get("mutants", ())
-            if one["outcome"] in {"caught", "survived"}
+            ("by_rule", item["name"], item["by"])
+            for item in run.get("generated", {}).get("mutants", ())
+            if item["outcome"] in {"caught", "survived"}
         ]
         rows += [
-            ("good", " ".join(filter(None, (one["robot"], one["variant"]))), one["blamed"])
-            for one in run["good_robots"]
-            if not one["not_tried"]
+            ("good", " ".join(filter(None, (item["robot"], item["variant"]))), item["blamed"])
+            for item in run["good_robots"]
+            if not item["not_tried"]
         ]
         for table, name, ids in rows:
             seen[table][name] += 1

@@ -69,11 +69,11 @@ def each_at_once(
     with ThreadPoolExecutor(at_once) as executor:
         judged = [executor.submit(reported, item) for item in items]
         try:
-            return [one.result() for one in judged]
+            return [future.result() for future in judged]
         except BaseException:
             interrupted.set()
             executor.shutdown(wait=False, cancel_futures=True)
-            running = [one for one in judged if not one.cancelled()]
+            running = [future for future in judged if not future.cancelled()]
             while wait(running, _AGAIN_S).not_done:
                 for process in multiprocessing.active_children():
                     process.kill()

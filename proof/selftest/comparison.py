@@ -96,12 +96,12 @@ class Comparison:
     @property
     def tried(self) -> set[str]:
         """Return the names of the mutants that the tool was run against."""
-        return {one.mutant for one in self.results}
+        return {result.mutant for result in self.results}
 
     @property
     def killed(self) -> dict[str, tuple[str, ...]]:
         """Return the findings on each mutant that the tool kills, by its name."""
-        return {one.mutant: one.findings for one in self.results if one.killed}
+        return {result.mutant: result.findings for result in self.results if result.killed}
 
 
 def schemathesis() -> Tool | None:

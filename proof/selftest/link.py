@@ -159,8 +159,8 @@ class _Relay:
             _abort(writer)
             return
         await asyncio.gather(_Pump(there).run(reader, to_robot), _Pump(back).run(from_robot, writer))
-        for one in (writer, to_robot):
-            one.close()
+        for stream_writer in (writer, to_robot):
+            stream_writer.close()
 
 
 class _Pump:

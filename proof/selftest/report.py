@@ -108,14 +108,14 @@ class Report:
                 for result in self.control_results
             ],
             "compared": {
-                one.tool: {
-                    "of_the_good_robot": list(one.good),
+                comparison.tool: {
+                    "of_the_good_robot": list(comparison.good),
                     "faults": [
                         {"name": seen.mutant, "caught": seen.killed, "findings": list(seen.findings)}
-                        for seen in one.results
+                        for seen in comparison.results
                     ],
                 }
-                for one in self.compared
+                for comparison in self.compared
             },
             **(
                 {"generated": by_rule.document(self.exist, self.generated_results, self.seed)}
@@ -142,13 +142,15 @@ class Report:
         if self.blamed is not None:
             return report.page(self.target, self.generated_results, self.blamed, self.compared, self.notes)
         if self.generated_results:
-            theirs = {seen.mutant: seen.killed for one in self.compared for seen in one.results}
+            theirs = {seen.mutant: seen.killed for comparison in self.compared for seen in comparison.results}
             pack = "" if self.contract.name == DEFAULT_PACK else f" --contract {self.contract.name}"
             number = len(self.generated_results)
             command = f"roaas selftest --{self.option} {number} --seed {self.seed} --target {self.target}{pack}"
             return by_rule.rates_page(command, self.exist, self.generated_results, theirs, self.notes)
         compared = {
-            seen.mutant: "killed" if seen.killed else "survived" for one in self.compared for seen in one.results
+            seen.mutant: "killed" if seen.killed else "survived"
+            for comparison in self.compared
+            for seen in comparison.results
         }
         lines = [
             "# Mutants, and what killed them",
@@ -185,25 +187,29 @@ class Report:
             said = "; ".join(f"{id_} said {result.reasons.get(id_, 'nothing')[:200]}" for id_ in result.survived)
             lines.append(f"SURVIVED {result.mutant.name} ({result.mutant.says}) {said}")
         if self.control_results:
-            good = [one for one in self.control_results if one.outcome is not None]
+            good = [control for control in self.control_results if control.outcome is not None]
             lines.append(
                 f"{len(good) - len(self.false_positives)} of {len(good)} A/A controls (good devices) found conformant"
             )
         lines += [
-            f"not tried: {one.robot} ({one.variant}): {one.not_tried}" for one in self.control_results if one.not_tried
+            f"not tried: {control.robot} ({control.variant}): {control.not_tried}"
+            for control in self.control_results
+            if control.not_tried
         ]
-        for one in self.false_positives:
-            where = f" ({one.variant})" if one.variant else ""
-            said = "; ".join(f"{id_}: {why[:200]}" for id_, why in {**one.false_positives, **one.unjudged}.items())
-            code = one.outcome.exit_code if one.outcome else "none"
-            lines.append(f"FALSE POSITIVE {one.robot}{where}, seed {one.seed}, exit code {code}: {said}")
+        for control in self.false_positives:
+            where = f" ({control.variant})" if control.variant else ""
+            said = "; ".join(
+                f"{id_}: {why[:200]}" for id_, why in {**control.false_positives, **control.unjudged}.items()
+            )
+            code = control.outcome.exit_code if control.outcome else "none"
+            lines.append(f"FALSE POSITIVE {control.robot}{where}, seed {control.seed}, exit code {code}: {said}")
         if self.generated_results:
             lines.append(by_rule.summary(self.exist, self.generated_results))
         if self.blamed is not None:
             alarms = "; ".join(f"{id_}: {why[:200]}" for id_, why in self.blamed.items()) or "none"
             lines.append(f"False alarms on the unchanged device: {alarms}")
             only = report.only_theirs(self.generated_results, self.compared)
-            lines += [f"KILLED BY {one}" for one in only]
+            lines += [f"KILLED BY {text}" for text in only]
         for other in self.compared:
             ours = {result.mutant.name for result in self.tried if not result.survived}
             ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}

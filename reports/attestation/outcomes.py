@@ -81,7 +81,7 @@ def contradictions(run: Run) -> list[str]:
         found.append(f"{named(twice)} is listed more than once")
     counts = Counter(verdict for _, _, verdict in listed)
     if run.outcomes and counts != Counter(run.requirements):
-        said, there = (dict(sorted(one.items())) for one in (run.requirements, counts))
+        said, there = (dict(sorted(item.items())) for item in (run.requirements, counts))
         found.append(f"it counts {said} requirements, but lists {there}")
     for id_, level, verdict in listed:
         name = id_.partition("/")[0]

@@ -237,9 +237,9 @@ def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
         # An older suite wrote fewer digests.
         known = old["suite"]["digest"] == new["suite"]["digest"] or "none" not in {before, now}
         if before != now and known:
-            versions = [_at(one, version) for one in (old, new)] if version else []
+            versions = [_at(item, version) for item in (old, new)] if version else []
             yield name + (f" ({' → '.join(versions)})" if len(set(versions)) > 1 else "")
-    robots = [_at(one, "statement.robot.version") for one in (old, new)]
+    robots = [_at(item, "statement.robot.version") for item in (old, new)]
     if robots[0] != robots[1]:
         yield f"the device ({' → '.join(robots)})"
 

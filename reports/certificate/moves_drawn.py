@@ -73,10 +73,10 @@ def pictures(folder: Path, result: Mapping[str, Any]) -> list[Picture]:
         named = messages(result, "motion")
         moves = list(_moves(traces_in(folder)))
         ranges = _ranges(moves)
-        drawn = [_picture(one, named, ranges) for one in moves]
+        drawn = [_picture(item, named, ranges) for item in moves]
     except (ReportError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
-    return sorted(filter(None, drawn), key=lambda one: not one.failed)[:_MOST]
+    return sorted(filter(None, drawn), key=lambda picture: not picture.failed)[:_MOST]
 
 
 def traces_in(folder: Path) -> dict[str, Any]:
@@ -92,16 +92,16 @@ def traces_in(folder: Path) -> dict[str, Any]:
 
 def messages(result: Mapping[str, Any], of_class: str) -> list[str]:
     """Return what the findings of a class say."""
-    failures = (one.get("failures", ()) for one in result["requirements"] if one["class"] == of_class)
+    failures = (item.get("failures", ()) for item in result["requirements"] if item["class"] == of_class)
     return [failure.get("message", "") for found in failures for failure in found]
 
 
 def _moves(traces: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     """Yield what is a move or a drive: it has commands, and readings with positions."""
     for trace in traces.values():
-        for one in trace if isinstance(trace, list) else [trace]:
-            if isinstance(one, dict) and "what" in one and ("readings" in one or "under_way" in one):
-                yield one
+        for item in trace if isinstance(trace, list) else [trace]:
+            if isinstance(item, dict) and "what" in item and ("readings" in item or "under_way" in item):
+                yield item
 
 
 def _readings(move: Mapping[str, Any]) -> list[Mapping[str, Any]]:
@@ -111,8 +111,8 @@ def _readings(move: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def _ranges(moves: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     """Return how far each axis, and each velocity, ranges in the whole run."""
     found: dict[str, list[float]] = {}
-    for one in (reading for move in moves for reading in _readings(move)):
-        for name, value in (*one.get("values", {}).items(), *one.get("speeds", {}).items()):
+    for item in (reading for move in moves for reading in _readings(move)):
+        for name, value in (*item.get("values", {}).items(), *item.get("speeds", {}).items()):
             found.setdefault(name, []).append(value)
     return {name: max(values) - min(values) for name, values in found.items()}
 
@@ -122,7 +122,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     commands = [*move["commands"], *([move["end"]] if move.get("end") else [])]
     if not readings or not commands:
         return None
-    start, end = commands[0]["sent"], max(one["received"] for one in readings)
+    start, end = commands[0]["sent"], max(reading["received"] for reading in readings)
     if end <= start:
         return None
 
@@ -130,19 +130,23 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
         return float(round(max(0.0, moment - start) / (end - start) * WIDTH, 1))
 
     is_drive = "wanted" in move
-    wanted = [(x_of(one["sent"]), one["targets"]) for one in commands if _ok(one)]
+    wanted = [(x_of(command["sent"]), command["targets"]) for command in commands if _ok(command)]
     lines = []
     for name in _shown(readings, move.get("wanted")):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
-        seen = [((one["sent"] + one["received"]) / 2, one[key][name]) for one in readings if name in one.get(key, {})]
+        seen = [
+            ((reading["sent"] + reading["received"]) / 2, reading[key][name])
+            for reading in readings
+            if name in reading.get(key, {})
+        ]
         # A velocity is no position, even if both have the same name.
         aims = [] if is_drive and key == "values" else wanted
         lines.append(_line(name, [(x_of(moment), value) for moment, value in seen], aims, _LEAST * ranges[name]))
     return Picture(
         what=move["what"],
         lines=tuple(filter(None, lines)),
-        commands=tuple(x_of(one["sent"]) for one in commands if _ok(one)),
-        refused=tuple(x_of(one["sent"]) for one in commands if not _ok(one)),
+        commands=tuple(x_of(command["sent"]) for command in commands if _ok(command)),
+        refused=tuple(x_of(command["sent"]) for command in commands if not _ok(command)),
         seconds=end - start,
         failed=any(move["what"] in text for text in named),
     )
@@ -151,13 +155,13 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
 def _shown(readings: Sequence[Mapping[str, Any]], velocities: Mapping[str, float] | None) -> list[str]:
     """Return what is drawn: of a drive its velocities, and positions too where one of them is told by its axis."""
     told = _axes(readings, "speeds") if velocities is not None else []
-    others = [one for one in _axes(readings, "values") if one not in told]
+    others = [axis for axis in _axes(readings, "values") if axis not in told]
     driven = {name for name, value in (velocities or {}).items() if value}
     return told if told and driven <= set(told) else [*others, *told]
 
 
 def _axes(readings: Sequence[Mapping[str, Any]], key: str) -> list[str]:
-    return list(dict.fromkeys(name for one in readings for name in one.get(key, {})))
+    return list(dict.fromkeys(name for reading in readings for name in reading.get(key, {})))
 
 
 def _ok(command: Mapping[str, Any]) -> bool:

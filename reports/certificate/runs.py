@@ -66,7 +66,7 @@ class Run:
 
     def of(self, requirement: str) -> str:
         """Return the verdict on a requirement, or an empty text if the run does not know it."""
-        found = (one["verdict"] for one in self.certificate.result["requirements"] if one["id"] == requirement)
+        found = (item["verdict"] for item in self.certificate.result["requirements"] if item["id"] == requirement)
         return next(found, "")
 
 
@@ -82,9 +82,9 @@ class Device:
         """Return id and text of each requirement that one of the shown runs does not meet, or could not judge."""
         found: dict[str, str] = {}
         for run in self.runs[:COLUMNS]:
-            for one in run.certificate.result["requirements"]:
-                if one["verdict"] in _BROKEN:
-                    found.setdefault(one["id"], one["text"])
+            for item in run.certificate.result["requirements"]:
+                if item["verdict"] in _BROKEN:
+                    found.setdefault(item["id"], item["text"])
         return sorted(found.items())
 
 

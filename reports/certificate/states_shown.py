@@ -55,7 +55,7 @@ def grid(folder: Path, result: Mapping[str, Any]) -> Grid | None:
     try:
         walk, named = traces_in(folder)["walked"], messages(result, "states")
         states = tuple(map(str, walk["states"]))[:_MOST]
-        steps = {(one["operation"], one["state"]): bool(one["taken"]) for one in walk["steps"]}
+        steps = {(item["operation"], item["state"]): bool(item["taken"]) for item in walk["steps"]}
         names = list(walk["operations"])[:_MOST]
         return Grid(states, {name: tuple(_cells(name, states, steps, named)) for name in names})
     except (ReportError, ValueError, LookupError, TypeError, AttributeError, RecursionError):

@@ -66,17 +66,17 @@ def build(
     own = {name: policy_of(door, Path(file), folder) for name, file, folder in devices}
     trusted, unusable = read_keys(keys)
     entries = read_entries(envelopes, trusted)
-    certificates = [one for one in entries if isinstance(one, Certificate)]
-    unknown = own.keys() - {one.run.robot.name for one in certificates}
+    certificates = [certificate for certificate in entries if isinstance(certificate, Certificate)]
+    unknown = own.keys() - {certificate.run.robot.name for certificate in certificates}
     if unknown:
         raise click.UsageError(f"--device: no certificate names the device {', '.join(map(repr, sorted(unknown)))}")
     found = histories(certificates, lambda name: own.get(name, usual), now)
-    refused = [one for one in entries if isinstance(one, Refused)]
+    refused = [refusal for refusal in entries if isinstance(refusal, Refused)]
     write_site(out, found, refused, now)
     for said in unusable:
         click.echo(on_a_line(said, 400), err=True)
-    for one in refused:
-        click.echo(f"refused: {on_a_line(one.detail, 400)}", err=True)
+    for refusal in refused:
+        click.echo(f"refused: {on_a_line(refusal.detail, 400)}", err=True)
     counting = sum(history.current.stands for history in found)
     have = "robot has" if len(found) == 1 else "robots have"
     click.echo(f"{counting} of {len(found)} {have} a certificate that counts; {len(refused)} refused")

@@ -226,7 +226,7 @@ def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
 def _described(lines: Mapping[str, int], case: Case) -> int | None:
     """Return the line of the first operation of the case's findings, in the description; None if it is not there."""
     for finding in case.findings:
-        named = [one["operation"] for one in finding.failure.get("operations", ())]
+        named = [item["operation"] for item in finding.failure.get("operations", ())]
         for label in (*named, finding.subject.partition("?")[0]):
             if label in lines:
                 return lines[label]
@@ -241,7 +241,7 @@ def _places(result: Mapping[str, Any], case: Case) -> Iterator[Place]:
         yield Place(described["file"], line)
     if statement:
         yield Place(statement["file"], statement["classes"].get(case.class_name, statement["line"]))
-    stated = [one for one in (ledger, known.get("generic_ledger")) if one and case.name in one["lines"]]
+    stated = [item for item in (ledger, known.get("generic_ledger")) if item and case.name in item["lines"]]
     if stated:
         yield Place(stated[0]["file"], stated[0]["lines"][case.name])
     elif not (statement or (described and _described(described["lines"], case))):

@@ -19,15 +19,15 @@ _MOST = 6
 
 def noticed(result: Mapping[str, Any]) -> list[str]:
     """Return sentences for each series of the leading client, the slowest first, and what else limits them."""
-    own = [one for one in result["series"] if one["client"] == "wire"] or result["series"]
-    told = [one for one in own if one["count"] and one["response_ms"]["p50"] is not None]
+    own = [item for item in result["series"] if item["client"] == "wire"] or result["series"]
+    told = [item for item in own if item["count"] and item["response_ms"]["p50"] is not None]
     if not told or not result.get("trustworthy", result["valid"]):
         return ["This run does not show what a user of the robot will notice; the reasons are below."]
-    told.sort(key=lambda one: -_tail(one)[1])
-    lines = [sentence for one in told[:_MOST] for sentence in _of_series(one, result)]
+    told.sort(key=lambda item: -_tail(item)[1])
+    lines = [sentence for item in told[:_MOST] for sentence in _of_series(item, result)]
     if len(told) > _MOST:
         lines.append(f"The other {len(told) - _MOST} are faster than these.")
-    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(one["errors"] for one in told))]
+    return [*lines, *_of_streams(result), *_of_stops(result), *_limits(result, any(item["errors"] for item in told))]
 
 
 def _tail(one: Mapping[str, Any]) -> tuple[str, float]:
@@ -73,13 +73,13 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
 
 def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield how old the data is that a display shows, for each stream and for polling beside it."""
-    for one in result.get("streams", []):
-        ages, intervals = one["age_ms"], one["interval_ms"]
-        name = f"{excerpt(one['name'], 100)}, {'polled' if one['kind'] == 'polling' else 'streamed'}"
-        if one.get("stamped") and one.get("clock") == "not known":
+    for item in result.get("streams", []):
+        ages, intervals = item["age_ms"], item["interval_ms"]
+        name = f"{excerpt(item['name'], 100)}, {'polled' if item['kind'] == 'polling' else 'streamed'}"
+        if item.get("stamped") and item.get("clock") == "not known":
             yield f"{name}: the age of the data is not known, because the robot's clock is not."
         elif ages and intervals:
-            error = one.get("age_error_ms") or 0.0
+            error = item.get("age_error_ms") or 0.0
             old = f"{ms(ages['p50'])} ms old when it comes ({ms(ages['max'])} ms at most)"
             if error:
                 least = max(0.0, ages["p50"] - error)
@@ -96,17 +96,17 @@ def _of_streams(result: Mapping[str, Any]) -> Iterator[str]:
 def _of_stops(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield how late a stop took effect, alone and beside other operators."""
     found = result.get("operators") or {"by_number": [], "error": None}
-    for one in found["by_number"]:
-        if not one["stops"]:
+    for item in found["by_number"]:
+        if not item["stops"]:
             continue
-        number = "One operator" if one["operators"] == 1 else f"Each of {one['operators']} operators reads the state"
-        rest, late = one["rest_ms"], one["late"]
+        number = "One operator" if item["operators"] == 1 else f"Each of {item['operators']} operators reads the state"
+        rest, late = item["rest_ms"], item["late"]
         promised = found.get("promised_ms")
         yield (
             f"{number}: a stop takes effect after {ms(rest['p50'])} ms at the median and {ms(rest['max'])} ms at most "
-            f"(± {ms(one['known_to_ms'])} ms"
+            f"(± {ms(item['known_to_ms'])} ms"
             + (f"; the motion map promises {ms(promised)} ms" if promised else "")
-            + (f", which {late} of {one['stops']} stops did not keep" if late else "")
+            + (f", which {late} of {item['stops']} stops did not keep" if late else "")
             + ")."
         )
     if found["error"]:

@@ -108,7 +108,7 @@ def read_entries(places: Iterable[Path], keys: Mapping[str, SSlibKey]) -> list[C
         if not inside:
             found.append(Refused("", "the folder has no certificate", f"{place}: it holds no {ENVELOPE_NAME}"))
     if not paths:
-        raise ResultMissingError("; ".join(one.detail for one in found if isinstance(one, Refused)))
+        raise ResultMissingError("; ".join(refusal.detail for refusal in found if isinstance(refusal, Refused)))
     files: dict[bytes, Path] = {}
     for path, root in paths.items():
         try:

@@ -89,8 +89,12 @@ def allowed(api: RestInterface, operation: Operation) -> bool:
 
 def callable_operations(api: RestInterface) -> dict[tuple[str, str], Operation]:
     """Return the operations that may be sent and whose responses end, by method and path without a slash at its end."""
-    found = (one for one in operations_of(api.run.contract) if allowed(api, one) and one.label not in api.streams)
-    return {(one.method, one.template.rstrip("/")): one for one in found}
+    found = (
+        operation
+        for operation in operations_of(api.run.contract)
+        if allowed(api, operation) and operation.label not in api.streams
+    )
+    return {(operation.method, operation.template.rstrip("/")): operation for operation in found}
 
 
 def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:

@@ -75,7 +75,9 @@ def differences(wanted: Iterable[Operation], found: Iterable[Described]) -> list
 
 
 def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list[str]:
-    described = {(one.where, one.name): one for operation in theirs for one in operation.parameters}
+    described = {
+        (parameter.where, parameter.name): parameter for operation in theirs for parameter in operation.parameters
+    }
     missing = []
     for one in sorted(ours.parameters, key=lambda item: (item.where, item.name)):
         where, name, their = one.where, one.name, described.get((one.where, one.name))
@@ -86,7 +88,7 @@ def _differences_of_parameters(ours: Operation, theirs: list[Operation]) -> list
         elif not _same_default(one, their):
             default, other = one.schema.get("default"), their.schema.get("default")
             missing.append(f"{ours.label} with the default {other!r} of the parameter {name} instead of {default!r}")
-    known = {one.name for one in ours.parameters if one.where == "query"}
+    known = {parameter.name for parameter in ours.parameters if parameter.where == "query"}
     extra = {name for (where, name), one in described.items() if one.required and where == "query"} - known
     return [
         *missing,

@@ -65,7 +65,7 @@ class Guard:
             if self._spent_s > _FREE_S + _SHARE * (started - self._began):
                 return
             self._is_stale = acts
-            stops = [_told_of(one) for one in self._drafts() if one.method not in SAFE_METHODS]
+            stops = [_told_of(draft) for draft in self._drafts() if draft.method not in SAFE_METHODS]
             self._spent_s += time.monotonic() - started
             if stops and (stops != self._told or not self._is_alive):
                 self._tell(stops)
@@ -158,7 +158,7 @@ def tell(process: subprocess.Popen[bytes] | None, line: bytes) -> bool:
 def _told_of(draft: Draft) -> dict[str, Any]:
     """Return a request as the process reads it."""
     connection = draft.client.connection
-    files = [one and str(Path(one).absolute()) for one in (connection.ca_file, *(connection.certificate or ()))]
+    files = [item and str(Path(item).absolute()) for item in (connection.ca_file, *(connection.certificate or ()))]
     return {
         "host": draft.client.host.encode("idna").decode("ascii"),
         "port": draft.client.port,
@@ -171,6 +171,6 @@ def _told_of(draft: Draft) -> dict[str, Any]:
 def _digest_user(draft: Draft) -> tuple[str, list[str]] | None:
     """Return user:password and our modules, with which the process answers digest challenges, if it may."""
     connection = draft.client.connection
-    users = (one.secret for one in connection.credentials.items if one.kind is Kind.DIGEST)
+    users = (credential.secret for credential in connection.credentials.items if credential.kind is Kind.DIGEST)
     user = next(users, None) if connection.may_authorize(draft.client.base_url) else None
     return None if user is None else (user, sys.path)

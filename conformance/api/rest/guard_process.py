@@ -94,7 +94,7 @@ def _answer(stop: dict[str, Any], head: str) -> bool:
     before, blank, body = base64.b64decode(stop["request"]).partition(b"\r\n\r\n")
     start, *fields = before.split(b"\r\n")
     field = f"Authorization: {user.answer(*start.decode('latin-1').split(' ')[:2])}".encode()
-    fields = [one for one in fields if not one.lower().startswith(b"authorization:")]
+    fields = [octets for octets in fields if not octets.lower().startswith(b"authorization:")]
     stop["request"] = base64.b64encode(b"\r\n".join([start, field, *fields]) + blank + body).decode()
     return True
 
@@ -175,8 +175,8 @@ def main() -> None:
         if line.endswith(b"\n"):  # a line that is cut short is incomplete JSON
             told = json.loads(line)
             # Read the TLS files now, because they may be gone when the stop is sent.
-            files = {one["tls"] for one in (*told["stops"], told.get("login")) if one}
-            contexts = {one: contexts.get(one) or _context(one) for one in files}
+            files = {item["tls"] for item in (*told["stops"], told.get("login")) if item}
+            contexts = {file: contexts.get(file) or _context(file) for file in files}
     if told is not None:
         _stop(told, contexts)
 

@@ -31,7 +31,7 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     yield from _invalid_parameters(operation, usual)
     if usual.media_type in {FORM, MULTIPART} and isinstance(usual.body, dict):
         found = _invalid_fields(usual, usual.body, flat(operation.bodies[usual.media_type].schema))
-        yield from (one for one in found if body_verdict(operation, one.inputs) == INVALID)
+        yield from (variation for variation in found if body_verdict(operation, variation.inputs) == INVALID)
     if not is_json(usual.media_type) or usual.media_type not in operation.bodies:
         return
     body = operation.bodies[usual.media_type]
@@ -48,7 +48,9 @@ def invalid_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
     # A merge patch leaves out what it does not change (RFC 7396).
     is_whole = "merge-patch" not in usual.media_type
     yield from (
-        one for one in found if not fits(body.schema, one.inputs.body) and (is_whole or one.kind is Kind.INVALID)
+        variation
+        for variation in found
+        if not fits(body.schema, variation.inputs.body) and (is_whole or variation.kind is Kind.INVALID)
     )
 
 
@@ -157,7 +159,7 @@ def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:
     yield from _beyond_texts(schema)
     if isinstance(schema.get("enum"), list) and schema["enum"]:
         yield UNKNOWN, "which is none of its values"
-        if all(isinstance(one, str) for one in schema["enum"]):
+        if all(isinstance(item, str) for item in schema["enum"]):
             yield f"{UNKNOWN}é", _NOT_ASCII
     if isinstance(schema.get("maxItems"), int) and schema["maxItems"] <= _MOST_ITEMS:
         items = schema.get("items")

@@ -32,7 +32,7 @@ class LeftBehind:
 
     def __init__(self, operations: Iterable[Operation], base_url: str) -> None:
         self._base_url = base_url
-        self._collections = {collection_of(one.template) for one in operations} - {""}
+        self._collections = {collection_of(operation.template) for operation in operations} - {""}
         self._created: dict[str, tuple[str, str]] = {}
         self._changed: dict[str, tuple[str, bytes | None]] = {}
         self._deleted: dict[str, str] = {}
@@ -52,9 +52,9 @@ class LeftBehind:
         self._last[operation.label] = answer.status
         made = self.made(operation, path, exchange)
         if operation.method == "DELETE":
-            ours = [one for one in self._created if one == path or one.startswith(f"{path.rstrip('/')}/")]
-            for one in ours:
-                del self._created[one]
+            ours = [text for text in self._created if text == path or text.startswith(f"{path.rstrip('/')}/")]
+            for text in ours:
+                del self._created[text]
             if not ours:
                 self._deleted[path] = operation.label
         elif made:
@@ -111,7 +111,7 @@ class LeftBehind:
             ("deleted", [_things(label, ids) for label, ids in deleted.items()]),
             (
                 "answered last",
-                [f"{one['operation']} with {one['status']}" for one in last if one["operation"] not in said],
+                [f"{item['operation']} with {item['status']}" for item in last if item["operation"] not in said],
             ),
         )
         return {
@@ -124,6 +124,6 @@ class LeftBehind:
 
 
 def _things(label: str, ids: list[str]) -> str:
-    shown = ", ".join(one[:_ID] for one in ids[-_NAMED:])
+    shown = ", ".join(text[:_ID] for text in ids[-_NAMED:])
     earlier = "… " if len(ids) > _NAMED else ""
     return f"{len(ids)} by {label} (id{'s' if len(ids) > 1 else ''} {earlier}{shown})"

@@ -114,9 +114,9 @@ class Listing:
         """The names of all parameters whose part is known."""
         parts = (
             self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values(),
-            *(one.parameter for one in self.bounds),
+            *(bound.parameter for bound in self.bounds),
         )  # fmt: skip
-        return frozenset(one.name for one in parts if one is not None)
+        return frozenset(parameter.name for parameter in parts if parameter is not None)
 
     @cached_property
     def sortings(self) -> dict[str, Sorting]:
@@ -127,10 +127,10 @@ class Listing:
         schema = flat(sort.schema)
         schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
         given = [
-            one for one in (*schema.get("enum", ()), *sort.examples, schema.get("default")) if isinstance(one, str)
+            item for item in (*schema.get("enum", ()), *sort.examples, schema.get("default")) if isinstance(item, str)
         ]
         found = {text: self._sorting(text) for text in given}
-        turned = {one.member for one in found.values() if one is not None and one.descending}
+        turned = {sorting.member for sorting in found.values() if sorting is not None and sorting.descending}
         for text, one in found.items():
             # If a parameter takes "-name" for descending order, then "name" means ascending order.
             plain = one is not None and one.descending is None and one.member in turned
@@ -148,7 +148,7 @@ class Listing:
 
     def sent(self, target: str) -> dict[str, str] | None:
         """Return the query's texts by name; None if a parameter occurs twice, is invalid, or is not declared."""
-        declared = {one.name: one for one in self.operation.parameter("query")}
+        declared = {parameter.name: parameter for parameter in self.operation.parameter("query")}
         try:
             pairs = [(name, text) for name, text in pairs_of(target.partition("?")[2])]
             texts = {name: decoded_query(text) for name, text in pairs}
@@ -191,7 +191,7 @@ class Page:
     @cached_property
     def identities(self) -> tuple[str, ...]:
         """Return for each item its identifier, or its whole content if it has none."""
-        return tuple(json.dumps(members_of(one).get(self.by)) if self.by else identity_of(one) for one in self.items)
+        return tuple(json.dumps(members_of(item).get(self.by)) if self.by else identity_of(item) for item in self.items)
 
 
 def number_of(text: str) -> int:
@@ -253,7 +253,7 @@ def page_of(response: Response, operation: Operation | None = None) -> Page | No
     for name in found[0]:
         around.append({key: one for key, one in inner.items() if key != name})
         inner = inner[name]
-    beside = [one for part in around for one in (part, *part.values()) if isinstance(one, dict)]
+    beside = [item for part in around for item in (part, *part.values()) if isinstance(item, dict)]
     totals: dict[str, int] = {}
     for part in reversed(beside):
         totals |= {key: one for key, one in part.items() if plain_name(key) in TOTALS | COUNTS and type(one) is int}
@@ -264,7 +264,7 @@ def page_of(response: Response, operation: Operation | None = None) -> Page | No
         totals["content-range"] = int(within[1])
     links = [response.header("link") or ""]
     names = [name for part in beside for name, one in part.items() if one not in (None, "", False)]
-    goes_on = any(_NEXT.search(one) for one in (*links, *names))
+    goes_on = any(_NEXT.search(item) for item in (*links, *names))
     goes_on |= any(one is True and "more" in name.lower() for part in beside for name, one in part.items())
     return Page(tuple(found[1]), totals, goes_on, tuple(around))
 
@@ -289,7 +289,7 @@ def listing_of(operation: Operation) -> Listing | None:
     success = [one for status, one in operation.responses.items() if status.startswith("2")]
     in_xml = (schema for content in success for name, schema in content.items() if is_xml(name))
     item = _item_of(operation.shape or next(in_xml, None), 0)
-    query = {_plain(one.name): one for one in operation.parameter("query")}
+    query = {_plain(parameter.name): parameter for parameter in operation.parameter("query")}
     # A response with one thing is no list, even if the thing has a list among its members, unless it is read in pages.
     is_thing = operation.template.rstrip("/").endswith("}") and query.keys().isdisjoint((*_LIMITS, *_OFFSETS, *_PAGES))
     if operation.method != "GET" or item is None or is_thing:
@@ -307,7 +307,7 @@ def listing_of(operation: Operation) -> Listing | None:
         for name, one in query.items()
         if name in plain.members and name not in _NO_FILTERS and one not in sorts and name not in directions
     }
-    rest = [one for one in query.values() if one not in (limit, *filters.values())]
+    rest = [parameter for parameter in query.values() if parameter not in (limit, *filters.values())]
     return Listing(
         operation,
         item,
@@ -319,7 +319,7 @@ def listing_of(operation: Operation) -> Listing | None:
         next(iter(directions.values())) if len(directions) == 1 else None,
         len(directions) > 1 or not _REVERSING.isdisjoint(query),
         filters,
-        tuple(bound for one in rest if (bound := bound_of(one, plain.members))),
+        tuple(bound for parameter in rest if (bound := bound_of(parameter, plain.members))),
     )
 
 
@@ -330,7 +330,7 @@ def _plain(name: str) -> str:
 
 def _directs(parameter: Parameter) -> bool:
     values = flat(parameter.schema).get("enum", ())
-    return bool(values) and all(str(one).lower().startswith(("asc", "desc")) for one in values)
+    return bool(values) and all(str(value).lower().startswith(("asc", "desc")) for value in values)
 
 
 def _item_of(schema: Any, depth: int) -> Schema | None:
@@ -410,7 +410,7 @@ class Bound(NamedTuple):
 
 def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | None:
     """Return the member that a parameter bounds, by its name, type and description; None if it is no bound."""
-    words = [one.lower() for one in _WORD.findall(parameter.name)]
+    words = [item.lower() for item in _WORD.findall(parameter.name)]
     kind = _kind(parameter.schema)
     for index in (0, -1) if words and kind else ():
         if words[index] not in _LEAST | _MOST:

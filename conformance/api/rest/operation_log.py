@@ -202,7 +202,11 @@ class OperationLog(Listener):
     def uncalled(self, rules: CallRules) -> list[str]:
         """Return the labels of the operations that may be called and were sent nothing."""
         operations = operations_of(self._contract)
-        return [one.label for one in operations if rules.decide(one).may and not self._records[one.label].sent]
+        return [
+            operation.label
+            for operation in operations
+            if rules.decide(operation).may and not self._records[operation.label].sent
+        ]
 
     def _has_sent(self, operation: Operation, name: str) -> bool:
         return bool({name, name.lower()} & self._records[operation.label].parameters)

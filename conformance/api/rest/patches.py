@@ -91,7 +91,7 @@ def _steps(path: str, says: str) -> list[str]:
     """Return the steps of a JSON pointer (RFC 6901)."""
     if path and not path.startswith("/"):
         raise PatchError(says)
-    return [one.replace("~1", "/").replace("~0", "~") for one in path.split("/")[1:]]
+    return [text.replace("~1", "/").replace("~0", "~") for text in path.split("/")[1:]]
 
 
 def _at(document: Any, path: str, says: str) -> Any:

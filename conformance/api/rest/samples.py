@@ -159,7 +159,7 @@ def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
     number = len(others)
     numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
     candidates = [item, *flat(schema).get("enum", ()), numbered]
-    return next((one for one in candidates if one not in others and fits(schema, one)), item)
+    return next((candidate for candidate in candidates if candidate not in others and fits(schema, candidate)), item)
 
 
 def _number(schema: Schema, kind: str) -> Any:

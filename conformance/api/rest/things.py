@@ -53,7 +53,7 @@ def path_chosen(item: Operation, turn: int) -> str:
         return ""
     (parameter,) = item.parameter("path")
     candidates: list[Any] = [one.format(turn) for one in _CHOSEN] + [_CHOSEN_NUMBER + turn]
-    id_ = next((one for one in candidates if fits(parameter.schema, one)), None)
+    id_ = next((candidate for candidate in candidates if fits(parameter.schema, candidate)), None)
     return "" if id_ is None else item.template.replace(f"{{{parameter.name}}}", str(id_))
 
 
@@ -66,7 +66,7 @@ def identified(value: Any, item: Operation) -> tuple[str, Any]:
         names += [*IDS[:2], "pk", f"{thing}id", *IDS[2:]]
     members = {plain_name(name): (name, one) for name, one in represented(value, names).items()}
     found = [members[name] for name in names if name in members]
-    usable = (one for one in found if isinstance(one[1], str | int) and fits(parameter.schema, one[1]))
+    usable = (pair for pair in found if isinstance(pair[1], str | int) and fits(parameter.schema, pair[1]))
     return next(usable, ("", None))
 
 
@@ -79,16 +79,16 @@ def identifier_of(value: Any, item: Operation) -> str:
 def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
     """Return the object of a response that has the most members of these plain names: the body, or one inside it."""
     found = [value] if isinstance(value, dict) else []
-    found += [one for one in value.values() if isinstance(one, dict)] if found else []
-    found += [one for inner in found[1:] for one in inner.values() if isinstance(one, dict)]
-    return max(found, key=lambda one: len({plain_name(name) for name in one} & set(names)), default={})
+    found += [item for item in value.values() if isinstance(item, dict)] if found else []
+    found += [item for inner in found[1:] for item in inner.values() if isinstance(item, dict)]
+    return max(found, key=lambda item: len({plain_name(name) for name in item} & set(names)), default={})
 
 
 def is_marked_deleted(value: Any) -> bool:
     """Return whether a representation is marked as deleted, as that of a restorable thing is."""
     if not isinstance(value, dict):
         return False
-    inner = [one for one in value.values() if isinstance(one, dict)]
+    inner = [item for item in value.values() if isinstance(item, dict)]
     for name, one in [(name, one) for part in (value, *inner) for name, one in part.items()]:
         plain = plain_name(name)
         if _DELETED.search(plain) and one not in (None, False, 0, ""):
@@ -151,7 +151,10 @@ def differences(
         if (shared and name not in shared) or is_devices(name, shared.get(name, {}), collections):
             continue
         if isinstance(value, dict) and isinstance(other, dict):
-            yield from (f"{one} in {name}" for one in differences(value, other, part, shared.get(name), collections))
+            yield from (
+                f"{difference} in {name}"
+                for difference in differences(value, other, part, shared.get(name), collections)
+            )
         elif not _alike(value, other, flat(part)):
             yield f"{shown(other)} as {name} instead of {shown(value)}"
 
@@ -194,9 +197,9 @@ def _is_told(sent: Any, told: Any, before: Any, schema: Schema) -> bool:
 def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     """Return the properties of the part of a response's schema that has the most of these names."""
     outer = flat(schema).get("properties", {})
-    inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
-    inner += [flat(one).get("properties", {}) for part in inner for one in part.values() if isinstance(one, dict)]
-    return max([outer, *inner], key=lambda one: len(set(one) & set(names)))
+    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
+    inner += [flat(item).get("properties", {}) for part in inner for item in part.values() if isinstance(item, dict)]
+    return max([outer, *inner], key=lambda item: len(set(item) & set(names)))
 
 
 def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
@@ -218,7 +221,7 @@ def is_shared(name: str) -> bool:
 
 def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - one for each type
     if isinstance(value, list) and isinstance(other, list):
-        plain = not any(isinstance(one, list | dict) for one in (*value, *other))
+        plain = not any(isinstance(item, list | dict) for item in (*value, *other))
         return not plain or sorted(map(_letters, value)) == sorted(map(_letters, other))
     if isinstance(value, list | dict) or isinstance(other, list | dict):
         return True

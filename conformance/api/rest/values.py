@@ -156,7 +156,7 @@ class Values:
 
         The first takes the first alternative of each union, the second the last one.
         """
-        made = [self.filled(sample(one), one, operation) for one in (schema, backwards(schema))]
+        made = [self.filled(sample(item), item, operation) for item in (schema, backwards(schema))]
         return _distinct([*(value for value in examples if not isinstance(value, str)), *made])[:_TRIED]
 
     def filled(self, value: Any, schema: Schema, operation: Operation | None = None) -> Any:
@@ -185,6 +185,6 @@ class Values:
 def _distinct(values: Sequence[Any]) -> list[Any]:
     found: list[Any] = []
     for value in values:
-        if not any(value == one and type(value) is type(one) for one in found):
+        if not any(value == item and type(value) is type(item) for item in found):
             found.append(value)
     return found

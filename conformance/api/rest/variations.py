@@ -102,7 +102,9 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
         for example in operation.bodies[media_type].examples[:_FEW]:
             if example != usual.body and not isinstance(example, str):
                 yield Variation(Kind.EXAMPLE, "the example body", "body", replace(usual, body=example))
-        yield from (_knowing(one, operation, values) for one in _valid_members(usual, usual.body, schema, ()))
+        yield from (
+            _knowing(variation, operation, values) for variation in _valid_members(usual, usual.body, schema, ())
+        )
     if whole is not NOTHING and whole != usual.body and media_type == usual.media_type:
         yield Variation(Kind.OPTIONAL, "all members of the body", "body", replace(usual, body=whole))
     for name in operation.formats[:_FEW] if len(operation.formats) > 1 else ():
@@ -144,19 +146,19 @@ def together(operation: Operation, usual: Inputs, variations: list[Variation]) -
     """
     alone, groups = list[Variation](), list[tuple[Any, list[Variation]]]()
     schema = operation.bodies[usual.media_type].schema if usual.media_type in operation.bodies else {}
-    for one in variations:
-        if not one.place.startswith("body /") or not isinstance(usual.body, dict):
-            alone.append(one)
+    for variation in variations:
+        if not variation.place.startswith("body /") or not isinstance(usual.body, dict):
+            alone.append(variation)
             continue
         for index, (body, parts) in enumerate(groups):
-            meeting = [other.inputs.body for other in parts if _meet(one.place, other.place)]
-            is_there = meeting == [one.inputs.body] * len(meeting)
-            whole = (body if meeting else _with_part(body, one)) if is_there else None
+            meeting = [other.inputs.body for other in parts if _meet(variation.place, other.place)]
+            is_there = meeting == [variation.inputs.body] * len(meeting)
+            whole = (body if meeting else _with_part(body, variation)) if is_there else None
             if whole is not None and fits(schema, whole):
-                groups[index] = whole, [*parts, one]
+                groups[index] = whole, [*parts, variation]
                 break
         else:
-            groups.append((one.inputs.body, [one]))
+            groups.append((variation.inputs.body, [variation]))
     for turn, (body, parts) in enumerate(groups, 1):
         fresh = _with_new_texts(body, schema, usual.body, turn) if operation.method == "POST" else body
         says, inputs = f"{len(parts)} members of the body", replace(usual, body=fresh)
@@ -234,12 +236,12 @@ def _bounds(schema: Schema) -> Iterator[Any]:
 def _lists(schema: Schema) -> Iterator[list[Any]]:
     """Yield arrays of the most items, and with each value of an enumeration of their items."""
     most, items = schema.get("maxItems"), flat(schema["items"])
-    values = [one for one in items.get("enum", ()) if one is not None][:_FEW]
+    values = [item for item in items.get("enum", ()) if item is not None][:_FEW]
     if isinstance(most, int) and 0 < most <= _FEW:
         whole = alike_and_apart({**schema, "minItems": most})[1]
         yield whole or values[:most]
-        values = [one for one in values if one not in whole]
-    yield from ([one] for one in values)
+        values = [value for value in values if value not in whole]
+    yield from ([value] for value in values)
 
 
 def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, ...]) -> Iterator[Variation]:

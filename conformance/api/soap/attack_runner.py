@@ -147,7 +147,7 @@ class AttackRunner:
 
 def judge_calls(judge: Judge, callbacks: CallbackServer, runners: Sequence[AttackRunner]) -> None:
     """Judge whether any attack made a robot open a connection, after a moment for a robot that does so late."""
-    with_canary = [one for runner in runners for one in runner.with_canary]
+    with_canary = [unanswered for runner in runners for unanswered in runner.with_canary]
     if with_canary:
         callbacks.settle(max(runner.tempted for runner in runners))
     for attack, exchange, ids in with_canary:

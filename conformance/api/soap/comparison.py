@@ -22,7 +22,7 @@ def names(contract: Wsdl, robot: Wsdl) -> Iterator[str]:
         if wanted != found:
             yield f"{what} {found!r}, not {wanted!r}"
     for what in ("service", "name"):
-        here, there = ({getattr(port, what) for port in one.bound} for one in (contract, robot))
+        here, there = ({getattr(port, what) for port in wsdl.bound} for wsdl in (contract, robot))
         # A robot may have further services and ports, such as one for SOAP 1.2.
         for missing in sorted(here - there):
             kind = "port" if what == "name" else what

@@ -160,7 +160,7 @@ def extreme(simple: Simple, text: str, is_free: bool) -> str:  # noqa: FBT001 - 
         return text
     if simple.builtin in INTEGERS:
         low, high = bounds(simple)
-        return next((str(one) for one in _BEYOND_BITS if low <= one <= high), text)
+        return next((str(number) for number in _BEYOND_BITS if low <= number <= high), text)
     longest = simple.max_length if simple.builtin in STRINGS else None
     return text if longest is None or longest > _LONGEST else (string.ascii_lowercase * longest)[:longest]
 
@@ -184,7 +184,7 @@ def _known(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - 
     if simple.builtin in INTEGERS and is_free:
         low, high = bounds(simple)
         own = _LARGE if simple.builtin in _WIDE and high > _LARGE[1] else _SMALL
-        return tuple(str(min(max(one, low), high)) for one in own)
+        return tuple(str(min(max(number, low), high)) for number in own)
     if simple.builtin in STRINGS and is_free:
         return tuple(one for one in _TEXTS if shortest <= len(one) <= (len(one) if longest is None else longest))
     return () if shortest or longest else _TYPED.get(simple.builtin, ())

@@ -133,7 +133,7 @@ def _branches(group: Group | None, tag: str) -> Iterator[Element]:
     for item in group.items if group else ():
         if isinstance(item, Group):
             yield from _branches(item, tag)
-        elif group and group.model == "choice" and tag in {one.tag for one in group.elements()} - {item.tag}:
+        elif group and group.model == "choice" and tag in {element.tag for element in group.elements()} - {item.tag}:
             yield item
 
 

@@ -185,16 +185,16 @@ def payload_of(octets: bytes, content_type: str = "") -> etree._Element | None:
         root = parse(in_utf_8(content_type, octets), comments=False)
     except NotXmlError:
         return None
-    body = next((one for one in elements(root) if local(str(one.tag)) == "Body"), None)
+    body = next((element for element in elements(root) if local(str(element.tag)) == "Body"), None)
     return next(iter(elements(body)), None) if body is not None else None
 
 
 def texts_of(payload: etree._Element) -> dict[str, list[str]]:
     """Return the values in the content of a Body, by the name of their element or attribute in lower case."""
     found: dict[str, list[str]] = {}
-    for one in payload.iter(etree.Element):
-        if one is not payload and not len(one):
-            found.setdefault(etree.QName(one).localname.lower(), []).append("".join(map(str, one.itertext())))
-        for name, text in one.attrib.items():
+    for element in payload.iter(etree.Element):
+        if element is not payload and not len(element):
+            found.setdefault(etree.QName(element).localname.lower(), []).append("".join(map(str, element.itertext())))
+        for name, text in element.attrib.items():
             found.setdefault(etree.QName(str(name)).localname.lower(), []).append(str(text))
     return found

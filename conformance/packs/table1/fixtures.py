@@ -64,7 +64,7 @@ def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
     api = interfaces.rest
     if api is None or not isinstance(api.device, Device) or not run.allow_motion:
         return []
-    found = [partial(read_awaited, api.client, one) for one in api.device.accepted]
+    found = [partial(read_awaited, api.client, deliveries) for deliveries in api.device.accepted]
     for read in found:
         with suppress(NoAnswerError):
             read()  # entries before the first delivery are older ones

@@ -97,7 +97,7 @@ def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, st
         if any(key.startswith("2") and declares(operation, key) for key in operation.responses)
         and trace.held(operation.label)
     ]
-    yield from held_back(one for label in held for one in trace.of(label, Kind.USUAL) if not one.invents)
+    yield from held_back(probe for label in held for probe in trace.of(label, Kind.USUAL) if not probe.invents)
 
 
 @rule("description/status-declared", on=_ON)
@@ -258,7 +258,7 @@ def _wrong_header(schema: Schema, value: str) -> str:
         readings.append(value.strip().lower() == "true")
     if not readings:
         return f"the value is no {' or '.join(sorted(kinds))}"
-    problems = [shape_of(schema).problem(one) for one in readings]
+    problems = [shape_of(schema).problem(reading) for reading in readings]
     return "" if "" in problems else problems[0]
 
 

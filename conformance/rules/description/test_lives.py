@@ -76,10 +76,10 @@ def refused_keeps(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 @rule("description/deleted-is-gone", on=(used_things,))
 def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outcome]:
     """Judge whether a thing was deleted although another one refers to it, which breaks the reference."""
-    for one in trace:
-        shown = one.deleted if one.fault else one.user
+    for deletion in trace:
+        shown = deletion.deleted if deletion.fault else deletion.user
         expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
-        yield Case(not one.fault, shown, expected, f"{shown.came}: {one.fault}", cause=one.operation)
+        yield Case(not deletion.fault, shown, expected, f"{shown.came}: {deletion.fault}", cause=deletion.operation)
 
 
 @rule("description/same-values", on=(lifecycles,))
@@ -97,22 +97,28 @@ def chosen_by_value(trace: tuple[Life, ...]) -> Iterable[Outcome]:
 @rule("description/same-values", on=(tables,))
 def same_rows(trace: tuple[Table, ...]) -> Iterable[Outcome]:
     """Judge whether a list as CSV has the rows and the numbers that it has as JSON."""
-    for one in trace:
-        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=one.operation)
+    for table in trace:
+        yield Case(not table.fault, table.shown, table.expected, table.fault, cause=table.operation)
 
 
 @rule("description/idempotency-key", on=(repeated_keys,))
 def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
     """Judge whether a key stands for one request: it is performed once, and no other request gets its response."""
-    for one in trace:
-        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=f"{one.operation} {one.way}")
+    for creation in trace:
+        yield Case(
+            not creation.fault,
+            creation.shown,
+            creation.expected,
+            creation.fault,
+            cause=f"{creation.operation} {creation.way}",
+        )
 
 
 @rule("description/safe", on=(safe_reads,))
 def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
     """Judge whether safe requests leave values unchanged that clients write."""
-    for one in trace:
-        yield Case(not one.fault, one.shown, one.expected, one.fault, cause=one.operation)
+    for watch in trace:
+        yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=watch.operation)
 
 
 @pytest.fixture(scope="session")

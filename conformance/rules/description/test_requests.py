@@ -78,9 +78,13 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
 
 def _deletes_the_absent(trace: Survey) -> set[str]:
     """Return the DELETE operations that succeed for absent things, as idempotent ones may (RFC 9110 9.2.2)."""
-    deleted = [one for one in trace.probes if one.ok and one.exchange and one.operation.startswith("DELETE ")]
-    sent = Counter(one.exchange.request.url for one in deleted if one.exchange and one.validity == VALID)
-    return {one.operation for one in deleted if one.exchange and (one.invents or sent[one.exchange.request.url] > 1)}
+    deleted = [probe for probe in trace.probes if probe.ok and probe.exchange and probe.operation.startswith("DELETE ")]
+    sent = Counter(probe.exchange.request.url for probe in deleted if probe.exchange and probe.validity == VALID)
+    return {
+        probe.operation
+        for probe in deleted
+        if probe.exchange and (probe.invents or sent[probe.exchange.request.url] > 1)
+    }
 
 
 def _is_in_path(probe: Probe) -> bool:
@@ -164,7 +168,7 @@ def defaults(trace: Survey) -> Iterable[Outcome]:
 @rule("description/valid-accepted", on=(survey, generated_requests))
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
-    texts = {one.label: one.text for one in operations_of(run.contract)}
+    texts = {operation.label: operation.text for operation in operations_of(run.contract)}
     alone = (one for one in _named(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
     trace = replace(trace, probes=tuple(alone))
     yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
@@ -196,12 +200,12 @@ def _named(trace: Survey, run: Run) -> Iterator[Probe]:
     free = {
         item.label
         for item in operations_of(run.contract)
-        if any(is_free_text(one.schema) for one in item.parameter("path"))
+        if any(is_free_text(parameter.schema) for parameter in item.parameter("path"))
     }
     # Schemathesis also sends other methods, such as OPTIONS.
-    own = [one for one in trace.probes if one.operation.startswith(f"{one.attempt.request.method} ")]
-    known = {_path_of(one) for one in own if one.ok}
-    yield from (one for one in own if one.operation not in free or _path_of(one) in known)
+    own = [probe for probe in trace.probes if probe.operation.startswith(f"{probe.attempt.request.method} ")]
+    known = {_path_of(probe) for probe in own if probe.ok}
+    yield from (probe for probe in own if probe.operation not in free or _path_of(probe) in known)
 
 
 def _is_of_two(probe: Probe, text: str) -> bool:
@@ -210,7 +214,7 @@ def _is_of_two(probe: Probe, text: str) -> bool:
     sent = read_json(request.body).value
     names = {*(sent if isinstance(sent, dict) else ()), *dict(parse_qsl(urlsplit(request.target).query))}
     refusal = read_json(probe.exchange.response.body).value if probe.exchange else None
-    said = [one for one in refusal.values() if isinstance(one, str)] if isinstance(refusal, dict) else []
+    said = [item for item in refusal.values() if isinstance(item, str)] if isinstance(refusal, dict) else []
     sentences = [sentence for one in (text, *said) for sentence in _SENTENCE.split(one)]
     return any(
         _TOGETHER.search(one) and sum(bool(re.search(rf"\b{re.escape(name)}\b", one)) for name in names) > 1

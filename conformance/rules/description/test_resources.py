@@ -40,17 +40,19 @@ def test_parameters_of_lists(api: RestInterface, values: Values) -> None:
 @rule("description/list-pages", on=(pages_of_lists,))
 def list_pages(trace: tuple[Paged, ...]) -> Iterable[Outcome]:
     """Judge whether the parts of a list are the list, each item once."""
-    for one in trace:
-        yield Case(not one.fault, one.found, one.expected, one.fault, cause=f"{one.operation} {one.way}")
+    for paging in trace:
+        yield Case(
+            not paging.fault, paging.found, paging.expected, paging.fault, cause=f"{paging.operation} {paging.way}"
+        )
 
 
 @rule("description/list-pages", on=(own_things,))
 def list_pages_below(trace: Survey) -> Iterable[Outcome]:
     """Judge the same of lists below a thing."""
-    return list_pages.judge(tuple(one for one in trace.paged if one.way != ANOTHER))
+    return list_pages.judge(tuple(paging for paging in trace.paged if paging.way != ANOTHER))
 
 
 @rule("description/own-identifier", on=(own_things,))
 def own_items(trace: Survey) -> Iterable[Outcome]:
     """Judge whether what was created below a thing is not below another one."""
-    return list_pages.judge(tuple(one for one in trace.paged if one.way == ANOTHER))
+    return list_pages.judge(tuple(paging for paging in trace.paged if paging.way == ANOTHER))

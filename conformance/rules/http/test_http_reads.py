@@ -59,15 +59,20 @@ class _Reads:
     def lost(self) -> list[Attempt]:
         """The reads without an answer: a server error, too many requests, or no response."""
         return [
-            one
-            for one in self.attempts
-            if is_busy(one) or (isinstance(one, Exchange) and one.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR)
+            exchange
+            for exchange in self.attempts
+            if is_busy(exchange)
+            or (isinstance(exchange, Exchange) and exchange.response.status >= HTTPStatus.INTERNAL_SERVER_ERROR)
         ]
 
     @property
     def put_off(self) -> list[Exchange]:
         """The lost reads that the robot deferred with a Retry-After."""
-        return [one for one in self.lost if isinstance(one, Exchange) and one.response.put_off_s is not None]
+        return [
+            exchange
+            for exchange in self.lost
+            if isinstance(exchange, Exchange) and exchange.response.put_off_s is not None
+        ]
 
     @property
     def fine(self) -> bool:
@@ -203,4 +208,6 @@ def _read(api: RestInterface, calls: Sequence[Call], rate: str, count: int, ever
 
 def _wait(seen: _Reads) -> None:
     """Wait as long as the robot's Retry-After demands."""
-    time.sleep(min(_LONGEST_WAIT_S, max((one.response.put_off_s or 0.0 for one in seen.put_off), default=0.0)))
+    time.sleep(
+        min(_LONGEST_WAIT_S, max((exchange.response.put_off_s or 0.0 for exchange in seen.put_off), default=0.0))
+    )

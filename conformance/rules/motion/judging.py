@@ -49,7 +49,7 @@ def off(here: dict[str, float], there: dict[str, float], motion: MotionMap, shar
 
 def usable(leg: Leg) -> tuple[Reading, ...]:
     """Return the readings that have all positions."""
-    return tuple(one for one in leg.readings if one.values)
+    return tuple(reading for reading in leg.readings if reading.values)
 
 
 def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
@@ -59,7 +59,7 @@ def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
         return
     seen = usable(leg)
     # What it shows when its time is over counts, or, where it was there before, what it showed last.
-    late = tuple(one for one in seen if one.sent >= leg.due)[:SEVERAL]
+    late = tuple(reading for reading in seen if reading.sent >= leg.due)[:SEVERAL]
     last = late if len(late) == SEVERAL else seen[-SEVERAL:]
     apart = off(at(last, motion), goal.targets, motion) if len(last) == SEVERAL else ""
     if len(last) < SEVERAL or (apart and not late):
@@ -90,7 +90,7 @@ def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             and (one.was_kept(motion.velocity.hold_s) or not all(command.accepted for command in one.commands))
         ]
         found = [outcome for one in shown for outcome in _driven(one, motion, seen)]
-        cases = [one for one in found if isinstance(one, Case)]
+        cases = [case for case in found if isinstance(case, Case)]
         yield from cases or found
         if not shown:
             yield NotTested("over this link the device was not driven on within its hold time")
@@ -99,12 +99,12 @@ def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 def _driven(drive: Drive, motion: MotionMap, so_far: Sequence[Reading]) -> Iterator[Outcome]:
     if motion.velocity is None:
         return
-    refused = next((one for one in drive.commands if not one.accepted), None)
+    refused = next((command for command in drive.commands if not command.accepted), None)
     if refused is not None:
         yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.named}")
         return
     first = drive.commands[0]
-    seen = [one for one in drive.under_way if one.sent >= drive.settled(motion.velocity.settle_s)]
+    seen = [reading for reading in drive.under_way if reading.sent >= drive.settled(motion.velocity.settle_s)]
     for name, wanted in drive.wanted.items():
         if (place := end_of_travel(drive.under_way, name, wanted, motion, so_far)) is not None:
             yield NotTested(f"it stands at {place:.4g}, maybe the end of its travel: write its limits into the map")
@@ -127,7 +127,7 @@ def renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterat
     """Judge whether a velocity that was sent again and again outlasts the hold time of the first command."""
     hold_s = motion.velocity.hold_s if motion.velocity else None
     first = drive.commands[0]
-    late = [one for one in drive.under_way if hold_s and one.sent >= first.answered + hold_s]
+    late = [reading for reading in drive.under_way if hold_s and reading.sent >= first.answered + hold_s]
     long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
     found = measured(late, name, motion) if wanted and long_enough else None
     if found is not None:
@@ -145,7 +145,7 @@ def renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterat
 
 def slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | None:
     """Return the least of the medians of several readings in a row, in the direction that is wanted."""
-    seen = [math.copysign(1, wanted) * one.speeds[name] for one in readings if name in one.speeds]
+    seen = [math.copysign(1, wanted) * reading.speeds[name] for reading in readings if name in reading.speeds]
     return min((median(seen[index : index + SEVERAL]) for index in range(len(seen) - SEVERAL + 1)), default=None)
 
 
@@ -207,8 +207,8 @@ def went_on(
         within_s: time in which the device must rest, s.
         motion: the map.
     """
-    before = [one for one in readings if one.values and one.received <= command.sent]
-    after = [one for one in readings if one.values and one.sent >= command.answered]
+    before = [reading for reading in readings if reading.values and reading.received <= command.sent]
+    after = [reading for reading in readings if reading.values and reading.sent >= command.answered]
     if not before or len(after) < SEVERAL:
         return ""
     took_s = command.answered - command.sent
@@ -243,7 +243,7 @@ def _stopped(leg: Leg, motion: MotionMap, *, excused: bool) -> tuple[tuple[Readi
 def _fastest_so_far(leg: Leg) -> dict[str, float]:
     """Return how fast the device can be while moving: at most twice its average speed."""
     goal, order = leg.commands[:2]
-    seen = [one for one in usable(leg) if goal.answered < one.sent and one.received <= order.sent]
+    seen = [reading for reading in usable(leg) if goal.answered < reading.sent and reading.received <= order.sent]
     if not seen:
         return {}
     axis, last = moved_axis(leg), seen[-1]

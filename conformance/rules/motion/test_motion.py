@@ -53,7 +53,7 @@ def stays(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 def _first_at(readings: tuple[Reading, ...], goal: dict[str, float], motion: MotionMap) -> int | None:
     """Return the index of the first of several readings in a row at a position."""
     for index in range(len(readings) - SEVERAL + 1):
-        if not any(off(one.values, goal, motion) for one in readings[index : index + SEVERAL]):
+        if not any(off(reading.values, goal, motion) for reading in readings[index : index + SEVERAL]):
             return index
     return None
 
@@ -70,7 +70,7 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             least, greatest = axis.limits[0] - room, axis.limits[1] + room
             places = [middle_of(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]
             inside = next((i for i, one in enumerate(places) if least <= one <= greatest), len(places))
-            beyond = [one for one in places[inside:] if not least <= one <= greatest]
+            beyond = [place for place in places[inside:] if not least <= place <= greatest]
             if places:
                 found = f"{name} {max(beyond, key=abs):.4g}" if beyond else ""
                 yield Case(
@@ -131,7 +131,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 def _soon(readings: tuple[Reading, ...], motion: MotionMap) -> tuple[str, Reading]:
     """Return the axes that still move when the device must rest, as text, and the last reading that counts."""
-    soon = tuple(one for one in readings if one.sent < readings[0].sent + _SOON_S)
+    soon = tuple(reading for reading in readings if reading.sent < readings[0].sent + _SOON_S)
     moved = off(at(soon[-SEVERAL:], motion), at(readings[:SEVERAL], motion), motion) or fastest(soon, motion)
     return moved, soon[-1]
 
@@ -174,9 +174,9 @@ def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
 def _arrives_at(leg: Leg, motion: MotionMap) -> float:
     """Return when the device arrives at the first target at the earliest, by its speed before the second move."""
     first, second = leg.commands[:2]
-    seen = [one for one in usable(leg) if one.received <= second.sent]
+    seen = [reading for reading in usable(leg) if reading.received <= second.sent]
     axis = moved_axis(leg)
-    way = [abs(one.values[axis] - leg.start[axis]) for one in seen]
+    way = [abs(reading.values[axis] - leg.start[axis]) for reading in seen]
     moved = [index for index, one in enumerate(way) if one > motion.tolerance(axis)]
     if not moved or way[-1] == 0:
         return 0.0
@@ -194,7 +194,7 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
         return
     axis = moved_axis(leg)
     ahead = 1 if first.targets[axis] > leg.start[axis] else -1
-    places = [ahead * one.values[axis] for one in readings]
+    places = [ahead * reading.values[axis] for reading in readings]
     farther = max(places) - places[0]
     yield Case(
         farther <= 2 * motion.tolerance(axis),
@@ -208,7 +208,7 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/last-of-many", on=(many_commands,))
 def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device ends at the last accepted of many targets."""
-    accepted = [one for one in trace.commands if one.accepted]
+    accepted = [command for command in trace.commands if command.accepted]
     if not accepted:
         yield Case(holds=False, exchange=trace.commands[-1].exchange, expected="a 2xx for one of many moves at least")
     else:
@@ -218,7 +218,7 @@ def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/repeated", on=(repeated,))
 def repetition(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move that is sent twice ends where it ends when it is sent once."""
-    accepted = [one for one in trace.commands if one.accepted]
+    accepted = [command for command in trace.commands if command.accepted]
     yield from reached(trace, (accepted or list(trace.commands))[-1], motion)
 
 
@@ -229,23 +229,23 @@ def one_client(trace: tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) ->
         if isinstance(leg, Drive):
             yield from _of_one_driver(leg, motion)
             continue
-        accepted = [one for one in leg.commands if one.accepted]
+        accepted = [command for command in leg.commands if command.accepted]
         seen = usable(leg)[-SEVERAL:]
         if not accepted or len(seen) < SEVERAL:
             yield NotTested("no client's move was accepted" if not accepted else "the state could not be read")
             continue
         here = at(seen, motion)
-        fits = any(not off(here, one.targets, motion) for one in accepted)
+        fits = any(not off(here, command.targets, motion) for command in accepted)
         yield Case(fits, accepted[-1].exchange, "the target of one client", observed=named(here))
 
 
 def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device follows one of several clients' commands, not a mixture."""
-    accepted = [one for one in drive.commands if one.accepted]
+    accepted = [command for command in drive.commands if command.accepted]
     if motion.velocity is None or not accepted:
         return
     begin, end = drive.settled(motion.velocity.settle_s), accepted[-1].sent + (motion.velocity.hold_s or math.inf)
-    seen = [one for one in drive.under_way if begin <= one.sent and one.received <= end]
+    seen = [reading for reading in drive.under_way if begin <= reading.sent and reading.received <= end]
     found = {name: measured(seen, name, motion) for name in motion.velocity.axes}
     lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0
     # By positions a velocity is seen in a while only: their noise moves a short one.
@@ -254,10 +254,10 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     if len(speeds) < len(found):
         # The hold time is too short for it, or the link too slow: positions tell enough of most devices.
         return
-    fastest_of = {name: max(abs(one.targets[name]) for one in drive.commands) for name in speeds}
+    fastest_of = {name: max(abs(command.targets[name]) for command in drive.commands) for name in speeds}
     fits = any(
         # Nearer to its velocity, or to rest, than to another client's; of an axis that nobody drives nothing is told.
-        all(abs(speeds[name] - one.targets[name]) < most / 2 for name, most in fastest_of.items() if most)
-        for one in accepted
+        all(abs(speeds[name] - command.targets[name]) < most / 2 for name, most in fastest_of.items() if most)
+        for command in accepted
     )
     yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=named(speeds), cause="velocity")

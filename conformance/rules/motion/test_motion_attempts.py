@@ -22,7 +22,7 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
 
     It may rest anywhere within the tolerance of its last target, so two places of rest may be twice that apart.
     """
-    seen = tuple(one for one in quiet.readings if one.values or (one.speeds and not motion.state.axes))
+    seen = tuple(reading for reading in quiet.readings if reading.values or (reading.speeds and not motion.state.axes))
     if len(seen) < SEVERAL:
         return None
     windows = (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1))
@@ -35,7 +35,7 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
 
 def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:
     """Judge that attempts of some kinds moved nothing: together, or, where the device moved, each alone."""
-    tried = [one for one in trace.tried if one.kind in kinds]
+    tried = [attempt for attempt in trace.tried if attempt.kind in kinds]
     together = _moved(trace, motion)
     if not tried:
         yield NotClaimed("of the map and the description no such request can be made")
@@ -44,7 +44,7 @@ def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outc
     elif _moves_anyway(trace, motion):
         yield NotTested("the device also moved at rest while the suite sent only reads")
     elif together == "":
-        yield from (Case(True, one.exchange, f"rest after {one.what}") for one in tried)
+        yield from (Case(True, attempt.exchange, f"rest after {attempt.what}") for attempt in tried)
     else:
         yield from _alone(trace, motion, kinds)
 
@@ -58,38 +58,43 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
     """Judge attempts that were repeated singly, because the device moved after all of them."""
     for quiet in trace.alone:
         moved = _moved(quiet, motion)
-        last = ([one for one in quiet.tried if one.exchange and not is_refusal(one.exchange)] or list(quiet.tried))[-1:]
-        for one in quiet.tried:
+        last = (
+            [attempt for attempt in quiet.tried if attempt.exchange and not is_refusal(attempt.exchange)]
+            or list(quiet.tried)
+        )[-1:]
+        for attempt in quiet.tried:
             # Of several, the last that it did not refuse has moved it, or else the last one.
-            if one.kind in kinds and moved is not None and not (moved and one not in last):
-                yield Case(not moved, one.exchange, f"rest after {one.what}", observed=moved, cause=one.kind)
+            if attempt.kind in kinds and moved is not None and not (moved and attempt not in last):
+                yield Case(
+                    not moved, attempt.exchange, f"rest after {attempt.what}", observed=moved, cause=attempt.kind
+                )
     if trace.idle is None:
         yield NotTested("the device moved after several attempts, and did not come back for each of them alone")
 
 
 def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
     """Judge whether attempts are refused, with a given status if there are any; over SOAP by a fault."""
-    for one in tried:
-        soap = one.exchange is not None and is_soap(one.exchange)
+    for attempt in tried:
+        soap = attempt.exchange is not None and is_soap(attempt.exchange)
         expected = "a fault" if soap else " or ".join(map(str, statuses)) or "4xx"
-        found = one.exchange
-        sure = soap or one.failed or not statuses or (found is not None and found.response.status in statuses)
-        holds = found is not None and sure and (one.failed or is_refusal(found))
-        yield Case(holds, found, f"{expected} for {one.what}", cause=one.kind)
+        found = attempt.exchange
+        sure = soap or attempt.failed or not statuses or (found is not None and found.response.status in statuses)
+        holds = found is not None and sure and (attempt.failed or is_refusal(found))
+        yield Case(holds, found, f"{expected} for {attempt.what}", cause=attempt.kind)
 
 
 @rule("motion/beyond-limits", on=(clamped_targets, clamped_velocities, attempts_at_rest))
 def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether targets and velocities beyond the limits are refused or clamped, as the map declares."""
     if not isinstance(trace, Quiet):
-        yield from driven(tuple(one for one in trace if isinstance(one, Drive)), motion)
-        for one in trace:
-            if isinstance(one, Leg):
-                yield from reached(one, one.commands[-1], motion)
+        yield from driven(tuple(drive for drive in trace if isinstance(drive, Drive)), motion)
+        for leg in trace:
+            if isinstance(leg, Leg):
+                yield from reached(leg, leg.commands[-1], motion)
         return
     if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")
-    yield from refused(one for one in trace.tried if one.kind == "beyond")
+    yield from refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
 
 
 @rule("motion/refused-still", on=(attempts_at_rest,))
@@ -97,10 +102,10 @@ def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target beyond the limits, or an invalid one, moves nothing."""
     yield from nothing_moved(trace, motion, "beyond", "invalid", "unactuated")
     together = _moved(trace, motion)
-    alone = trace.idle is not None and not any(_moved(one, motion) for one in trace.alone)
+    alone = trace.idle is not None and not any(_moved(quiet, motion) for quiet in trace.alone)
     if together and alone and not _moves_anyway(trace, motion):
         # It moves now and then, or after several of them; which one it was, nobody can say.
-        last = next((one.exchange for one in reversed(trace.tried) if one.exchange is not None), None)
+        last = next((attempt.exchange for attempt in reversed(trace.tried) if attempt.exchange is not None), None)
         yield Case(False, last, f"rest after {len(trace.tried)} attempts in a row", observed=together, cause="together")
 
 
@@ -113,7 +118,7 @@ def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/unauthorised-still", on=(attempts_at_rest,))
 def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
-    tried = [one for one in trace.tried if one.kind == "unauthorised"]
+    tried = [attempt for attempt in trace.tried if attempt.kind == "unauthorised"]
     # 423 and 428 refuse a client without the lease (RFC 4918 11.3, RFC 6585 3).
     yield from refused(tried, 401, 403, 423, 428)
     yield from nothing_moved(trace, motion, "unauthorised")
@@ -135,7 +140,9 @@ def fresh(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             for a, b in itertools.pairwise(changed)
             if off(seen[b].values, seen[b - 1].values, motion)
             # Of few positions, one may be a target, at which a fast device rested until it got the next one.
-            and (len(changed) >= SEVERAL or all(off(seen[a].values, one.targets, motion) for one in leg.commands))
+            and (
+                len(changed) >= SEVERAL or all(off(seen[a].values, command.targets, motion) for command in leg.commands)
+            )
         ]
         longest_s = max(still, default=0.0)
         yield Case(
@@ -154,8 +161,8 @@ def stamp(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         yield NotClaimed("the map names no stamp")
         return
     for leg in legs_of(trace):
-        seen = [one for one in leg.readings if one.values]
-        stamps = [one.stamp for one in seen if one.stamp is not None]
+        seen = [reading for reading in leg.readings if reading.values]
+        stamps = [reading.stamp for reading in seen if reading.stamp is not None]
         if len(stamps) < len(seen):
             yield Case(holds=False, exchange=seen[0].exchange, expected=f"a time at {motion.state.stamp}")
         elif len(stamps) > SEVERAL:

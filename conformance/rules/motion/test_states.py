@@ -53,7 +53,7 @@ def action_succeeds(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
             seen[index]
             for index in range(len(seen) - SEVERAL)
             if seen[index].action in action.succeeded
-            and all(off(one.values, goal.targets, motion, 2) for one in seen[index : index + SEVERAL])
+            and all(off(reading.values, goal.targets, motion, 2) for reading in seen[index : index + SEVERAL])
         ]
         if goal.accepted and seen:
             words = " or ".join(action.succeeded)
@@ -71,9 +71,9 @@ def action_runs(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         return
     for leg in trace:
         goal = leg.commands[-1]
-        under_way = [one for one in usable(leg) if _is_between(one, leg, motion)]
+        under_way = [reading for reading in usable(leg) if _is_between(reading, leg, motion)]
         if goal.accepted and len(under_way) >= SEVERAL:
-            words = {one.action for one in under_way}
+            words = {reading.action for reading in under_way}
             found = " and ".join(sorted(words)) or "nothing"
             expected = f"{' or '.join(action.running)} at {action.at} under way ({leg.what})"
             yield Case(bool(words & set(action.running)), goal.exchange, expected, observed=found)
@@ -106,10 +106,14 @@ def action_canceled(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
 @rule("motion/switches", on=(switched,))
 def switches(trace: tuple[Switched, ...]) -> Iterator[Outcome]:
     """Judge whether each switch takes each of its values, and keeps it."""
-    for one in trace:
-        expected = f"{one.switch} {one.value!r} shown, and kept"
-        found = f"{one.shown!r}" + (" a moment later" if one.arrived else "")
-        holds = one.command.response.ok and one.arrived and one.stayed
+    for switch in trace:
+        expected = f"{switch.switch} {switch.value!r} shown, and kept"
+        found = f"{switch.shown!r}" + (" a moment later" if switch.arrived else "")
+        holds = switch.command.response.ok and switch.arrived and switch.stayed
         yield Case(
-            holds, one.command, expected, observed="" if not one.command.response.ok else found, cause=one.switch
+            holds,
+            switch.command,
+            expected,
+            observed="" if not switch.command.response.ok else found,
+            cause=switch.switch,
         )

@@ -32,7 +32,7 @@ def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
     """Return the axes that still move in some readings, as text; empty if none, None if it cannot be told."""
-    seen = tuple(one for one in readings if one.values or (one.speeds and not motion.state.axes))
+    seen = tuple(reading for reading in readings if reading.values or (reading.speeds and not motion.state.axes))
     if len(seen) < 2 * SEVERAL:
         return None
     moved = off(at(seen[-SEVERAL:], motion), at(seen[:SEVERAL], motion), motion)
@@ -56,7 +56,7 @@ def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, ex
         yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.named}")
         return
     due = must_rest_from(end, drive.readings, excused=excused) + settle_s
-    moved = _at_rest([one for one in drive.after if one.sent >= due], drive, motion)
+    moved = _at_rest([reading for reading in drive.after if reading.sent >= due], drive, motion)
     if not excused and not moved:
         axes = motion.velocity.axes if motion.velocity else {}
         speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
@@ -81,7 +81,7 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
         due = last.answered + within_s + longest_s(drive.readings)
         seen_from = due if drive.rested is None else min(due, drive.rested)
-        moved = _at_rest([one for one in drive.after if one.sent >= seen_from], drive, motion)
+        moved = _at_rest([reading for reading in drive.after if reading.sent >= seen_from], drive, motion)
         moved = moved or _still_driven(drive, due, motion.velocity.hold_s, motion) or moved
         yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.named})")
 
@@ -93,7 +93,7 @@ def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) ->
     """
     settle_s = motion.velocity.settle_s if motion.velocity else 0.0
     late = due - settle_s + max(_LONGER * hold_s, settle_s / 2, _LONGER_S)
-    seen = [one for one in drive.after if late <= one.sent and one.received <= due]
+    seen = [reading for reading in drive.after if late <= reading.sent and reading.received <= due]
     for name, wanted in drive.wanted.items():
         found = measured(seen, name, motion) if wanted else None
         if found is not None and abs(found - wanted) <= motion.speed_tolerance(name) < abs(wanted) / 2:
@@ -121,7 +121,7 @@ def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
 
 def fails(outcomes: Iterable[Outcome]) -> bool:
     """Return whether any outcome is a failure."""
-    return any(isinstance(one, Case) and not one.holds for one in outcomes)
+    return any(isinstance(case, Case) and not case.holds for case in outcomes)
 
 
 def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[Outcome]:
@@ -132,10 +132,10 @@ def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[
     if motion.velocity is None or motion.velocity.hold_s is None:
         return
     unseen, seen = set[str](), set[str]()
-    so_far = [one for drive in trace for one in drive.readings]
+    so_far = [reading for drive in trace for reading in drive.readings]
     for drive in trace:
         last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s, share, motion)
-        within = [one for one in drive.after if begin <= one.sent and one.received <= end]
+        within = [reading for reading in drive.after if begin <= reading.sent and reading.received <= end]
         for name, wanted in drive.wanted.items():
             found = measured(within, name, motion) if wanted else None
             if end_of_travel(within, name, wanted, motion, so_far) is not None:

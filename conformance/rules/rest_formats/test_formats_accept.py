@@ -109,13 +109,15 @@ def _alone(api: RestInterface, call: Call) -> list[Preferred]:
 def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:
     """Judge requests with preferences: one finding for each format that was sent instead of the preferred one."""
     failed = defaultdict(list)
-    for one in preferred:
-        if not one.holds:
-            failed[one.got].append(one.accept)
-    for one in preferred:
-        others = [accept for accept in dict.fromkeys(failed[one.got]) if accept != one.accept]
+    for preference in preferred:
+        if not preference.holds:
+            failed[preference.got].append(preference.accept)
+    for preference in preferred:
+        others = [accept for accept in dict.fromkeys(failed[preference.got]) if accept != preference.accept]
         more = f" (and for {len(others)} more values of Accept: {' | '.join(others[:_NAMED])})" if others else ""
-        expect(judge, one.requirement, one.exchange).that(one.holds, f"{one.expected}{more}", cause=one.got)
+        expect(judge, preference.requirement, preference.exchange).that(
+            preference.holds, f"{preference.expected}{more}", cause=preference.got
+        )
 
 
 def _sent(api: RestInterface, call: Call, text: str) -> tuple[str, Exchange]:

@@ -67,7 +67,9 @@ def _refused(operation: Operation, values: Values, number: int) -> list[Outgoing
     other = replace(valid.having_type(_TEXT), body=large if number % 2 else small)
     found = [replace(valid, body=cut), *([other] if _TEXT not in operation.bodies else [])]
     unknown = list(unknown_variations(operation, usual))[-1:]
-    return found + [replace(written(operation, one.inputs), body=small if number % 2 else large) for one in unknown]
+    return found + [
+        replace(written(operation, variation.inputs), body=small if number % 2 else large) for variation in unknown
+    ]
 
 
 def _behind(api: RestInterface, request: Outgoing, call: Call) -> Attempt | None:

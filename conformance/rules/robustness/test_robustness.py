@@ -111,10 +111,10 @@ def steady_latency(trace: Survey | tuple[TimedAgain, ...]) -> Iterable[Outcome]:
         yield _steady(trace.repeated, trace.repeats, len(trace.repeats) // 3)
     else:
         yield NotTested("no operation that only reads was answered often enough")
-    for label in {one.operation: None for one in trace.probes}:
-        timed = [one.exchange for one in trace.of(label, Kind.AGAIN) if one.exchange is not None and one.ok]
+    for label in {probe.operation: None for probe in trace.probes}:
+        timed = [probe.exchange for probe in trace.of(label, Kind.AGAIN) if probe.exchange is not None and probe.ok]
         if len(timed) >= 3 * TIMED:
-            times = [one.response.elapsed_ms for one in timed]
+            times = [exchange.response.elapsed_ms for exchange in timed]
             yield replace(
                 _steady(timed[-1], times, TIMED),
                 cause=label,

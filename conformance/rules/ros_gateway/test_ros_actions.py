@@ -31,68 +31,70 @@ _NO_STATE: Final = NotClaimed("the map has no state of goals")
 @rule("ros-gateway/goal-once", on=(action_goals,))
 def once(trace: Goals) -> Iterator[Outcome]:
     """Judge whether an accepted goal reached the server unchanged, and exactly once."""
-    for one in trace.probes:
-        if one.course not in _ACCEPTED or one.course is Course.SECOND:
+    for goal in trace.probes:
+        if goal.course not in _ACCEPTED or goal.course is Course.SECOND:
             continue
-        if not one.accepted:
-            yield Case(holds=False, exchange=one.exchange, expected=f"2xx for a goal {one.course}", cause="refused")
+        if not goal.accepted:
+            yield Case(holds=False, exchange=goal.exchange, expected=f"2xx for a goal {goal.course}", cause="refused")
             continue
-        wanted = 2 if one.course is Course.FIRST else 1
-        goals = [heard for heard in one.heard if heard.what == "goal"]
-        expected = f"{wanted} goal{'s' * (wanted > 1)} at {one.body.action} for {wanted} accepted"
+        wanted = 2 if goal.course is Course.FIRST else 1
+        goals = [heard for heard in goal.heard if heard.what == "goal"]
+        expected = f"{wanted} goal{'s' * (wanted > 1)} at {goal.body.action} for {wanted} accepted"
         cause = "lost" if len(goals) < wanted else "doubled"
-        yield Case(len(goals) == wanted, one.exchange, expected, f"{len(goals)} goals", cause)
-        wanted_fields = mapped(json.loads(one.value), one.body)
-        wrong = next(changed(mapped(goals[0].content, one.body), wanted_fields), None) if goals else None
+        yield Case(len(goals) == wanted, goal.exchange, expected, f"{len(goals)} goals", cause)
+        wanted_fields = mapped(json.loads(goal.value), goal.body)
+        wrong = next(changed(mapped(goals[0].content, goal.body), wanted_fields), None) if goals else None
         found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
-        yield Case(not wrong, one.exchange, "the goal's fields at its server", observed=found, cause="changed")
+        yield Case(not wrong, goal.exchange, "the goal's fields at its server", observed=found, cause="changed")
 
 
 @rule("ros-gateway/goal-rejected", on=(action_goals,))
 def rejected(trace: Goals) -> Iterator[Outcome]:
     """Judge whether a goal that its server rejects is reported as that."""
-    for one in trace.probes:
-        if one.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in one.heard):
+    for goal in trace.probes:
+        if goal.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in goal.heard):
             continue
-        body, declared = one.body, one.body.rejected
-        if not one.accepted:
-            holds = fails_as(one.exchange, body, declared)
-            yield Case(holds, one.exchange, f"{statuses(declared)} for a goal {one.course}", cause="status")
+        body, declared = goal.body, goal.body.rejected
+        if not goal.accepted:
+            holds = fails_as(goal.exchange, body, declared)
+            yield Case(holds, goal.exchange, f"{statuses(declared)} for a goal {goal.course}", cause="status")
             continue
-        last = one.looks[-1] if one.looks else None
+        last = goal.looks[-1] if goal.looks else None
         state = body.state
         if declared or last is None or state is None:
-            expected = f"{statuses(declared)} for a goal {one.course}"
-            yield Case(holds=False, exchange=one.exchange, expected=expected, cause="accepted")
+            expected = f"{statuses(declared)} for a goal {goal.course}"
+            yield Case(holds=False, exchange=goal.exchange, expected=expected, cause="accepted")
             continue
         others = {*state.running, *state.succeeded, *state.canceled}
         holds = last.word in state.rejected if state.rejected else last.word not in others
         expected = f"the state {' or '.join(state.rejected)}" if state.rejected else "no state of an accepted goal"
-        yield Case(holds, last.exchange, f"{expected} for a goal {one.course}", observed=last.word, cause="state")
+        yield Case(holds, last.exchange, f"{expected} for a goal {goal.course}", observed=last.word, cause="state")
 
 
 @rule("ros-gateway/goal-outcome", on=(action_goals,))
 def outcomes(trace: Goals) -> Iterator[Outcome]:
     """Judge whether a goal's state is that of its server: running until the end, then how it ended, for good."""
-    for one in trace.probes:
-        state, name = one.body.state, _ENDS.get(one.course, "")
+    for goal in trace.probes:
+        state, name = goal.body.state, _ENDS.get(goal.course, "")
         if state is None:
             yield _NO_STATE
             continue
-        if not name or not one.looks or (one.course is not Course.ABORTS and _end_of(one) is None):
+        if not name or not goal.looks or (goal.course is not Course.ABORTS and _end_of(goal) is None):
             continue
         words: tuple[str, ...] = getattr(state, name)
         if not words:
             continue
-        last, end = one.looks[-1], _end_of(one)
+        last, end = goal.looks[-1], _end_of(goal)
         # Another end is wrong at once; a goal that still runs may have been ended just now.
-        runs_on = last.word not in words and not is_end(one.body, last.word)
-        if runs_on and end is not None and last.sent < end + one.body.within_s:
-            yield NotTested(f"the server ended a goal {one.course} too late to see what becomes of it")
+        runs_on = last.word not in words and not is_end(goal.body, last.word)
+        if runs_on and end is not None and last.sent < end + goal.body.within_s:
+            yield NotTested(f"the server ended a goal {goal.course} too late to see what becomes of it")
             continue
-        expected = f"the state {' or '.join(words)} within {one.body.within_s:g} s after the end of a goal {one.course}"
-        yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=one.course)
-        yield from _steady(one)
+        expected = (
+            f"the state {' or '.join(words)} within {goal.body.within_s:g} s after the end of a goal {goal.course}"
+        )
+        yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=goal.course)
+        yield from _steady(goal)
 
 
 def _end_of(one: Goal) -> float | None:
@@ -118,30 +120,30 @@ def _steady(one: Goal) -> Iterator[Outcome]:
 @rule("ros-gateway/goal-result", on=(action_goals,))
 def results(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether the result of a goal that succeeded is exact, and that of another one is not another's."""
-    for one in trace.probes:
-        body = one.body
+    for goal in trace.probes:
+        body = goal.body
         if body.result is None:
             yield NotClaimed("the map has no result of goals")
             continue
-        ended = [look for look in one.looks if is_end(body, look.word)]
-        if not one.result or not ended or one.course not in _ENDS:
+        ended = [look for look in goal.looks if is_end(body, look.word)]
+        if not goal.result or not ended or goal.course not in _ENDS:
             continue
-        last, definition = ended[-1], trace.definitions[f"{one.operation}#Result"]
-        if last.result or _ENDS[one.course] == "succeeded":
-            found = differing(last.exchange, one.result, definition, body, body.result, ros)
-            expected = f"the result of a goal {one.course}"
-            yield Case(not found, last.exchange, expected, observed=found, cause=f"{one.course} {found.split(' ')[0]}")
+        last, definition = ended[-1], trace.definitions[f"{goal.operation}#Result"]
+        if last.result or _ENDS[goal.course] == "succeeded":
+            found = differing(last.exchange, goal.result, definition, body, body.result, ros)
+            expected = f"the result of a goal {goal.course}"
+            yield Case(not found, last.exchange, expected, observed=found, cause=f"{goal.course} {found.split(' ')[0]}")
 
 
 @rule("ros-gateway/goal-feedback", on=(action_goals,))
 def feedback(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether feedback is the server's, exact, in order, and the last one."""
-    for one in trace.probes:
-        if one.body.feedback is None:
+    for goal in trace.probes:
+        if goal.body.feedback is None:
             yield NotClaimed("the map has no feedback of goals")
             continue
-        if one.course is Course.SUCCEEDS and one.accepted and one.looks:
-            yield from _feedback(one, trace, ros)
+        if goal.course is Course.SUCCEEDS and goal.accepted and goal.looks:
+            yield from _feedback(goal, trace, ros)
 
 
 def _feedback(one: Goal, trace: Goals, ros: RosMap) -> Iterator[Outcome]:
@@ -182,16 +184,16 @@ def _number_of(look: Look, one: Goal, trace: Goals, ros: RosMap) -> int | None:
 @rule("ros-gateway/goal-cancel", on=(action_goals,))
 def cancels(trace: Goals) -> Iterator[Outcome]:
     """Judge whether a cancel request reaches the server for this goal alone, and its result is reported."""
-    for one in trace.probes:
-        if not one.body.cancel:
+    for goal in trace.probes:
+        if not goal.body.cancel:
             yield NotClaimed("the map has no operation that cancels")
             continue
-        if one.course in {Course.CANCELED, Course.GOES_ON, Course.FIRST} and isinstance(one.cancel, Exchange):
-            yield from _canceled(one, one.cancel)
-        if one.course is Course.SECOND and one.body.state is not None and one.looks:
-            last = one.looks[-1]
-            holds = last.word not in one.body.state.canceled
-            yield Case(holds, last.exchange, f"no cancellation of a goal {one.course}", last.word, cause="another")
+        if goal.course in {Course.CANCELED, Course.GOES_ON, Course.FIRST} and isinstance(goal.cancel, Exchange):
+            yield from _canceled(goal, goal.cancel)
+        if goal.course is Course.SECOND and goal.body.state is not None and goal.looks:
+            last = goal.looks[-1]
+            holds = last.word not in goal.body.state.canceled
+            yield Case(holds, last.exchange, f"no cancellation of a goal {goal.course}", last.word, cause="another")
 
 
 def _canceled(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
@@ -217,8 +219,8 @@ def _canceled(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
 @rule("ros-gateway/recovers", on=(action_goals,))
 def recovers(trace: Goals) -> Iterator[Outcome]:
     """Judge whether goals reach a server that is back."""
-    for one in trace.probes:
-        if one.course in {Course.REACHED, Course.BACK}:
-            holds = one.accepted and bool(one.heard)
-            expected = f"2xx, and a goal at {one.body.action}, {one.course}"
-            yield Case(holds, one.exchange, expected, "none" if not one.heard else "", cause=one.course)
+    for goal in trace.probes:
+        if goal.course in {Course.REACHED, Course.BACK}:
+            holds = goal.accepted and bool(goal.heard)
+            expected = f"2xx, and a goal at {goal.body.action}, {goal.course}"
+            yield Case(holds, goal.exchange, expected, "none" if not goal.heard else "", cause=goal.course)

@@ -31,13 +31,13 @@ _ALL: Final = "all topics at once"
 @rule("ros-gateway/absent", on=(topics_at_first,))
 def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
     """Judge whether an operation reports that there was no message yet."""
-    for one in trace:
-        if not one.body.absent and one.body.failure is None:
+    for absence in trace:
+        if not absence.body.absent and absence.body.failure is None:
             yield NotClaimed("the map does not say what a topic without a message returns: `absent`")
-        elif succeeded(one.exchange, one.body) and one.body.max_age_s is None:
+        elif succeeded(absence.exchange, absence.body) and absence.body.max_age_s is None:
             yield NotTested("the gateway may have a message from before this run, and keeps it as long as it likes")
         else:
-            yield _absence(one)
+            yield _absence(absence)
 
 
 @rule("ros-gateway/stale", on=(publishers_end,))
@@ -45,11 +45,11 @@ def stale(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether an operation reports that its last message is too old."""
     if not trace.absences:
         yield NotClaimed("the map says of no topic how old a message may be: `max_age_s`")
-    for one in trace.absences:
-        if one.first is not None and not succeeded(one.first, one.body):
+    for absence in trace.absences:
+        if absence.first is not None and not succeeded(absence.first, absence.body):
             yield NotTested("there was no message that could become too old")
         else:
-            yield _absence(one)
+            yield _absence(absence)
 
 
 def _absence(one: Absence) -> Case:
@@ -64,11 +64,13 @@ def _absence(one: Absence) -> Case:
 @rule("ros-gateway/own-topic", on=(publishers_end,))
 def own(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether an operation returns the messages of its topic while others have as new ones."""
-    for one in trace.presences:
-        if one.publisher == _ALL:
-            found = f"the message of {one.instead}" if one.instead else _older(one)
+    for presence in trace.presences:
+        if presence.publisher == _ALL:
+            found = f"the message of {presence.instead}" if presence.instead else _older(presence)
             expected = "the message of its own topic, while all topics have one"
-            yield Case(one.shown, one.exchange, expected, observed=found, cause="another" if one.instead else "")
+            yield Case(
+                presence.shown, presence.exchange, expected, observed=found, cause="another" if presence.instead else ""
+            )
 
 
 def _older(one: Presence) -> str:
@@ -78,39 +80,55 @@ def _older(one: Presence) -> str:
 @rule("ros-gateway/recovers", on=(publishers_end,))
 def recovers(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether messages are returned again after their publisher was away."""
-    for one in trace.presences:
-        if one.publisher != _ALL:
-            yield Case(one.shown, one.exchange, f"the message of {one.publisher}", _older(one), one.publisher)
+    for presence in trace.presences:
+        if presence.publisher != _ALL:
+            yield Case(
+                presence.shown,
+                presence.exchange,
+                f"the message of {presence.publisher}",
+                _older(presence),
+                presence.publisher,
+            )
 
 
 @rule("ros-gateway/qualities", on=(publishers_of_each_quality,))
 def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
     """Judge whether publishers of each reliability and durability are heard."""
-    for one in trace:
-        yield Case(one.shown, one.exchange, f"the message of {one.publisher}", _older(one), one.publisher)
+    for presence in trace:
+        yield Case(
+            presence.shown,
+            presence.exchange,
+            f"the message of {presence.publisher}",
+            _older(presence),
+            presence.publisher,
+        )
 
 
 @rule("ros-gateway/lists", on=(graph_lists,))
 def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
     """Judge whether lists have exactly the names on the graph, with their types."""
-    for one in trace:
-        wanted = f"{one.name} ({one.kind})" if one.there else f"no {one.name}"
-        when = "it came to" if one.there else "it left"
-        expected = f"{wanted} within {one.body.timeout_s:g} s after {when} the graph"
-        if "/_" in one.name and not one.there:
-            expected = f"no {one.name}, a hidden name"
+    for listing in trace:
+        wanted = f"{listing.name} ({listing.kind})" if listing.there else f"no {listing.name}"
+        when = "it came to" if listing.there else "it left"
+        expected = f"{wanted} within {listing.body.timeout_s:g} s after {when} the graph"
+        if "/_" in listing.name and not listing.there:
+            expected = f"no {listing.name}, a hidden name"
         yield Case(
-            one.right, one.exchange, expected, one.found or "no such name", cause=f"{one.there} {bool(one.found)}"
+            listing.right,
+            listing.exchange,
+            expected,
+            listing.found or "no such name",
+            cause=f"{listing.there} {bool(listing.found)}",
         )
 
 
 @rule("ros-gateway/subscriptions", on=(many_reads,))
 def subscriptions(trace: tuple[Growth, ...]) -> Iterator[Outcome]:
     """Judge whether reads leave no subscriptions behind."""
-    for one in trace:
-        more = one.after - one.before
-        expected = f"at most {_FEW} more subscriptions after {one.reads} reads"
-        yield Case(more <= _FEW, one.exchange, expected, observed=f"{more} more", cause="more")
+    for growth in trace:
+        more = growth.after - growth.before
+        expected = f"at most {_FEW} more subscriptions after {growth.reads} reads"
+        yield Case(more <= _FEW, growth.exchange, expected, observed=f"{more} more", cause="more")
 
 
 @rule("ros-gateway/subscriptions", on=(topic_bursts,))

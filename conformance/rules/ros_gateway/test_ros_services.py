@@ -24,18 +24,22 @@ _ABSENT: Final = (Server.MISSING, Server.GONE, Server.SILENT)
 @rule("ros-gateway/service-response", on=(service_calls,))
 def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each call returns the server's response."""
-    for one in trace.probes:
-        if one.server not in _RESPONDS or not one.answer:
+    for call in trace.probes:
+        if call.server not in _RESPONDS or not call.answer:
             continue
-        ok = one.succeeded
-        if not ok and one.server is not Server.RESPONDS:
+        ok = call.succeeded
+        if not ok and call.server is not Server.RESPONDS:
             # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
             continue
         found = ""
-        if ok and isinstance(one.attempt, Exchange):
-            found = differing(one.attempt, one.answer, trace.responses[one.operation], one.body, one.body.result, ros)
-        expected = f"2xx with the response of {one.body.service}, {one.server}"
-        yield Case(ok and not found, one.attempt, expected, observed=found, cause=f"{one.server} {found.split(' ')[0]}")
+        if ok and isinstance(call.attempt, Exchange):
+            found = differing(
+                call.attempt, call.answer, trace.responses[call.operation], call.body, call.body.result, ros
+            )
+        expected = f"2xx with the response of {call.body.service}, {call.server}"
+        yield Case(
+            ok and not found, call.attempt, expected, observed=found, cause=f"{call.server} {found.split(' ')[0]}"
+        )
     for crowd in trace.crowds:
         yield from _own(crowd, trace.responses[crowd.operation], ros)
 
@@ -43,13 +47,15 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
 def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each of many clients gets the response to its call; of equal calls, each gets another one."""
     body, left = crowd.body, defaultdict[str, list[str]](list)
-    for one in crowd.heard:
-        if one.what == "response":
-            left[_key(one.content["request"], body)].append(json.dumps(one.content["response"]))
+    for message in crowd.heard:
+        if message.what == "response":
+            left[_key(message.content["request"], body)].append(json.dumps(message.content["response"]))
     for request, attempt in zip(crowd.requests, crowd.attempts, strict=True):
         if isinstance(attempt, Exchange) and succeeded(attempt, body):
             own = left[_key(json.loads(request), body)]
-            fits = next((one for one in own if not differing(attempt, one, definition, body, body.result, ros)), None)
+            fits = next(
+                (text for text in own if not differing(attempt, text, definition, body, body.result, ros)), None
+            )
             expected = f"the response of {body.service} to this call, one of {len(crowd.requests)} at once"
             yield Case(fits is not None, attempt, expected, observed="another one", cause="another")
             if fits is not None:
@@ -63,14 +69,14 @@ def _key(request: dict[str, Any], body: Body) -> str:
 @rule("ros-gateway/service-once", on=(service_calls,))
 def once(trace: Services) -> Iterator[Outcome]:
     """Judge whether a successful call reached the server unchanged, and exactly once."""
-    for one in trace.probes:
-        if one.server not in _RESPONDS or not one.answer or not one.succeeded:
+    for call in trace.probes:
+        if call.server not in _RESPONDS or not call.answer or not call.succeeded:
             continue
-        requests = [heard for heard in one.heard if heard.what == "request"]
-        expected, cause = f"one call of {one.body.service} for one accepted request", "doubled" if requests else "lost"
-        yield Case(len(requests) == 1, one.attempt, expected, f"{len(requests)} calls", cause)
+        requests = [heard for heard in call.heard if heard.what == "request"]
+        expected, cause = f"one call of {call.body.service} for one accepted request", "doubled" if requests else "lost"
+        yield Case(len(requests) == 1, call.attempt, expected, f"{len(requests)} calls", cause)
         if requests:
-            yield from _as_sent(one, requests[0])
+            yield from _as_sent(call, requests[0])
     for crowd in trace.crowds:
         yield from _reached(crowd)
 
@@ -80,7 +86,7 @@ def _reached(crowd: Crowd) -> Iterator[Outcome]:
     body = crowd.body
     keys = [_key(json.loads(request), body) for request in crowd.requests]
     sent = Counter(keys)
-    heard = Counter(_key(one.content, body) for one in crowd.heard if one.what == "request")
+    heard = Counter(_key(message.content, body) for message in crowd.heard if message.what == "request")
     done = Counter(key for key, attempt in zip(keys, crowd.attempts, strict=True) if succeeded(attempt, body))
     for key, attempt in zip(keys, crowd.attempts, strict=True):
         calls = f"{done[key]} to {sent[key]}" if done[key] < sent[key] else f"{sent[key]}"
@@ -98,22 +104,22 @@ def _as_sent(one: Called, request: Heard) -> Iterator[Outcome]:
 @rule("ros-gateway/service-failure", on=(service_calls,))
 def failures(trace: Services) -> Iterator[Outcome]:
     """Judge whether a call without a response is reported as a failure in time, by a declared status."""
-    for one in trace.probes:
-        if one.server not in _ABSENT or (one.server is Server.SILENT and not one.heard):
+    for call in trace.probes:
+        if call.server not in _ABSENT or (call.server is Server.SILENT and not call.heard):
             continue
-        body = one.body
-        declared = body.too_late if one.server is Server.SILENT else (*body.unavailable, *body.too_late)
-        if one.server is not Server.SILENT and not body.unavailable:
+        body = call.body
+        declared = body.too_late if call.server is Server.SILENT else (*body.unavailable, *body.too_late)
+        if call.server is not Server.SILENT and not body.unavailable:
             declared = ()
-        expected = f"{statuses(declared)} within {body.within_s:g} s for {body.service}, {one.server}"
-        if one.is_open and body.timeout_s is None:
+        expected = f"{statuses(declared)} within {body.within_s:g} s for {body.service}, {call.server}"
+        if call.is_open and body.timeout_s is None:
             yield NotClaimed(f"the map does not say how long a call of {body.service} may take: `timeout_s`")
             continue
-        if one.is_open or not isinstance(one.attempt, Exchange):
-            yield Case(holds=False, exchange=one.attempt, expected=expected, cause=f"{one.server} silent")
+        if call.is_open or not isinstance(call.attempt, Exchange):
+            yield Case(holds=False, exchange=call.attempt, expected=expected, cause=f"{call.server} silent")
             continue
-        holds, status = fails_as(one.attempt, body, declared), one.attempt.response.status
-        yield Case(holds, one.attempt, expected, cause=f"{one.server} {status}")
+        holds, status = fails_as(call.attempt, body, declared), call.attempt.response.status
+        yield Case(holds, call.attempt, expected, cause=f"{call.server} {status}")
 
 
 @rule("ros-gateway/others-served", on=(service_calls,))
@@ -126,7 +132,7 @@ def others(trace: Services) -> Iterator[Outcome]:
         if one.server is Server.SILENT and (one.heard or is_dead):
             rounds.setdefault(one.operation, []).append(one)
     for calls in rounds.values():
-        held = [next((beside for beside in one.beside if is_held(one, beside)), None) for one in calls]
+        held = [next((beside for beside in call.beside if is_held(call, beside)), None) for call in calls]
         shown = next((beside for beside in (*held, *calls[0].beside) if beside is not None), None)
         is_held_up = all(beside or not one.heard for beside, one in zip(held, calls, strict=True))
         if shown is None:
@@ -144,6 +150,6 @@ def others(trace: Services) -> Iterator[Outcome]:
 @rule("ros-gateway/recovers", on=(service_calls,))
 def recovers(trace: Services) -> Iterator[Outcome]:
     """Judge whether a service that was gone is called again, and whether the gateway survives a silent one."""
-    for one in trace.probes:
-        if one.server in {Server.BACK, Server.AFTER}:
-            yield Case(one.succeeded, one.attempt, f"2xx for {one.body.service}, {one.server}", cause=one.server)
+    for call in trace.probes:
+        if call.server in {Server.BACK, Server.AFTER}:
+            yield Case(call.succeeded, call.attempt, f"2xx for {call.body.service}, {call.server}", cause=call.server)

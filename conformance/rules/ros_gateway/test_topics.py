@@ -44,8 +44,8 @@ def reads_of(ros: RosMap, call: str) -> Reads:
 def rows(found: list[Difference]) -> tuple[str, str]:
     """Return ROS's value and the web's value, field by field."""
     more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
-    own = "; ".join(f"{one.at} = {one.ros} ({one.declared})" for one in found[:_ROWS])
-    web = "; ".join(f"{one.at} = {one.web}" for one in found[:_ROWS])
+    own = "; ".join(f"{difference.at} = {difference.ros} ({difference.declared})" for difference in found[:_ROWS])
+    web = "; ".join(f"{difference.at} = {difference.web}" for difference in found[:_ROWS])
     return own + more, web + more
 
 
@@ -69,10 +69,10 @@ def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
 def _with_older(trace: Topics) -> Iterator[tuple[Shown, list[Shown]]]:
     """Yield each message with those that the same operation showed before it, and that are not equal to it."""
     before: dict[str, list[Shown]] = {}
-    for one in trace.probes:
-        older = before.setdefault(one.operation, [])
-        yield one, [each for each in reversed(older) if each.value != one.value]
-        older.append(one)
+    for answer in trace.probes:
+        older = before.setdefault(answer.operation, [])
+        yield answer, [each for each in reversed(older) if each.value != answer.value]
+        older.append(answer)
 
 
 def _differences(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> list[Difference]:
@@ -130,27 +130,33 @@ def read_newest(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
 def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each published field equals the request's."""
     for burst in trace:
-        for one in burst.sent:
-            if one.is_wrong and one.accepted and burst.heard:
-                came = f"{one.exchange.came}, and the message {burst.heard[0].value[:_SHOWN]}"
-                yield Case(False, one.exchange, f"an error status for {one.what}", came, f"{one.operation} {one.what}")
-            if not one.accepted or not one.value:
+        for message in burst.sent:
+            if message.is_wrong and message.accepted and burst.heard:
+                came = f"{message.exchange.came}, and the message {burst.heard[0].value[:_SHOWN]}"
+                yield Case(
+                    False,
+                    message.exchange,
+                    f"an error status for {message.what}",
+                    came,
+                    f"{message.operation} {message.what}",
+                )
+            if not message.accepted or not message.value:
                 continue
-            wanted = json.loads(one.value)
+            wanted = json.loads(message.value)
             heard = [each.content for each in burst.heard]
             if not heard:
                 continue  # whether one comes, another requirement says
             fits = any(equal(each, wanted) for each in heard)
-            found = [] if fits else list(changed(_mapped(heard[-1], one, ros), _mapped(wanted, one, ros)))
+            found = [] if fits else list(changed(_mapped(heard[-1], message, ros), _mapped(wanted, message, ros)))
             more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
             web = "; ".join(f"{at} = {sent}" for at, _, sent in found[:_ROWS]) + more
             own = "; ".join(f"{at} = {came}" for at, came, _ in found[:_ROWS]) + more
             yield Case(
                 not found,
-                one.exchange,
-                f"{one.what} on {one.topic} as the web sent it" + (f": {web}" if found else ""),
-                observed=f"on {one.topic}: {own}",
-                cause=f"{one.operation} {found[0][0] if found else ''}",
+                message.exchange,
+                f"{message.what} on {message.topic} as the web sent it" + (f": {web}" if found else ""),
+                observed=f"on {message.topic}: {own}",
+                cause=f"{message.operation} {found[0][0] if found else ''}",
             )
 
 
@@ -165,24 +171,24 @@ def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each accepted request is exactly one message. Messages without a request are other publishers'."""
     for number, burst in enumerate(trace):
         same_operation = [one for one in trace if one.operation == burst.operation]
-        sent = [one for each in same_operation for one in each.sent]
+        sent = [message for each in same_operation for message in each.sent]
         after = [each for one in trace[number:] if one.operation == burst.operation for each in one.heard]
-        wanted = {one.value: _mapped(json.loads(one.value), one, ros) for one in sent}
-        strange = [each for each in burst.heard if not any(equal(each.content, one) for one in wanted.values())]
-        for one in burst.sent:
-            twins = sum(other.accepted and wanted[other.value] == wanted[one.value] for other in sent)
-            if not one.accepted or twins > 1:
+        wanted = {message.value: _mapped(json.loads(message.value), message, ros) for message in sent}
+        strange = [each for each in burst.heard if not any(equal(each.content, item) for item in wanted.values())]
+        for message in burst.sent:
+            twins = sum(other.accepted and wanted[other.value] == wanted[message.value] for other in sent)
+            if not message.accepted or twins > 1:
                 continue
-            same = sum(equal(each.content, wanted[one.value]) for each in after)
-            expected = f"one message on {one.topic} for an accepted request ({burst.how})"
-            if same == 1 or (same > 1 and _is_blank(wanted[one.value])):
-                yield Case(True, one.exchange, expected)
+            same = sum(equal(each.content, wanted[message.value]) for each in after)
+            expected = f"one message on {message.topic} for an accepted request ({burst.how})"
+            if same == 1 or (same > 1 and _is_blank(wanted[message.value])):
+                yield Case(True, message.exchange, expected)
             elif same:
-                yield Case(False, one.exchange, expected, f"{same} equal messages", f"{one.operation} several")
+                yield Case(False, message.exchange, expected, f"{same} equal messages", f"{message.operation} several")
             elif not burst.reliable:
-                yield NotTested(f"of {burst.how}, some of {one.topic} may be lost on the way")
+                yield NotTested(f"of {burst.how}, some of {message.topic} may be lost on the way")
             elif not strange:  # else it came, and was changed
-                yield Case(False, one.exchange, expected, f"none on {one.topic}", f"{one.operation} none")
+                yield Case(False, message.exchange, expected, f"none on {message.topic}", f"{message.operation} none")
 
 
 def _is_blank(value: object) -> bool:
@@ -214,12 +220,12 @@ def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
 def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether a refused request publishes nothing."""
     for burst in trace:
-        for one in burst.sent:
-            if one.accepted:
+        for message in burst.sent:
+            if message.accepted:
                 continue
             heard = [each.content for each in burst.heard]
-            if one.value:
-                heard = [each for each in heard if equal(each, _mapped(json.loads(one.value), one, ros))]
-            expected = f"no message on {one.topic}, as the request was refused ({one.what})"
+            if message.value:
+                heard = [each for each in heard if equal(each, _mapped(json.loads(message.value), message, ros))]
+            expected = f"no message on {message.topic}, as the request was refused ({message.what})"
             shown = json.dumps(heard[0])[:_SHOWN] if heard else ""
-            yield Case(not heard, one.exchange, expected, f"the message {shown}", cause=one.operation)
+            yield Case(not heard, message.exchange, expected, f"the message {shown}", cause=message.operation)

@@ -37,47 +37,51 @@ def _differences(one: Watched, look: Look, value: dict[str, Any], ros: RosMap) -
 @rule("ros-gateway/read-exact", on=(topic_watches,))
 def watched_exact(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each message that is returned is one that was published."""
-    for one in trace:
-        places = _places(one, ros)
+    for watch in trace:
+        places = _places(watch, ros)
         missed = sum(not found for _, found in places)
-        if not one.reliable and missed <= _MISSED * len(places):
+        if not watch.reliable and missed <= _MISSED * len(places):
             if missed:
-                yield Note(f"{missed} of {len(places)} messages of {one.topic}, which has best effort, were not heard.")
+                yield Note(
+                    f"{missed} of {len(places)} messages of {watch.topic}, which has best effort, were not heard."
+                )
             places = [(look, found) for look, found in places if found]
         for look, found in places:
             if found:
-                yield Case(True, look.exchange, f"a message that was published on {one.topic}")
+                yield Case(True, look.exchange, f"a message that was published on {watch.topic}")
                 continue
-            near = [each for each in one.heard if each.at < look.sent + SLACK_S] or list(one.heard)
-            every = [_differences(one, look, json.loads(each.value), ros) for each in near]
+            near = [each for each in watch.heard if each.at < look.sent + SLACK_S] or list(watch.heard)
+            every = [_differences(watch, look, json.loads(each.value), ros) for each in near]
             own, web = rows(min(every, key=len))
-            expected = f"a message that was published on {one.topic}; the most similar one has {own}"
-            yield Case(False, look.exchange, expected, web, one.operation)
+            expected = f"a message that was published on {watch.topic}; the most similar one has {own}"
+            yield Case(False, look.exchange, expected, web, watch.operation)
 
 
 @rule("ros-gateway/read-fresh", on=(topic_watches,))
 def watched_fresh(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether a message is returned no longer than declared after the next one arrived."""
-    for one in trace:
-        reads = reads_of(ros, one.operation)
+    for watch in trace:
+        reads = reads_of(ros, watch.operation)
         within_s = (reads.max_age_s or reads.within_s) + SLACK_S
-        for look, found in _places(one, ros):
+        for look, found in _places(watch, ros):
             if not found:
                 continue
-            next_at = one.heard[found[-1] + 1].at if found[-1] + 1 < len(one.heard) else look.sent
-            expected = f"a message on {one.topic} that was the last one {within_s:g} s before, or a newer one"
+            next_at = watch.heard[found[-1] + 1].at if found[-1] + 1 < len(watch.heard) else look.sent
+            expected = f"a message on {watch.topic} that was the last one {within_s:g} s before, or a newer one"
             late_s = look.sent - next_at
-            yield Case(late_s <= within_s, look.exchange, expected, f"one {late_s:.1f} s after the next", one.operation)
+            yield Case(
+                late_s <= within_s, look.exchange, expected, f"one {late_s:.1f} s after the next", watch.operation
+            )
 
 
 @rule("ros-gateway/read-newest", on=(topic_watches,))
 def watched_newest(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether no message is returned after a newer one."""
-    for one in trace:
+    for watch in trace:
         last = -1
-        for look, found in _places(one, ros):
+        for look, found in _places(watch, ros):
             later = [index for index in found if index >= last]
             if found:
-                expected = f"a message on {one.topic} that is no older than the one before"
-                yield Case(bool(later), look.exchange, expected, "an older one", one.operation)
+                expected = f"a message on {watch.topic} that is no older than the one before"
+                yield Case(bool(later), look.exchange, expected, "an older one", watch.operation)
             last = later[0] if later else last

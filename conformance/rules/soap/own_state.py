@@ -53,7 +53,7 @@ def unexplained(trace: Iterable[SoapProbe], found: Wsdl | None) -> list[SoapProb
             ids = {text for name, text in values if REFERS.search(name)}
             others = range(0 if last is None else last + 1, index)
             is_kept = not any(
-                good[one] and names[one] in _ENDS and ids & {text for _, text in sent[one][1]} for one in others
+                good[other] and names[other] in _ENDS and ids & {text for _, text in sent[other][1]} for other in others
             )
         kept += [probe] if is_kept else []
     return kept
@@ -82,20 +82,25 @@ def _declared(probes: list[SoapProbe], found: Wsdl | None) -> dict[str, frozense
     by_label = {label_of(port, one): one.faults for port, one in each(found.ports)} if found is not None else {}
     general = frozenset.intersection(*by_label.values()) if by_label else frozenset()
     refusing = frozenset(
-        tag for one in probes if one.kind is Kind.INVALID and one.fault is not None for tag in _inside(one.fault)
+        tag
+        for probe in probes
+        if probe.kind is Kind.INVALID and probe.fault is not None
+        for tag in _inside(probe.fault)
     )
     return {label: faults - (general & refusing) for label, faults in by_label.items()}
 
 
 def entries(fault: etree._Element) -> list[etree._Element]:
     """Return the elements in the detail of a fault."""
-    return [one for part in elements(fault) if local(str(part.tag)).lower() == "detail" for one in elements(part)]
+    return [
+        element for part in elements(fault) if local(str(part.tag)).lower() == "detail" for element in elements(part)
+    ]
 
 
 def _inside(fault: etree._Element) -> frozenset[str]:
-    return frozenset(str(one.tag) for one in entries(fault))
+    return frozenset(str(element.tag) for element in entries(fault))
 
 
 def _is_repeatable(probes: list[SoapProbe], label: str) -> bool:
-    usual = [one for one in probes if one.operation == label and one.kind is Kind.USUAL]
-    return len(usual) >= _REPEATED and all(one.succeeded for one in usual)
+    usual = [probe for probe in probes if probe.operation == label and probe.kind is Kind.USUAL]
+    return len(usual) >= _REPEATED and all(probe.succeeded for probe in usual)

@@ -164,17 +164,17 @@ def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
         if found is None:
             return None
         wrong = _wrong_fault_12(found) if probe.envelope == ENVELOPE_12 else _wrong_fault_11(found)
-        known = [one for one in entries(found) if types and types.shape(str(one.tag)) is not None]
+        known = [element for element in entries(found) if types and types.shape(str(element.tag)) is not None]
         if known and _code_of(found) == (ENVELOPE, "MustUnderstand"):
             return f"{known[0].tag} in the detail, which is for errors of the Body"
-        return wrong or next(filter(None, (types.invalid(one) for one in known if types)), "")
+        return wrong or next(filter(None, (types.invalid(element) for element in known if types)), "")
 
     return _told(trace, "a well-made fault", wrong)
 
 
 def _wrong_fault_11(found: etree._Element) -> str:
     """Return what is wrong with a fault of SOAP 1.1 (4.4; WS-I BP R1000, R1001)."""
-    by_name = {str(one.tag): one for one in elements(found)}
+    by_name = {str(element.tag): element for element in elements(found)}
     for name in ("faultcode", "faultstring"):
         if name not in by_name:
             return f"no {name} without a namespace"
@@ -196,14 +196,20 @@ def _undeclared(code: etree._Element) -> str:
 
 def _code_of(found: etree._Element) -> tuple[str, str]:
     """Return namespace and name of a fault's code."""
-    code = next((one for one in found.iter(etree.Element) if local(one.tag) in {"faultcode", "Value"}), found)
+    code = next(
+        (element for element in found.iter(etree.Element) if local(element.tag) in {"faultcode", "Value"}), found
+    )
     prefix, _, name = text_of(code).strip().rpartition(":")
     return code.nsmap.get(prefix or None) or "", name
 
 
 def _wrong_fault_12(found: etree._Element) -> str:
     """Return what is wrong with a fault of SOAP 1.2 (Part 1, 5.4)."""
-    by_name = {local(str(one.tag)): one for one in elements(found) if str(one.tag).startswith(f"{{{ENVELOPE_12}}}")}
+    by_name = {
+        local(str(element.tag)): element
+        for element in elements(found)
+        if str(element.tag).startswith(f"{{{ENVELOPE_12}}}")
+    }
     if "Code" not in by_name or "Reason" not in by_name:
         return "no Code and Reason of SOAP 1.2"
     value = next(iter(elements(by_name["Code"])), None)
@@ -212,10 +218,10 @@ def _wrong_fault_12(found: etree._Element) -> str:
         return f"the code {text_of(value).strip() if value is not None else ''!r}, which SOAP 1.2 does not have"
     if wrong := next(filter(None, map(_undeclared, found.iter(clark(ENVELOPE_12, "Value")))), ""):
         return wrong
-    texts = [one for one in elements(by_name["Reason"]) if local(str(one.tag)) == "Text"]
+    texts = [element for element in elements(by_name["Reason"]) if local(str(element.tag)) == "Text"]
     if not texts or not text_of(texts[0]).strip():
         return "a Reason without Text"
-    return "" if all(one.get(_LANG) for one in texts) else "a Text of Reason without xml:lang"
+    return "" if all(element.get(_LANG) for element in texts) else "a Text of Reason without xml:lang"
 
 
 @rule("soap/fault-status", on=_ON)
@@ -236,11 +242,13 @@ def fault_status(trace: Trace) -> Iterator[Outcome]:
 def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a message that the WSDL allows is accepted; a device need not have all that a standard's has."""
     found = services_of(run.contract)
-    lacking = {one for one in trace if found is not None and found.foreign and _OPTIONAL.search(_came(one))}
-    asked = [one for one in unexplained(trace, found) if one.kind in _ASKED and one.exchange and one not in lacking]
-    yield from _told(asked, "success", lambda one: "" if one.succeeded else _came(one))
-    accepted = {one.operation for one in trace if one.kind is Kind.USUAL}
-    for label in dict.fromkeys(one.operation for one in trace if one.kind in _VALID):
+    lacking = {probe for probe in trace if found is not None and found.foreign and _OPTIONAL.search(_came(probe))}
+    asked = [
+        probe for probe in unexplained(trace, found) if probe.kind in _ASKED and probe.exchange and probe not in lacking
+    ]
+    yield from _told(asked, "success", lambda probe: "" if probe.succeeded else _came(probe))
+    accepted = {probe.operation for probe in trace if probe.kind is Kind.USUAL}
+    for label in dict.fromkeys(probe.operation for probe in trace if probe.kind in _VALID):
         if label not in accepted:
             name = label.rpartition("/")[2]
             yield Note(f"{name} refused each message: the suite does not know its values. Name some in [values].")

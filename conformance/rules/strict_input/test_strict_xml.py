@@ -42,7 +42,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
                 api, partial(wrong.send, api), _ID, item.what, field=named[0], shown=named[1], json=False
             ):
                 api.device.halt(api)
-        for item in [one for one in made if one.kind == "lexical"][:1]:
+        for item in [mutation for mutation in made if mutation.kind == "lexical"][:1]:
             # The checkers judge the format of the refusal.
             call.carrying(item.made).send(api, ("Accept", XML))
     api.device.halt(api)

@@ -112,8 +112,8 @@ def _quiet(
     where, tried, readings = mapped.where(), list[Tried](), list[Reading]()
     home = mapped.home if mapped.motion.goto else {}
     with partial_trace(lambda: Quiet(where, tuple(tried), tuple(readings), home=home)):
-        for one in itertools.chain.from_iterable(each() for each in several):
-            tried.append(one)
+        for attempt in itertools.chain.from_iterable(each() for each in several):
+            tried.append(attempt)
             seen = _glance(mapped)
             readings += seen
             if fastest(seen, mapped.motion, rested=True):
@@ -144,7 +144,7 @@ def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
     def rests(here: Mapping[str, float]) -> bool:
         return mapped.is_near(here, quiet.where) or bool(quiet.home and mapped.is_near(here, quiet.home))
 
-    elsewhere = any(one.values and not rests(one.values) for one in quiet.readings)
+    elsewhere = any(reading.values and not rests(reading.values) for reading in quiet.readings)
     return elsewhere or bool(fastest(quiet.readings, mapped.motion, rested=True) or quiet.beside)
 
 

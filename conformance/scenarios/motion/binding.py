@@ -128,7 +128,9 @@ def _declared_type(wanted: str, declared: Operation | None) -> str:
 
 def _with_whole_numbers(path: str, declared: Operation) -> str:
     """Return a path with whole numbers where the description has integers."""
-    whole = {f"{{{one.name}}}" for one in declared.parameter("path") if kinds_of(one.schema) == {"integer"}}
+    whole = {
+        f"{{{parameter.name}}}" for parameter in declared.parameter("path") if kinds_of(parameter.schema) == {"integer"}
+    }
     parts, names = path.split("/"), declared.template.split("/")
     if not whole or len(parts) != len(names):
         return path
@@ -145,7 +147,7 @@ def _whole(value: Any, schema: Schema) -> Any:
     if not isinstance(value, dict):
         return value
     members: dict[str, Schema] = {}
-    for part in (schema, *(one for key in ("allOf", "anyOf", "oneOf") for one in schema.get(key, ()))):
+    for part in (schema, *(item for key in ("allOf", "anyOf", "oneOf") for item in schema.get(key, ()))):
         members = {**part.get("properties", {}), **members} if isinstance(part, dict) else members
     return {
         name: _whole(one, members[name]) if isinstance(members.get(name), dict) else one for name, one in value.items()
@@ -194,10 +196,10 @@ class SoapBinding:
     def content(self, octets: bytes) -> Any:
         """Return the content of the Body's first element, without namespaces in its names."""
         try:
-            parts = [one for one in elements(parse(octets)) if local(str(one.tag)) == "Body"]
+            parts = [element for element in elements(parse(octets)) if local(str(element.tag)) == "Body"]
         except NotXmlError:
             return None
-        return next((value_of(one) for part in parts for one in elements(part)), None)
+        return next((value_of(element) for part in parts for element in elements(part)), None)
 
     def forbids(self, call: str, body: Any) -> bool:
         """Return whether the schema forbids a message."""

@@ -36,7 +36,7 @@ def with_room(
         NotPossibleError: there is no room, or the device does not get to where it is.
         NoAnswerError: there is no response.
     """
-    for name in {name for one in choices for name, speed in one.items() if speed} & mapped.room.unknown:
+    for name in {name for choice in choices for name, speed in choice.items() if speed} & mapped.room.unknown:
         _learn(mapped, name)
     share, begin = mapped.room.plan(choices, lasts_s)
     if not mapped.rests:
@@ -44,7 +44,7 @@ def with_room(
     here = mapped.where()
     from_here = mapped.room.share_from(here, choices, lasts_s)
     if from_here and from_here >= slower * share:
-        return [{name: from_here * speed for name, speed in one.items()} for one in choices]
+        return [{name: from_here * speed for name, speed in choice.items()} for choice in choices]
     away = {name: span for name, span in begin.items() if not span[0] <= here[name] <= span[1]}
     if away and mapped.motion.goto is not None:
         # A drive prolonged by a slow link may have moved another axis beyond its limits, where no move may end.
@@ -59,7 +59,7 @@ def with_room(
         room = mapped.motion.tolerance(axis)
         if not least - room <= here[axis] <= greatest + room:
             raise NotPossibleError(f"the device does not get to where {axis} has room for a drive")
-    return [{name: share * speed for name, speed in one.items()} for one in choices]
+    return [{name: share * speed for name, speed in choice.items()} for choice in choices]
 
 
 def _learn(mapped: MappedDevice, name: str) -> None:

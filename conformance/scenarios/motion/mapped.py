@@ -132,7 +132,7 @@ class MappedDevice:
         self._read_at = sent = self.clock.now()
         exchange, document = self.get(state.read)
         values = positions_at(document, {name: one.at for name, one in state.axes.items() if not one.read}, state.axes)
-        for call in dict.fromkeys(one.read for one in state.axes.values() if one.read):
+        for call in dict.fromkeys(axis.read for axis in state.axes.values() if axis.read):
             own = {name: one.at for name, one in state.axes.items() if one.read == call}
             values |= positions_at(self.get(call)[1], own, state.axes)
         values = values if len(values) == len(state.axes) else {}
@@ -309,8 +309,8 @@ class MappedDevice:
 
     def saw_rest(self, readings: Sequence[Reading]) -> bool:
         """Note and return whether the last ones of some readings show the device at rest."""
-        last = [one for one in readings[-2 * SEVERAL :] if one.values or one.speeds]
-        stays = not self.motion.state.axes or all(self.is_near(one.values, last[0].values) for one in last)
+        last = [reading for reading in readings[-2 * SEVERAL :] if reading.values or reading.speeds]
+        stays = not self.motion.state.axes or all(self.is_near(reading.values, last[0].values) for reading in last)
         self.rests = len(last) == 2 * SEVERAL and stays and not fastest(last, self.motion)
         return self.rests
 
@@ -338,7 +338,7 @@ class MappedDevice:
             NoAnswerError: there is no response.
         """
         seen = [self.read() for _ in range(SEVERAL if self.motion.state.axes else 0)]
-        if not all(one.values for one in seen):
+        if not all(reading.values for reading in seen):
             places = ", ".join(axis.at for axis in self.motion.state.axes.values())
             came = seen[-1].exchange.came
             raise NotPossibleError(f"{self.motion.state.read} got {came}, without numbers at {places}")
@@ -350,7 +350,7 @@ class MappedDevice:
 
         def among(ends: Sequence[Position], readings: list[Reading]) -> list[Position]:
             last = readings[-SEVERAL:] if len(readings) >= SEVERAL else []
-            return [one for one in ends if last and all(self.is_near(reading.values, one) for reading in last)]
+            return [item for item in ends if last and all(self.is_near(reading.values, item) for reading in last)]
 
         while True:
             seen += self.watch(self.due(command), partial(among, targets))
@@ -450,7 +450,7 @@ class MappedDevice:
             before = self.where()
             # Positions show slow motion only over some time; measured velocities show it in several readings.
             seen = self.watch(self.clock.now() + STAYS_S, *(() if self.motion.state.axes else (self.saw_rest,)))
-            stays = self.is_near(self.where(), before) if before else any(one.speeds for one in seen)
+            stays = self.is_near(self.where(), before) if before else any(reading.speeds for reading in seen)
             if stays and not fastest(seen, self.motion):
                 self.rests = True
                 return

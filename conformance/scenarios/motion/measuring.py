@@ -24,14 +24,14 @@ def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float
     """Return a velocity by some readings, in units per second; None if they do not show it."""
     speed = motion.velocity.axes[name] if motion.velocity else None
     if speed is None or not speed.of:
-        speeds = [one.speeds[name] for one in readings if one.speeds]
+        speeds = [reading.speeds[name] for reading in readings if reading.speeds]
         return median(speeds) if len(speeds) >= SEVERAL else None
     # If a response came late, the time of its position is not known.
     late_s = max(LATE * usual_s(readings), _SHARE * (readings[-1].sent - readings[0].sent)) if readings else 0.0
     seen = [
-        ((one.sent + one.received) / 2, one.values[speed.of])
-        for one in readings
-        if one.values and one.received - one.sent <= late_s
+        ((reading.sent + reading.received) / 2, reading.values[speed.of])
+        for reading in readings
+        if reading.values and reading.received - reading.sent <= late_s
     ]
     if len(seen) < 2 * SEVERAL or seen[-1][0] - seen[0][0] < _LAPSE_S:
         return None
@@ -54,12 +54,12 @@ def end_of_travel(
     speed = motion.velocity.axes[name] if motion.velocity else None
     if speed is None or not speed.of or not wanted or motion.state.axes[speed.of].bound:
         return None
-    last = [one for one in readings if one.values and one.sent >= readings[-1].sent - STEADY_S]
+    last = [reading for reading in readings if reading.values and reading.sent >= readings[-1].sent - STEADY_S]
     found, room, way = measured(last, name, motion), motion.tolerance(speed.of), 1 if wanted > 0 else -1
     if found is None or abs(found) > _STANDS * abs(wanted) or last[-1].sent - last[0].sent < STEADY_S / 2:
         return None
     place = middle_of(last[-SEVERAL:], speed.of)
-    farther = any(way * (one.values[speed.of] - place) > room for one in so_far if one.values)
+    farther = any(way * (reading.values[speed.of] - place) > room for reading in so_far if reading.values)
     return None if farther else place
 
 
@@ -67,9 +67,9 @@ def noise_of(readings: Sequence[Reading], name: str, motion: MotionMap, resting:
     """Return how far off a velocity may be for the noise of some readings alone, in units per second."""
     speed = motion.velocity.axes[name] if motion.velocity else None
     if speed is not None and speed.of in resting.axes:
-        places = [(one.sent, one.values[speed.of]) for one in readings if one.values]
+        places = [(reading.sent, reading.values[speed.of]) for reading in readings if reading.values]
         return resting.axes[speed.of].slope_room(places) / speed.scale
-    found = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
+    found = [(reading.sent, reading.speeds[name]) for reading in readings if reading.speeds]
     return resting.speeds[name].room(found) if name in resting.speeds else 0.0
 
 
@@ -80,7 +80,7 @@ def steady_since(
     if not readings:
         return None
     begin = readings[-1].sent - STEADY_S
-    last = [one for one in readings if one.sent >= begin]
+    last = [reading for reading in readings if reading.sent >= begin]
     if len(last) == len(readings):
         return None
     for half in (last[: len(last) // 2], last[len(last) // 2 :]):

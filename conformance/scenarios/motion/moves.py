@@ -116,7 +116,7 @@ class _Way:
 
     def lasts_s(self, name: str) -> float:
         """Return how long the way along an axis may take, by the part that is done, s."""
-        seen = [one for one in self.readings if one.values]
+        seen = [reading for reading in self.readings if reading.values]
         done = abs(seen[-1].values[name] - self.start[name]) if seen else 0.0
         way = abs(self.command.targets[name] - self.start[name])
         return _SURELY * way / done * (seen[-1].received - self.command.sent) if done else math.inf
@@ -251,6 +251,6 @@ def repeated(mapped: MappedDevice) -> Leg:
 def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
     """Send targets in a row, and follow the last one that is accepted."""
     start = mapped.where()
-    commands = [mapped.goto(one) for one in wanted]
-    last = next((one for one in reversed(commands) if one.accepted), commands[-1])
+    commands = [mapped.goto(item) for item in wanted]
+    last = next((command for command in reversed(commands) if command.accepted), commands[-1])
     return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.accepted else (), mapped.due(last))

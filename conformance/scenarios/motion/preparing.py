@@ -89,7 +89,7 @@ class Preparation:
         lease = self._motion.lease
         if not (lease and self.lease and lease.header):
             return made
-        others = tuple(one for one in made.headers if one[0] != lease.header)
+        others = tuple(pair for pair in made.headers if pair[0] != lease.header)
         return Outgoing(made.method, made.target, (*others, (lease.header, self.lease)), made.body)
 
     def end(self) -> None:

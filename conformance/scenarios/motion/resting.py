@@ -20,12 +20,12 @@ _OF_POSITION: Final = 0.2
 def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
     """Return the noise of a device at rest, measured or at least as its map declares."""
     axes = {
-        name: Noise.of([one.values[name] for one in readings if one.values], axis.noise)
+        name: Noise.of([reading.values[name] for reading in readings if reading.values], axis.noise)
         for name, axis in motion.state.axes.items()
     }
     declared = motion.velocity.axes if motion.velocity else {}
     speeds = {
-        name: Noise.of([one.speeds[name] for one in readings if one.speeds], declared[name].noise)
+        name: Noise.of([reading.speeds[name] for reading in readings if reading.speeds], declared[name].noise)
         for name in motion.speeds
     }
     return Resting(axes, speeds)
@@ -41,10 +41,10 @@ def fastest(readings: Sequence[Reading], motion: MotionMap, *, rested: bool = Fa
     for name, axis in declared.items():
         if name in most and axis.rest is not None:
             most[name] = min(most[name], axis.rest + FARTHEST * axis.noise)
-    seen = [one.speeds for one in readings if one.speeds]
+    seen = [reading.speeds for reading in readings if reading.speeds]
     for window in (seen[index : index + SEVERAL] for index in range(len(seen) - SEVERAL + 1)):
         for name in window[0]:
-            speed = median(one[name] for one in window)
+            speed = median(item[name] for item in window)
             if abs(speed) > most[name]:
                 return f"{name} at {speed:.4g} per second"
     return ""
@@ -55,12 +55,12 @@ def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -
     declared = motion.velocity.axes if motion.velocity else {}
     for name, noise in resting.speeds.items():
         most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)
-        seen = [(one.sent, one.speeds[name]) for one in readings if one.speeds]
+        seen = [(reading.sent, reading.speeds[name]) for reading in readings if reading.speeds]
         if speed := goes_on(seen, _middle, _beside(most, noise.room)):
             return f"{name} at {speed:.3g} per second, on and on"
     for name, noise in resting.axes.items():
         most = motion.state.axes[name].rest or _OF_POSITION * motion.tolerance(name)
-        seen = [((one.sent + one.received) / 2, one.values[name]) for one in readings if one.values]
+        seen = [((reading.sent + reading.received) / 2, reading.values[name]) for reading in readings if reading.values]
         if speed := goes_on(seen, slope, _beside(most, noise.slope_room)):
             return f"{name} by {speed:.3g} per second, on and on"
     return ""
@@ -68,7 +68,7 @@ def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -
 
 def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
     """Return the same of the last readings, where they last long enough to tell."""
-    last = [one for one in readings if one.sent >= readings[-1].sent - 1.5 * CREEPS_S]
+    last = [reading for reading in readings if reading.sent >= readings[-1].sent - 1.5 * CREEPS_S]
     return creeping(last, motion, resting) if last and last[-1].sent - last[0].sent >= CREEPS_S else ""
 
 

@@ -83,7 +83,7 @@ class Room:
                 # The start of a drive is reached within the tolerance only.
                 free = axis.limits[1] - axis.limits[0] - 2 * self._motion.tolerance(name)
                 share = min(share, max(0.0, free) / (down + up))
-        for name, speed in ((name, speed) for one in choices for name, speed in one.items() if speed):
+        for name, speed in ((name, speed) for choice in choices for name, speed in choice.items() if speed):
             if share < 1 and share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name):
                 raise NotPossibleError(
                     f"the limits of {', '.join(ways)} leave no room to drive {name} for {lasts_s:.1f} s: the slowest "
@@ -109,8 +109,8 @@ class Room:
                 share = min(share, max(0.0, free) / way) if way > 0 else share
         slow = any(
             share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name)
-            for one in choices
-            for name, speed in one.items()
+            for choice in choices
+            for name, speed in choice.items()
             if speed
         )
         return 0.0 if share < 1 and slow else share
@@ -121,7 +121,7 @@ class Room:
         if len(driven) != 1:
             return
         (name, speed), late_s = driven[0], LATE * usual_s(readings)
-        seen = [one for one in readings if one.values and one.received - one.sent <= late_s]
+        seen = [reading for reading in readings if reading.values and reading.received - reading.sent <= late_s]
         for axis in self._axes:
             for first, last in itertools.combinations(seen, 2):
                 lapse_s = (last.sent + last.received - first.sent - first.received) / 2
@@ -148,7 +148,7 @@ class Room:
     def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
         """Learn from readings at a steady velocity which way it takes the device until the next command."""
         driven = {name: speed for name, speed in speeds.items() if speed}
-        seen = [one for one in readings if one.values]
+        seen = [reading for reading in readings if reading.values]
         lapse_s = seen[-1].sent - seen[0].sent if seen else 0.0
         if driven.keys() != self._driven or len(driven) != 1 or lapse_s < _APART_S:
             return
@@ -161,7 +161,7 @@ class Room:
 
     def is_over(self, choices: Sequence[Speeds], readings: Sequence[Reading], rests_s: float) -> bool:
         """Return whether a drive has to end, as the device would pass a limit if it rested ``rests_s`` later."""
-        seen = [one for one in readings if one.values][-SEVERAL:]
+        seen = [reading for reading in readings if reading.values][-SEVERAL:]
         if len(seen) < SEVERAL:
             return False
         for name, axis in self._axes.items():
@@ -193,9 +193,9 @@ class Room:
         ends = [
             sum(
                 edge([speed * rate * lasts_s for rate in self._rates_of(name, turned=turned).get(axis, (0.0,))])
-                for name, speed in one.items()
+                for name, speed in choice.items()
             )
-            for one in choices
+            for choice in choices
             for edge in (min, max)
         ]
         return -min(0.0, *ends), max(0.0, *ends)

@@ -29,9 +29,9 @@ def _at_once(mapped: MappedDevice, given: Goto | Velocity, several: list[Positio
     Raises:
         NotPossibleError: none was answered.
     """
-    made = [mapped.request_of(given, one) for one in several]
+    made = [mapped.request_of(given, item) for item in several]
     sent = mapped.clock.now()
-    attempts = send_together([[(mapped.api.client, one) for one in made]])[0]
+    attempts = send_together([[(mapped.api.client, request) for request in made]])[0]
     answered = mapped.clock.now()
     pairs = zip(several, attempts, strict=True)
     found = [Command(sent, answered, one, attempt) for one, attempt in pairs if isinstance(attempt, Exchange)]
@@ -54,11 +54,11 @@ def _of_clients(mapped: MappedDevice) -> Leg:
     shares = [client / (_CLIENTS - 1) for client in range(_CLIENTS)]
     several = [{name: axis.limits[0] * (1 - share) + axis.limits[1] * share for name, axis in axes} for share in shares]
     # A target at the device's own place would be reached in any case.
-    wanted = [one for one in several if not mapped.is_near(start, one)]
+    wanted = [item for item in several if not mapped.is_near(start, item)]
     commands = _at_once(mapped, mapped.moves, wanted)
-    for one in commands:
-        if one.accepted:
-            mapped.note(one.exchange)
+    for command in commands:
+        if command.accepted:
+            mapped.note(command.exchange)
     seen = mapped.follow(commands[-1], wanted)
     return Leg("targets of several clients", start, tuple(commands), tuple(seen), mapped.due(commands[-1]))
 
@@ -87,7 +87,11 @@ def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
     commands = _at_once(mapped, mapped.drives, several)
 
     def reached(so_far: list[Reading]) -> float | None:
-        found = (steady_since(so_far, one.targets, mapped.motion, mapped.resting) for one in commands if one.accepted)
+        found = (
+            steady_since(so_far, command.targets, mapped.motion, mapped.resting)
+            for command in commands
+            if command.accepted
+        )
         return next((since for since in found if since is not None), None)
 
     def is_over(so_far: list[Reading]) -> bool:

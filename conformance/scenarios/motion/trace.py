@@ -101,7 +101,7 @@ class Leg:
 
     def after(self, moment: float) -> tuple[Reading, ...]:
         """Return the usable readings that were requested after a moment."""
-        return tuple(one for one in self.readings if one.sent >= moment and one.values)
+        return tuple(reading for reading in self.readings if reading.sent >= moment and reading.values)
 
     def was_under_way(self, axis: str, tolerance: float, until: float | None = None) -> bool:
         """Return whether the second command met the device between start and target of the first, along an axis.
@@ -110,7 +110,7 @@ class Leg:
         latest, if not when it was answered.
         """
         goal, order = self.commands[:2]
-        before = [one for one in self.readings if one.values and one.received <= order.sent]
+        before = [reading for reading in self.readings if reading.values and reading.received <= order.sent]
         if not before:
             return False
         last = before[-1]
@@ -169,7 +169,10 @@ class Drive:
 
         Over a slow link it may rest in between, rightly.
         """
-        met = [*(one.answered for one in self.commands[1:]), *(one.received for one in self.under_way[-1:])]
+        met = [
+            *(command.answered for command in self.commands[1:]),
+            *(reading.received for reading in self.under_way[-1:]),
+        ]
         return hold_s is None or all(later - one.sent <= hold_s for one, later in zip(self.commands, met, strict=False))
 
 
@@ -262,4 +265,4 @@ def is_soap(exchange: Exchange) -> bool:
 
 def middle_of(readings: Sequence[Reading], axis: str) -> float:
     """Return where an axis is by the median of some readings."""
-    return median(one.values[axis] for one in readings)
+    return median(reading.values[axis] for reading in readings)

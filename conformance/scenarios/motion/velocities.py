@@ -98,7 +98,7 @@ def _by_each_way(mapped: MappedDevice) -> Iterator[tuple[Position, _By]]:
     """Yield velocities for each further way to command one: of each axis alone, and of two at once."""
     for way in mapped.drives.ways:
         several = [{name: _SLOW * limit} for name, limit in _ends(mapped) if name in way.axes]
-        several += [one for one in _at_once(mapped) if one.keys() & way.axes]
+        several += [item for item in _at_once(mapped) if item.keys() & way.axes]
         yield from ((speeds, _by(way, speeds)) for speeds in several)
 
 
@@ -453,7 +453,9 @@ def _kept_up(
     while mapped.clock.now() < until and commands[-1].accepted:
         # Before the settle time is over, a device that reverses still drives at the earlier velocity.
         settled = before is None or mapped.clock.now() >= begun + settle_s
-        mapped.room.note(made, [one for one in readings[-_NOTED:] if before is None or one.sent >= begun + settle_s])
+        mapped.room.note(
+            made, [reading for reading in readings[-_NOTED:] if before is None or reading.sent >= begun + settle_s]
+        )
         choices, seen = (
             ([made], readings) if before is None else ([made, before.wanted], [*before.under_way, *readings])
         )
@@ -468,7 +470,7 @@ def _kept_up(
         if since is not None and not outlasts_s:
             break
     if since is not None:
-        steady = [one for one in readings if one.sent >= since]
+        steady = [reading for reading in readings if reading.sent >= since]
         mapped.room.note(made, steady)
         mapped.room.note_heading(made, steady)
     elif mapped.room.ends(made, readings):
@@ -500,7 +502,7 @@ def _watched(
 
     def drives_on(readings: list[Reading]) -> bool:
         """Whether readings show that the device drives on, towards a limit."""
-        late = [one for one in readings if one.sent >= due]
+        late = [reading for reading in readings if reading.sent >= due]
         return len(late) > 2 * SEVERAL and mapped.room.is_over([speeds], late, 0.0)
 
     def rested(readings: list[Reading]) -> float | None:
@@ -510,11 +512,11 @@ def _watched(
     since = rested(after)
     # After a slow reading, only readings as much later count: several of them show rest.
     for _ in range(_MORE if since is None else 0):
-        counted = [one for one in after if one.sent >= rests_at + longest_s([*drive.readings, *after])]
+        counted = [reading for reading in after if reading.sent >= rests_at + longest_s([*drive.readings, *after])]
         if len(counted) >= 2 * SEVERAL or drives_on(after):
             break
         after.append(mapped.read())
-    still = [one for one in after if one.sent >= (rests_at if since is None else since)]
+    still = [reading for reading in after if reading.sent >= (rests_at if since is None else since)]
     if creeping(still, mapped.motion, mapped.resting):
         # The device may still come to rest.
         after += mapped.watch(after[-1].sent + _SLOWS_S, drives_on)
@@ -525,14 +527,14 @@ def _watched(
 
 def _resting_since(mapped: MappedDevice, readings: Sequence[Reading], begin: float) -> float | None:
     """Return since when, not before a time, the last readings show the device at rest, s; None if they do not."""
-    last = [one for one in readings if one.sent >= readings[-1].sent - STAYS_S]
-    seen = [one for one in last if one.values or one.speeds]
+    last = [reading for reading in readings if reading.sent >= readings[-1].sent - STAYS_S]
+    seen = [reading for reading in last if reading.values or reading.speeds]
     if len(last) in {len(readings), 0} or len(seen) < max(len(last), 2 * SEVERAL) or last[0].sent < begin:
         return None
     axes = mapped.motion.state.axes
     stays = all(
-        abs(one.values[name] - last[0].values[name]) <= mapped.motion.tolerance(name) / 2
-        for one in last
+        abs(reading.values[name] - last[0].values[name]) <= mapped.motion.tolerance(name) / 2
+        for reading in last
         for name in axes
     )
     return None if fastest(last, mapped.motion) or not stays else last[0].sent

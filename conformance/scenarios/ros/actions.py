@@ -132,7 +132,9 @@ def action_goals(gateway: Gateway) -> Goals:
 class _Sender:
     def __init__(self, gateway: Gateway, call: str, body: Acts, definitions: dict[str, Definition]) -> None:
         self._gateway, self._call, self._body = gateway, call, body
-        self._makers = {part: gateway.maker(one) for part in _PARTS for one in [definitions[f"{call}#{part}"]]}
+        self._makers = {
+            part: gateway.maker(definition) for part in _PARTS for definition in [definitions[f"{call}#{part}"]]
+        }
 
     def goals(self) -> Iterator[Goal]:
         """Yield a goal of each course."""
@@ -150,7 +152,7 @@ class _Sender:
         for course, step in list(steps.items())[: None if self._body.cancel else 3]:
             for _ in range(TRIES):
                 goals = self._two() if course is Course.FIRST else [self._followed(course, step)]
-                if not any(gave_up(sent, self._body) for one in goals for sent in (one.exchange, one.cancel)):
+                if not any(gave_up(sent, self._body) for goal in goals for sent in (goal.exchange, goal.cancel)):
                     break
             yield from goals
         self._gateway.robot.tell("forget", name=self._body.action)
@@ -188,7 +190,7 @@ class _Sender:
         return self._goal(course, value, exchange, steps[0])
 
     def _goal(self, course: Course, value: dict[str, Any], exchange: Exchange, step: dict[str, Any]) -> Goal:
-        feedback = tuple(json.dumps(one) for one in step.get("feedback", []))
+        feedback = tuple(json.dumps(item) for item in step.get("feedback", []))
         result = json.dumps(step["result"]) if "result" in step else ""
         return Goal(self._call, self._body, course, json.dumps(value), exchange, feedback, result)
 
@@ -251,7 +253,7 @@ class _Sender:
     def _has_ended(self, looks: list[Look]) -> bool:
         """Return whether the last looks all show an end."""
         last = looks[-_AFTERWARDS:]
-        return len(last) == _AFTERWARDS and all(is_end(self._body, one.word) for one in last)
+        return len(last) == _AFTERWARDS and all(is_end(self._body, look.word) for look in last)
 
 
 def is_end(body: Acts, word: str) -> bool:

@@ -82,7 +82,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
     """Read topics on which nothing was published yet."""
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
-    also = {one.publishes for one in gateway.ros.operations.values() if isinstance(one, Publishes)}
+    also = {publishes.publishes for publishes in gateway.ros.operations.values() if isinstance(publishes, Publishes)}
     there = gateway.robot.tell("graph")["topics"]
     found = []
     for call, body in gateway.of(Reads):
@@ -161,14 +161,14 @@ class _Topics:
                     if call not in found or now.instead or not found[call].shown:
                         found[call] = now
             is_over = WALL_CLOCK.now() > until
-            if is_over or (turn >= _ROUNDS and all(one.shown or one.instead for one in found.values())):
+            if is_over or (turn >= _ROUNDS and all(presence.shown or presence.instead for presence in found.values())):
                 break
             WALL_CLOCK.sleep(PACE_S)
         yield from found.values()
 
     def _presence(self, call: str, publisher: str, values: Mapping[str, Any], before: object) -> Presence:
         exchange = self._gateway.read(call, self._reads[call])
-        body, kinds = self._reads[call], {one.topic: one.type for one in self._reads.values()}
+        body, kinds = self._reads[call], {mapping.topic: mapping.type for mapping in self._reads.values()}
         if not succeeded(exchange, body):
             return Presence(publisher, shown=False, exchange=exchange)
         document, definition = document_of(exchange.response.body), self._definitions[call]
@@ -202,7 +202,7 @@ class _Topics:
         first = {call: self._gateway.read(call, body) for call, body in judged.items()}
         end()
         ended = WALL_CLOCK.now()
-        for call, body in sorted(judged.items(), key=lambda one: one[1].max_age_s or 0.0):
+        for call, body in sorted(judged.items(), key=lambda pair: pair[1].max_age_s or 0.0):
             WALL_CLOCK.sleep(max(0.0, ended + (body.max_age_s or 0.0) + _LATE_S - WALL_CLOCK.now()))
             exchange = self._gateway.read(call, body)
             for _ in range(_TRIES):

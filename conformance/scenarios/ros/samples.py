@@ -158,7 +158,7 @@ class Maker:
         if item in INTEGERS:
             least, most = INTEGERS[item]
             beyond = (_EXACT + 1, -_EXACT - 1, most - 1)
-            return (most, least, *(one for one in beyond if least <= one <= most), 0, 1)
+            return (most, least, *(number for number in beyond if least <= number <= most), 0, 1)
         return (True, False)
 
     def _any(self, shape: Shape) -> Any:

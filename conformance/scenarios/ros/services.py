@@ -201,7 +201,7 @@ class _Caller:
             if not silent.is_open or self._body.timeout_s:
                 # Without the usual call, the gateway may rightly wait for the first one.
                 yield self._answered(Server.AFTER, *self._usual())
-            if not any(is_held(silent, one) for one in silent.beside):
+            if not any(is_held(silent, beside) for beside in silent.beside):
                 break
         self._gateway.robot.tell("forget", name=self._body.service)
         yield self._called(Server.GONE, {})
@@ -218,7 +218,7 @@ class _Caller:
         ]
         robot.tell("script", name=body.service, script=[*script, {}])
         robot.heard(body.service)
-        made = [[self._gateway.request(self._call, body, one)] for one in requests]
+        made = [[self._gateway.request(self._call, body, request)] for request in requests]
         attempts = [(self._outcome(one),) for (one,) in crowd(self._gateway.api.client, made, body.within_s + _LATE_S)]
         heard = tuple(robot.heard(body.service, 2 * CROWD, _MORE_S))
         return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
@@ -255,7 +255,7 @@ class _Caller:
     @staticmethod
     def _finite(maker: Maker, most: int) -> Iterator[Sample]:
         """Yield samples without NaN and infinities, which a gateway may refuse."""
-        return (one for one in maker.samples(most, large=False) if one.kind is not Kind.NON_FINITE)
+        return (sample for sample in maker.samples(most, large=False) if sample.kind is not Kind.NON_FINITE)
 
     def _called(self, server: Server, request: dict[str, Any], answer: dict[str, Any] | None = None) -> Called:
         robot, body = self._gateway.robot, self._body
@@ -310,7 +310,7 @@ class _Caller:
 
     def _others(self) -> list[tuple[str, Reads | Lists]]:
         others = [(call, one) for call, one in self._gateway.ros.operations.items() if isinstance(one, Reads | Lists)]
-        return [one for one in others if isinstance(one[1], Lists) or one[1].stream in {"", "rosbridge"}][-_BESIDE:]
+        return [pair for pair in others if isinstance(pair[1], Lists) or pair[1].stream in {"", "rosbridge"}][-_BESIDE:]
 
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()

@@ -79,7 +79,7 @@ def topic_streams(gateway: Gateway, effort: Effort) -> tuple[Streamed, ...]:
                 with gateway.robot.publishing(body.topic):
                     for turn in range(1 if way.throttle_s else _ROUNDS[effort.name]):
                         found += _round(gateway, call, way, turn)
-                        if any(len(one.came) != len(one.sent) for one in found[-2:]):
+                        if any(len(event.came) != len(event.sent) for event in found[-2:]):
                             break
         if not found:
             raise NotDeclaredError("[ros.operations] has no topic with 'stream'")
@@ -112,7 +112,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
             how += f" after it has reconnected {turn} times" if turn else ""
             came = _came(stream, 1 if body.throttle_s else number, body)
             lasted_s = max(published_s, came[-1].at - came[0].at if came else 0.0)
-            shown = tuple(_shown(gateway, stream, one, body, definition, values) for one in came)
+            shown = tuple(_shown(gateway, stream, message, body, definition, values) for message in came)
             opened = streamed(stream, came[-1] if came else Message(began, b""))
             text = tuple(map(json.dumps, values))
             yield Streamed(call, body, how, text, shown, lasted_s, opened, published.reliably)
@@ -124,7 +124,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
                 clock.sleep(_MORE_S)
                 back = streams[place] = gateway.stream(call, body, stream.last_id)
                 came = [*back.heard(_AWAY, _RESUMES_S), *back.heard(_AWAY, _MORE_S)]
-                shown = tuple(_shown(gateway, back, one, body, definition, [*values, *away]) for one in came)
+                shown = tuple(_shown(gateway, back, message, body, definition, [*values, *away]) for message in came)
                 text, how = (*text, *map(json.dumps, away)), f"after {number} messages, with its Last-Event-ID"
                 yield Streamed(call, body, how, text, shown, 0.0, opened, published.reliably, number)
         if isinstance(streams[0], Subscription):
@@ -133,7 +133,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
             streams[0].heard()
             robot.publish(body.topic, body.type, *values)
             came = streams[0].heard(1, _MORE_S)
-            shown = tuple((streamed(streams[0], one), -1) for one in came)
+            shown = tuple((streamed(streams[0], message), -1) for message in came)
             opened = streamed(streams[0], streams[0].last)
             yield Streamed(call, body, "after it was unsubscribed from", (), shown, 0.0, opened, reliable=True)
     finally:

@@ -146,7 +146,7 @@ class _Reader:
                 wrong, earlier = [], earlier + 1
             else:
                 here = content_of(exchange, self.reads)
-                wrong = [*(one for one in wrong if one[1] == here), (sent, here)]
+                wrong = [*(pair for pair in wrong if pair[1] == here), (sent, here)]
                 if len(wrong) >= _SURE and sent - wrong[0][0] > _SURE_S:
                     break
             clock.sleep(PACE_S)
@@ -370,7 +370,7 @@ class _Writer:
     def burst(self, clients: int, each: int, how: str) -> Burst:
         """Return the outcome of messages of clients that send at the same moment, each one after another."""
         samples = [[self.usual() for _ in range(each)] for _ in range(clients)]
-        made = [[(one, json.dumps(self.value(one)), self.request(one)) for one in own] for own in samples]
+        made = [[(sample, json.dumps(self.value(sample)), self.request(sample)) for sample in own] for own in samples]
         requests = [[request for _, _, request in own] for own in made]
         sent = tuple(
             self.sent_as(one.what, value, attempt, client)
@@ -378,7 +378,7 @@ class _Writer:
             for attempt, (one, value, _) in zip(attempts, made[client], strict=True)
             if isinstance(attempt, Exchange)
         )
-        heard = self.hear(sum(one.accepted for one in sent))
+        heard = self.hear(sum(message.accepted for message in sent))
         return Burst(self.call, how, sent, heard, self.reliable)
 
     def malformed(self) -> Iterator[Burst]:
@@ -422,6 +422,6 @@ class _Writer:
         def text(value: Any) -> Any:
             if isinstance(value, dict):
                 return {name: text(one) for name, one in value.items()}
-            return [text(one) for one in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
+            return [text(item) for item in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
 
         return json.dumps(text(json.loads(body))).encode()

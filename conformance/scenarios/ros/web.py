@@ -91,8 +91,10 @@ def document_of(octets: bytes) -> Document:
             root = parse(octets)
         except NotXmlError:
             return Document(None, is_xml=True)
-        bodies = [one for one in elements(root) if local(str(one.tag)) == "Body"]
-        return Document(next((value_of(one) for part in bodies for one in elements(part)), value_of(root)), is_xml=True)
+        bodies = [element for element in elements(root) if local(str(element.tag)) == "Body"]
+        return Document(
+            next((value_of(element) for part in bodies for element in elements(part)), value_of(root)), is_xml=True
+        )
     try:
         return Document(json.loads(octets, parse_float=Decimal))
     except (ValueError, RecursionError):
@@ -121,7 +123,7 @@ def _web(value: Any, shape: Shape, definition: Definition, ros: RosMap) -> Any:
     if shape.is_octets:
         return value["b64"] if ros.bytes == "base64" else list(base64.b64decode(value["b64"]))
     if shape.is_array:
-        return [_web(one, Shape(shape.item), definition, ros) for one in value]
+        return [_web(item, Shape(shape.item), definition, ros) for item in value]
     if shape.is_message:
         fields = definition.fields(shape.item)
         return {name: _web(value[name], one, definition, ros) for name, one in fields if name in value}
@@ -292,7 +294,7 @@ def _shown(value: Any) -> str:
         return "nothing"
     if isinstance(value, dict) and set(value) == {"b64"}:
         value = value["b64"]
-    if isinstance(value, list) and not any(isinstance(one, list | dict) for one in value):
+    if isinstance(value, list) and not any(isinstance(item, list | dict) for item in value):
         text = f"[{', '.join(map(_shown, value[:_SHOWN]))}]"
     else:
         text = str(value) if isinstance(value, Decimal) else repr(value)

@@ -36,7 +36,7 @@ def kinds_in_requests(contract: Contract) -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = defaultdict(frozenset)
     if not contract.is_claimed:
         for operation in operations_of(contract):
-            schemas = [one.schema for one in operation.parameters]
+            schemas = [parameter.schema for parameter in operation.parameters]
             schemas += [body.schema for body in operation.bodies.values()]
             found[operation.label] = frozenset(re.findall(r"'type': '(\w+)'", repr(schemas)))
         return found
@@ -105,10 +105,12 @@ class Recorder:
 
 def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
     """Return the names of the faults that alter none of the messages, or would alter none without their condition."""
-    mutants = [one for one in mutants if one.always is not None]
-    exchanges = {one.exchange.name: one.exchange for one in mutants}
+    mutants = [mutant for mutant in mutants if mutant.always is not None]
+    exchanges = {mutant.exchange.name: mutant.exchange for mutant in mutants}
     by_operation = {name: _around(exchange, messages) for name, exchange in exchanges.items()}
-    return frozenset(one.name for one in mutants if not _alters(_shown(one), by_operation[one.exchange.name]))
+    return frozenset(
+        mutant.name for mutant in mutants if not _alters(_shown(mutant), by_operation[mutant.exchange.name])
+    )
 
 
 def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:

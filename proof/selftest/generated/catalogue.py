@@ -101,7 +101,7 @@ def _classes(place: Place) -> tuple[str, ...]:
 
 
 def _of_exchanges(contract: Contract) -> Iterator[GeneratedMutant]:
-    numeric = {one.exchange.name for one in places(contract) if one.part == "answer" and one.kind in NUMERIC}
+    numeric = {place.exchange.name for place in places(contract) if place.part == "answer" and place.kind in NUMERIC}
     for exchange in exchanges(contract):
         yield from responses.of_statuses(exchange)
         yield from responses.of_headers(exchange)

@@ -275,7 +275,7 @@ def _item(_schema: Schema, value: Any) -> Any:
 
 
 def _usual(name: str) -> FieldOperator:
-    found = next(one for one in OPERATORS if one.name == name and "json" in one.media)
+    found = next(operator for operator in OPERATORS if operator.name == name and "json" in operator.media)
     return FieldOperator(name, found.says, lambda place, _schema: found.make(place))
 
 

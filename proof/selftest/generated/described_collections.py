@@ -157,7 +157,7 @@ def _after(exchange: Exchange, operation: Operation, begin: Callable[[], _Act]) 
             response = forward(request)
             if request.side != "rest" or re.fullmatch(exchange.path, request.path) is None:
                 return response
-            other = next((one for one in reversed(read) if one != request.path), "")
+            other = next((text for text in reversed(read) if text != request.path), "")
             if request.method == "GET" and response.status in _SUCCESS:
                 read.pop(request.path, None)
                 read[request.path] = None

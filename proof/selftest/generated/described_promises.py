@@ -105,7 +105,7 @@ def _of_conditions(operation: Operation) -> Iterator[_Row]:
         yield "match-first", "looks at the first tag of If-Match alone (RFC 9110 13.1.1)", _first_tag
         yield "match-stale", "takes each tag that it ever sent (RFC 9110 13.1.1)", _stale_tag
         yield "applies-412", "performs what it refuses with 412", _knowing(_FAILED)
-    if any(one.name.lower() == "if-none-match" for one in operation.parameter("header")):
+    if any(parameter.name.lower() == "if-none-match" for parameter in operation.parameter("header")):
         yield "none-ignored", "ignores If-None-Match (RFC 9110 13.1.2)", _without("If-None-Match")
 
 
@@ -293,10 +293,10 @@ def _spent_key(request: Request, forward: Forward, past: _Past) -> tuple[Respons
 def _steps(body: bytes, moves: str = "") -> bytes:
     """Return a JSON patch that has another operation in the place of each move; without a name: one without tests."""
     steps = _json_of(body)
-    if not isinstance(steps, list) or not all(isinstance(one, dict) for one in steps):
+    if not isinstance(steps, list) or not all(isinstance(step, dict) for step in steps):
         return body
-    made = [{**one, "op": moves} if moves and one.get("op") == "move" else one for one in steps]
-    made = made if moves else [one for one in made if one.get("op") != "test"]
+    made = [{**step, "op": moves} if moves and step.get("op") == "move" else step for step in steps]
+    made = made if moves else [item for item in made if item.get("op") != "test"]
     return json.dumps(made).encode() if made != steps else body
 
 

@@ -146,7 +146,7 @@ def _judge(
     claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
     attempts = tuple(_attempts(contract, mutant, claimed))
     # A fault that quick misses is seldom found by other single requirements: judge everything at the next effort.
-    waiting = [(efforts[0], one) for one in attempts] + [(effort, attempts[-1]) for effort in efforts[1:]]
+    waiting = [(efforts[0], attempt) for attempt in attempts] + [(effort, attempts[-1]) for effort in efforts[1:]]
     while waiting:
         effort, (classes, requirements) = waiting[0]
         known = control.known(effort)

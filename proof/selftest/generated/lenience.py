@@ -14,8 +14,8 @@ _SUCCESS = range(200, 300)
 def _objects(value: Any, steps: tuple[str, ...]) -> list[dict[str, Any]]:
     found = [value]
     for step in steps:
-        found = [one[step] for one in found if isinstance(one, dict) and step in one]
-    return [one for one in found if isinstance(one, dict)]
+        found = [item[step] for item in found if isinstance(item, dict) and step in item]
+    return [item for item in found if isinstance(item, dict)]
 
 
 def _rewritten(place: Place, edit: Callable[[dict[str, Any], str], bool]) -> Callable[[Tally], Change]:

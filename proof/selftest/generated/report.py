@@ -159,10 +159,10 @@ def tools(
     """
     counted = [one for one in results if one.outcome in _COUNTED]
     rows = [("roaas certify", rate_of(counted), sorted(blamed))]
-    for one in compared:
-        both = [result.mutant.name for result in counted if result.mutant.name in one.tried]
-        by_them = sum(name in one.killed for name in both)
-        rows.append((one.tool, Rate(by_them, len(both) - by_them, 0), list(one.good)))
+    for comparison in compared:
+        both = [result.mutant.name for result in counted if result.mutant.name in comparison.tried]
+        by_them = sum(name in comparison.killed for name in both)
+        rows.append((comparison.tool, Rate(by_them, len(both) - by_them, 0), list(comparison.good)))
     return rows
 
 
@@ -172,11 +172,11 @@ def _cells(rate: Rate) -> str:
 
 def only_theirs(results: Iterable[GeneratedResult], compared: Iterable[Comparison]) -> list[str]:
     """Return the mutants that another tool kills and this suite does not, with the tool's report."""
-    ours = {one.mutant.name for one in results if one.outcome == KILLED}
+    ours = {result.mutant.name for result in results if result.outcome == KILLED}
     return [
-        f"{one.tool} alone: {name}: {', '.join(findings)}"
-        for one in compared
-        for name, findings in one.killed.items()
+        f"{comparison.tool} alone: {name}: {', '.join(findings)}"
+        for comparison in compared
+        for name, findings in comparison.killed.items()
         if name not in ours
     ]
 
@@ -190,7 +190,7 @@ def page(
 ) -> str:
     """Return a Markdown page."""
     results, compared = list(results), list(compared)
-    not_reached = sum(one.outcome == NOT_REACHED for one in results)
+    not_reached = sum(result.outcome == NOT_REACHED for result in results)
     about = (
         f"{len(results)} mutants, of which {not_reached} altered nothing and do not count. A mutant alters a message "
         "only where the altered one breaks a norm or the description, so that what both leave open is never counted. "
@@ -206,20 +206,22 @@ def page(
         said = f"{len(alarms)}: {'; '.join(alarms[:_ALARMS])}" if alarms else "0"
         said += f"; and {len(alarms) - _ALARMS} more" if len(alarms) > _ALARMS else ""
         lines.append(f"| {name} | {_cells(rate)} | {said} |")
-    heads = "".join(f" {one.tool} |" for one in compared), "---|" * len(compared)
+    heads = "".join(f" {comparison.tool} |" for comparison in compared), "---|" * len(compared)
     for key in ("class", "operator"):
         lines += ["", f"| {key} | killed | of | rate | interval |{heads[0]}", f"|---|---|---|---|---|{heads[1]}"]
         for name, rate in rates_by(results, key).items():
-            named = {one.mutant.name for one in results if one.outcome in _COUNTED and group_of(one, key) == name}
-            theirs = "".join(f" {len(named & one.killed.keys())} |" for one in compared)
+            named = {
+                result.mutant.name for result in results if result.outcome in _COUNTED and group_of(result, key) == name
+            }
+            theirs = "".join(f" {len(named & comparison.killed.keys())} |" for comparison in compared)
             lines.append(f"| `{name}` | {_cells(rate)} |{theirs}")
     if compared:
         lines += ["", "Killed by another tool alone:", ""]
-        lines += [f"- {one}" for one in only_theirs(results, compared)] or ["- none"]
+        lines += [f"- {text}" for text in only_theirs(results, compared)] or ["- none"]
     lines += ["", "| not killed | what it does | outcome | how often |", "|---|---|---|---|"]
     lines += [
-        f"| `{one.mutant.name}` | {one.mutant.says} | {one.outcome} | {one.altered} |"
-        for one in results
-        if one.outcome not in {KILLED, NOT_REACHED}
+        f"| `{result.mutant.name}` | {result.mutant.says} | {result.outcome} | {result.altered} |"
+        for result in results
+        if result.outcome not in {KILLED, NOT_REACHED}
     ]
     return "\n".join([*lines, *(f"\n{note}" for note in notes)]) + "\n"

@@ -244,7 +244,9 @@ def _in_xml(place: Place, message: Request | Response, edit: Edit) -> bool:
     if place.medium == "soap":
         parents = [wrapper for body in _children(root, "Body") for wrapper in _children(body, "")]
     for step in place.steps[:-1]:
-        parents = _items(parents) if step == ITEM else [one for parent in parents for one in _children(parent, step)]
+        parents = (
+            _items(parents) if step == ITEM else [element for parent in parents for element in _children(parent, step)]
+        )
     found = [(parent, _children(parent, place.steps[-1])) for parent in parents]
     if place.kind == "array" and place.medium == "xml":
         # A list may be nested in one element of the field's name.

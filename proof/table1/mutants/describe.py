@@ -60,16 +60,19 @@ def _renamed(told: Any, old: str, new: str) -> None:
 
 
 _mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks a parameter.").json(
-    _OPENAPI, field(f"paths.{PLAN}.get.parameters", lambda all_: [one for one in all_ if one.get("name") != "y"])
+    _OPENAPI, field(f"paths.{PLAN}.get.parameters", lambda all_: [item for item in all_ if item.get("name") != "y"])
 )
 _mutant("openapi-other-default", "openapi-operations", "/openapi.json names another default of a parameter.").json(
     _OPENAPI,
-    field(f"paths.{PLAN}.get.parameters", lambda all_: [{**one, "schema": _defaulted(one["schema"])} for one in all_]),
+    field(
+        f"paths.{PLAN}.get.parameters", lambda all_: [{**item, "schema": _defaulted(item["schema"])} for item in all_]
+    ),
 )
 _mutant("openapi-too-strict", "openapi-answers", "/openapi.json forbids values that the robot accepts.").json(
     _OPENAPI,
     field(
-        f"paths.{PLAN}.get.parameters", lambda all_: [{**one, "schema": {**one["schema"], "const": -1}} for one in all_]
+        f"paths.{PLAN}.get.parameters",
+        lambda all_: [{**item, "schema": {**item["schema"], "const": -1}} for item in all_],
     ),
 )
 _mutant("openapi-other-name", "openapi-answers", "/openapi.json requires a field that no response has.").json(
@@ -202,7 +205,7 @@ def _long_sequence(edit: Callable[[Any], object]) -> Make:
     """Return a change that applies ``edit`` to the first sequence of more than two elements in each schema."""
 
     def apply(schema: Any) -> None:
-        for sequence in [one for one in schema.iter(f"{_X}sequence") if len(one) > 2][:1]:
+        for sequence in [item for item in schema.iter(f"{_X}sequence") if len(item) > 2][:1]:
             edit(sequence)
 
     return _typed(apply)

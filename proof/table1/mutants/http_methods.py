@@ -48,7 +48,7 @@ def _allow(edit: Callable[[list[str]], list[str]]) -> Callable[[Response], None]
     def apply(response: Response) -> None:
         allow = response.field("Allow")
         if allow is not None:
-            response.put("Allow", ", ".join(edit([one.strip() for one in allow.split(",")])))
+            response.put("Allow", ", ".join(edit([text.strip() for text in allow.split(",")])))
 
     return apply
 

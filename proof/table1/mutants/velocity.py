@@ -110,7 +110,7 @@ def _good(twist: Any) -> bool:
     try:
         numbers = [twist[part][axis] for part in ("linear", "angular") for axis in "xyz"]
         slow = abs(twist["linear"]["x"]) < 0.5 and abs(twist["angular"]["z"]) < 1.6
-        return all(isinstance(one, int | float) for one in numbers) and slow
+        return all(isinstance(number, int | float) for number in numbers) and slow
     except (TypeError, KeyError):
         return False
 

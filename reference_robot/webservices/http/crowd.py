@@ -86,7 +86,7 @@ class Crowd:
     def has_place_for(self, address: Hashable, now: float) -> bool:
         """Return whether a new client of this address gets a place; if need be, others give way."""
         if self._counts[address] >= self._most_of_address:
-            self._make_room(address, [one for one in self if self._address_of[one] == address], now)
+            self._make_room(address, [item for item in self if self._address_of[item] == address], now)
         elif len(self._address_of) >= self._most:
             self._make_room(address, list(self), now)
         else:

@@ -149,7 +149,7 @@ def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 def _timed(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     series = result.get("time_series", {}).get("series", [])
-    return [one for one in series if any(point["count"] or point["errors"] for point in one["points"])]
+    return [item for item in series if any(point["count"] or point["errors"] for point in item["points"])]
 
 
 def _key(series: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -158,7 +158,7 @@ def _key(series: Mapping[str, Any]) -> tuple[str, str, str]:
 
 def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the series of the "wire" client if any exist, otherwise all series, so that the page stays small."""
-    return [one for one in series if one["client"] == "wire"] or list(series)
+    return [item for item in series if item["client"] == "wire"] or list(series)
 
 
 @picture(

@@ -134,7 +134,7 @@ class Deliveries:
         whole = len(value) < _HELD or bool(entries & before)
         asked_s = exchange.response.received_s - exchange.response.elapsed_ms / 1000
         waiting, self._waiting, self._before = self._waiting, [], entries
-        found = [self._take(one, there) for one in waiting]
+        found = [self._take(accepted, there) for accepted in waiting]
         for number, one in enumerate(waiting):
             later = zip(waiting[number + 1 :], found[number + 1 :], strict=True)
             overtaken = any(listed for other, listed in later if other.interface == one.interface)

@@ -86,7 +86,7 @@ class Goals:
         sent, shown = _goal_in(exchange.request), _goal_in(exchange.response)
         if not exchange.response.ok or not shown:
             return
-        id_, other = (one.get("goal_id", {}).get("id") for one in (sent, shown))
+        id_, other = (item.get("goal_id", {}).get("id") for item in (sent, shown))
         if id_ and other:
             yield case(
                 "rest-resources/goal-id",

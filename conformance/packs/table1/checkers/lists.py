@@ -122,7 +122,7 @@ class Lists:
         if problem or seen.listed is None or _sent_s(exchange) < seen.received_s:
             return
         schema = seen.shape.schema["items"]
-        entries = entries_of([from_element(one, schema) for one in found], seen.names)
+        entries = entries_of([from_element(element, schema) for element in found], seen.names)
         seen.others = [*seen.others[1 - _MOST :], (entries, exchange)]
 
 

@@ -210,7 +210,11 @@ def _asked_over_soap(body: bytes) -> dict[str, str]:
         root = parse_xml(body)
     except UnreadableError:
         return {}
-    return _once((local_name(one), one.text or "") for one in root.iter() if isinstance(one.tag, str) and not len(one))
+    return _once(
+        (local_name(element), element.text or "")
+        for element in root.iter()
+        if isinstance(element.tag, str) and not len(element)
+    )
 
 
 def _once(named: Iterable[tuple[str, str]]) -> dict[str, str]:

@@ -79,7 +79,7 @@ class SoapResponses:
         # Use the description that the checks have fetched; fetch nothing while an exchange is judged.
         described = [vars(service).get("described", service.contract), service.contract]
         tag = str(inside[0].tag) if inside else ""
-        known = next((one for one in described if tag.endswith(_SUFFIX) and one.shape(tag) is not None), None)
+        known = next((item for item in described if tag.endswith(_SUFFIX) and item.shape(tag) is not None), None)
         reason = f"{len(inside)} elements in the Body of {root.tag}" if len(inside) != 1 else f"the element {tag}"
         if len(inside) == 1 and known is not None:
             reason = known.types.invalid(inside[0])

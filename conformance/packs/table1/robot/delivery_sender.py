@@ -99,7 +99,7 @@ class DeliverySender:
 
     def _record(self, sent: tuple[Sent, ...]) -> None:
         """Record a batch; wait a little longer if other deliveries arrived than were accepted."""
-        accepted = [one for one in sent if one.accepted]
+        accepted = [message for message in sent if message.accepted]
         seen = self.observer.collect(len(accepted), 0.0)
         if self._keys(seen) != self._keys(accepted):
             seen += self.observer.collect(0)
@@ -108,7 +108,7 @@ class DeliverySender:
         self.batches.append(Batch(sent, tuple(seen)))
 
     def _keys(self, deliveries: Sequence[Seen] | Sequence[Sent]) -> list[bytes]:
-        return sorted(key_of(one.delivery, exact=self.observer.exact) for one in deliveries)
+        return sorted(key_of(delivery.delivery, exact=self.observer.exact) for delivery in deliveries)
 
     def _send(self, order: Order) -> Iterator[Sent]:
         delivery, how = order.delivery, order.how

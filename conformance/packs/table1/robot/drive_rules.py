@@ -48,7 +48,7 @@ def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = T
         way: whether the pose must follow the velocity.
         readings: whether to include the outcomes of single readings, of which there are hundreds.
     """
-    yield from ((_answered(one), answer_of(one)) for one in trace.commands if not one.renewal)
+    yield from ((_answered(command), answer_of(command)) for command in trace.commands if not command.renewal)
     if readings:
         yield from _readings(trace, limits)
     for reach in trace.reaches:
@@ -166,7 +166,7 @@ def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
 
 def _is_steady(limits: Limits, readings: Sequence[Velocity]) -> bool:
     """Return whether there are readings and all of them are near their median."""
-    return bool(readings) and all(is_near(limits, one, middle(readings), 0.5) for one in readings)
+    return bool(readings) and all(is_near(limits, velocity, middle(readings), 0.5) for velocity in readings)
 
 
 def _same(
@@ -188,7 +188,9 @@ def speed(trace: Trace) -> Case | None:
     if len(window) < SEVERAL or not trace.commands:
         return None
     turn, measured = trace.turns[-1], middle(window)
-    fastest = Velocity(*(max(map(abs, each)) for each in zip(*(one.velocity for one in trace.commands), strict=True)))
+    fastest = Velocity(
+        *(max(map(abs, each)) for each in zip(*(command.velocity for command in trace.commands), strict=True))
+    )
     holds = all(abs(one) <= 1.5 * most + 0.2 for one, most in zip(measured, fastest, strict=True))
     expected = f"a speed that was commanded, at most {rounded(fastest)}"
     return Case(holds, turn.velocity_exchange, expected, str(measured))

@@ -143,7 +143,7 @@ class Trace:
     @property
     def last_full(self) -> Command | None:
         """Return the last command of all components."""
-        return next((one for one in reversed(self.commands) if not one.linear_only), None)
+        return next((command for command in reversed(self.commands) if not command.linear_only), None)
 
     @property
     def full_sent(self) -> float:
@@ -153,7 +153,7 @@ class Trace:
     @property
     def last_command(self) -> Command | None:
         """Return the last command that was no renewal; None before the first."""
-        return next((one for one in reversed(self.commands) if not one.renewal), None)
+        return next((command for command in reversed(self.commands) if not command.renewal), None)
 
     @property
     def answered(self) -> float:

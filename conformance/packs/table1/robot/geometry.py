@@ -41,8 +41,8 @@ class Pose(NamedTuple):
 def middle_of(poses: Sequence[Pose]) -> Pose:
     """Return the medians of x, y and heading, which a few wrong readings do not change."""
     yaw = poses[-1].yaw
-    turned = median(wrapped(one.yaw - yaw) for one in poses)
-    return Pose(median(one.x for one in poses), median(one.y for one in poses), wrapped(yaw + turned))
+    turned = median(wrapped(pose.yaw - yaw) for pose in poses)
+    return Pose(median(pose.x for pose in poses), median(pose.y for pose in poses), wrapped(yaw + turned))
 
 
 def wrapped(angle: float) -> float:

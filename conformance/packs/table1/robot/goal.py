@@ -109,7 +109,7 @@ def await_goal(robot: Robot, *put: dict[str, Any]) -> tuple[Any, str, Exchange]:
     patience = robot.patience(robot.settle_s)
     for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
         goal, exchange = robot.goal()
-        problem = exchange.came if goal is None else min((difference(goal, one) for one in put), key=len)
+        problem = exchange.came if goal is None else min((difference(goal, item) for item in put), key=len)
         if not problem:
             break
     return goal, problem, exchange

@@ -30,7 +30,7 @@ def _without(schema: Schema, name: str) -> Schema:
     """Return an object's schema without one of its members."""
     return {
         **schema,
-        "required": [one for one in schema["required"] if one != name],
+        "required": [item for item in schema["required"] if item != name],
         "properties": {one: part for one, part in schema["properties"].items() if one != name},
     }
 

@@ -124,7 +124,7 @@ class _Sums(NamedTuple):
 def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
     steps = [_Sum()]
     skipped = _longest_lapse(trace)
-    linear, angular = (max(abs(one[part]) for one in velocities) for part in (0, 5))
+    linear, angular = (max(abs(velocity[part]) for velocity in velocities) for part in (0, 5))
     for (one, first), (two, last) in itertools.pairwise(zip(trace, velocities, strict=True)):
         if two.stamp - one.stamp > skipped:
             steps.append(_Sum())
@@ -194,7 +194,7 @@ def way_and_turn(
     trace, measured = trace[unbroken], measured[unbroken]
     if len(trace) < _FEWEST:
         return None, None
-    sources = ([one.velocity for one in trace], measured)
+    sources = ([odometry.velocity for odometry in trace], measured)
     sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
     way = _way([one for one in sums if one.each[-1].length >= _SHORTEST], noise)
     return way, _turn([one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)

@@ -213,7 +213,7 @@ def plan_questions(api: RestInterface) -> list[Question]:
     return [
         Question(query(x=place.x, y=place.y, yaw=place.yaw, frame_id=robot.statement.motion.frame), JSON, other)
         for place in places
-        for other in [_ends_elsewhere(place, [one for one in places if one is not place])]
+        for other in [_ends_elsewhere(place, [pose for pose in places if pose is not place])]
     ]
 
 

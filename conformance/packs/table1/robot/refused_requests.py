@@ -153,11 +153,11 @@ class RefusedRequests(Listener):
         for key, kinds in self._by_operation.items():
             rank = _rank(self._rest, key[0])
             depth = _DEPTH[rank]
-            alike = [one[place] for place in range(_ALIKE) for one in kinds.values() if place < len(one)]
+            alike = [kind[place] for place in range(_ALIKE) for kind in kinds.values() if place < len(kind)]
             ranked += [(number // depth, rank, request) for number, request in enumerate(alike)]
         ranked.sort(key=lambda one: one[:2])
         for _, _, request in ranked:
-            client = next((one for one in clients if request.url.startswith(one.url(""))), None)
+            client = next((http_client for http_client in clients if request.url.startswith(http_client.url(""))), None)
             if client is None or request in self._dropped:
                 continue
             path = request.url[len(client.url("")) :]

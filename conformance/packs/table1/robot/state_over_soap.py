@@ -174,4 +174,4 @@ def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
 
 def for_good(reads: Iterable[StateRead]) -> list[StateRead]:
     """Return the readings that are broken by themselves, without the differences that time may explain."""
-    return [replace(one, differs="") for one in reads if one.broken]
+    return [replace(read, differs="") for read in reads if read.broken]

@@ -39,7 +39,7 @@ def unrenewed(
         (across, "velocity"),
         (ahead, "xml"),
     ]
-    if effort == "deep" or not any(one.linear_x * ahead.linear_x > 0 for one in others):
+    if effort == "deep" or not any(velocity.linear_x * ahead.linear_x > 0 for velocity in others):
         ways.append((ahead, "velocity"))
     ways = [way for way in dict.fromkeys(ways) if any(way[0])]
     if effort == "quick":
@@ -52,7 +52,7 @@ def slow(robot: Robot, seed: int) -> list[Velocity]:
     limits, chance = robot.limits, random.Random(f"{seed}/slow")  # noqa: S311 - no secret
     found: list[Velocity] = []
     for component in (AHEAD, ABOUT):
-        end = chance.choice([one for one in limits.range_of(component) if one] or [0.0])
+        end = chance.choice([number for number in limits.range_of(component) if number] or [0.0])
         size = min(max(_SLOW * abs(end), _TOLD * limits.rest(component)), _MOST * abs(end))
         found.append(robot.only(component, math.copysign(size, end)))
     return found

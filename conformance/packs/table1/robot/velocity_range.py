@@ -62,7 +62,7 @@ def along_arc(robot: Robot, turning: Velocity, share: float) -> tuple[Velocity, 
     limits, motion = robot.limits, robot.statement.motion
     least, greatest = limits.range_of(AHEAD)
     aside, other = (-share, share) if -least >= greatest / 2 else (share, share / 2)
-    parts = [robot.share_of_limits(one, 0.0).linear_x for one in (aside, other)]
+    parts = [robot.share_of_limits(number, 0.0).linear_x for number in (aside, other)]
     turn = turning.angular_z
     for part in parts:
         turn = turn_beside(limits, motion, part, turn)

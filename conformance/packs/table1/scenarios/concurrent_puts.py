@@ -48,8 +48,10 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
     for turn in range(effort.cases(20)):
         body = goal_body(pose, robot.statement.motion.frame, f"clients {turn}")
         attempts = _put_together(robot, GOAL_PATH, [body] * _CLIENTS)
-        puts = tuple(one for one in attempts if isinstance(one, Exchange) and not is_busy(one))
-        if all(HTTPStatus.BAD_REQUEST <= one.response.status < HTTPStatus.INTERNAL_SERVER_ERROR for one in puts):
+        puts = tuple(exchange for exchange in attempts if isinstance(exchange, Exchange) and not is_busy(exchange))
+        if all(
+            HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR for exchange in puts
+        ):
             continue  # the robot refuses this place to every client
         goal, differs, read = await_goal(robot, body)
         if goal is None and arrived(robot, pose):

@@ -136,8 +136,8 @@ class CountedDeliveries:
     def known(self) -> set[Delivery]:
         """Return the valid deliveries among them."""
         own = {self.last, self.no_format, _TWICE, _APART}
-        own |= {one.delivery for one in self.rejected}
-        return own | {one.delivery for one in self.by_method} | {delivery for delivery, _ in self.after}
+        own |= {rejection.delivery for rejection in self.rejected}
+        return own | {count.delivery for count in self.by_method} | {delivery for delivery, _ in self.after}
 
     @property
     def twice_arrived(self) -> int:
@@ -172,15 +172,15 @@ def counted_deliveries(api: RestInterface, soap: SoapServices, probe: RosProbe) 
         1
         + sum(exchange.response.ok for _, exchange in trace.after)
         + answer.response.ok
-        + sum(one.accepted for one in trace.rejected)
+        + sum(rejection.accepted for rejection in trace.rejected)
         + keyed.twice[0].response.ok
         + keyed.accepted_apart
     )
     try:
-        seen = [one.delivery for one in observer.collect(wanted)]
+        seen = [sighting.delivery for sighting in observer.collect(wanted)]
         # A robot that published one message too many has pushed the last one out.
         lacking = keyed.accepted_apart - seen.count(_APART)
-        seen += (one.delivery for one in (observer.collect(lacking) if lacking > 0 else ()))
+        seen += (sighting.delivery for sighting in (observer.collect(lacking) if lacking > 0 else ()))
     except (NoObserverError, ProbeError) as error:
         return replace(trace, unseen=str(error))
     return replace(trace, answer=answer, keyed=keyed, seen=tuple(seen))

@@ -115,13 +115,16 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
         # A format may learn of another goal later, but must show one whole goal.
         other_goal = {name for name, place in found if place == "goal_id.id"}
         odd = {key: one for key, one in found.items() if key[0] not in other_goal and not key[1].startswith("status.")}
-        trace += [FormatsRead.of(call, one.exchange, one) for one in odd.values()]
+        trace += [FormatsRead.of(call, disagreement.exchange, disagreement) for disagreement in odd.values()]
         suspects = found if suspects is None else {key: one for key, one in found.items() if key in suspects}
         if exchange.response.ok:
             trace.append(FormatsRead.of(call, exchange))
     robot.delete_goal()
     await_none(robot)
-    return (*trace, *(FormatsRead.of(call, one.exchange, one) for one in (suspects or {}).values()))
+    return (
+        *trace,
+        *(FormatsRead.of(call, disagreement.exchange, disagreement) for disagreement in (suspects or {}).values()),
+    )
 
 
 @scenario(needs={Need.REST, Need.MOTION})

@@ -185,13 +185,13 @@ class _Way:
             drive.keep(robot.settle_s)
             first = len(drive.trace.odometry)
             drive.keep(_LOOKED_S)
-            here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[first:]] or [here])
+            here = middle_of([robot.in_map(odometry.pose) for odometry in drive.trace.odometry[first:]] or [here])
             trace = _arrived(trace, here)
         # The same for the place at the start.
-        begins = (start, *(robot.in_map(one.pose) for one in driven.odometry[:1]))
+        begins = (start, *(robot.in_map(odometry.pose) for odometry in driven.odometry[:1]))
         self.trace = replace(
             trace,
-            way_m=max(one.distance(here) for one in begins),
+            way_m=max(pose.distance(here) for pose in begins),
             read=exchange,
             ended=goal is None,
             other=other,
@@ -258,7 +258,9 @@ class _Way:
             ended = goal is None and exchange.response.status == HTTPStatus.NOT_FOUND
             if ended or clock.now() > min(progress + robot.limits.goal_s, began + _LONGEST_S):
                 drive.keep(robot.settle_s)
-                here = middle_of([robot.in_map(one.pose) for one in drive.trace.odometry[-SEVERAL:]] or [here])
+                here = middle_of(
+                    [robot.in_map(odometry.pose) for odometry in drive.trace.odometry[-SEVERAL:]] or [here]
+                )
                 self.trace = replace(self.trace, turned_off=(exchange, abs(wrapped(here.yaw - heading))))
             if ended or self.trace.turned_off or (goal is not None and goal["goal_id"]["id"] != _REACHED):
                 break

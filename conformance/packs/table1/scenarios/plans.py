@@ -80,7 +80,7 @@ def plans_from_start(robot: Robot, explore: Explorer) -> PlansFromStart:
     pairs = ((start, goal._replace(yaw=0.0)) for start, goal in itertools.pairwise(starts))
     defaults = (_by_default(robot, start, goal) for start, goal in pairs)
     written = _otherwise_written(robot, starts[0], starts[1]._replace(yaw=-0.5))
-    return PlansFromStart(tuple(reads), tuple(one for one in defaults if one is not None), written)
+    return PlansFromStart(tuple(reads), tuple(plan for plan in defaults if plan is not None), written)
 
 
 def _by_default(robot: Robot, start: Pose, goal: Pose) -> DefaultPlan | None:

@@ -197,7 +197,7 @@ class _Player:
     def _rest(self, chosen: list[Refused]) -> Case:
         """Send the requests at rest, and read the robot."""
         bring_to_rest(self.api)
-        exchanges = [self._send(one) for one in chosen]
+        exchanges = [self._send(refusal) for refusal in chosen]
         pairs = zip(chosen, exchanges, strict=True)
         if any(one.acts and exchange.response.ok and not self._is_wrong(one) for one, exchange in pairs):
             bring_to_rest(self.api)
@@ -214,13 +214,13 @@ class _Player:
 
     def _alone(self, chosen: list[Refused]) -> Iterator[Case]:
         """Send each request that would act with a look of its own; yield the readings that show an effect."""
-        for one in chosen:
-            if one.acts:
+        for refusal in chosen:
+            if refusal.acts:
                 bring_to_rest(self.api)
-                exchange = self._send(one)
-                seen = self._read(one.what)
-                if not seen.holds and (is_refused(exchange) or self._is_wrong(one)):
-                    yield replace(seen, exchange=exchange, cause=one.what)
+                exchange = self._send(refusal)
+                seen = self._read(refusal.what)
+                if not seen.holds and (is_refused(exchange) or self._is_wrong(refusal)):
+                    yield replace(seen, exchange=exchange, cause=refusal.what)
 
     def observer(self, probe: RosProbe, senders: list[DeliverySender]) -> DeliveryObserver | None:
         """Return an observer of deliveries from now on, or None."""
@@ -242,8 +242,8 @@ class _Player:
         for turn in range(_TWICE):
             if turn:
                 observer.mark()
-            chosen = [one for one in self._chosen() if one.acts]
-            last = [self._send(one) for one in chosen][-1:]
+            chosen = [refusal for refusal in self._chosen() if refusal.acts]
+            last = [self._send(refusal) for refusal in chosen][-1:]
             orders = list(self._orders(10_000 * (turn + 1), chosen)) if chosen else []
             until = clock.now() + QUIET_S
             try:
@@ -261,7 +261,7 @@ class _Player:
         """Record the deliveries after the last refused request; return those that nobody ordered."""
         accepted = tuple((delivery, exchange) for delivery, exchange in orders if exchange.response.ok)
         try:
-            seen = tuple(one.delivery for one in observer.collect(len(accepted), left_s))
+            seen = tuple(sighting.delivery for sighting in observer.collect(len(accepted), left_s))
         except (NoObserverError, ProbeError) as error:
             self.trace = replace(self.trace, unseen=str(error))
             return ()
@@ -277,8 +277,8 @@ class _Player:
 
     def _orders(self, first: int, chosen: list[Refused]) -> Iterator[tuple[Delivery, Exchange]]:
         """Send deliveries over each interface, each directly after a refused request on either interface."""
-        here = [one for one in chosen if one.client is self.robot.rest] or chosen
-        there = [one for one in chosen if one.client is not self.robot.rest] or chosen
+        here = [refusal for refusal in chosen if refusal.client is self.robot.rest] or chosen
+        there = [refusal for refusal in chosen if refusal.client is not self.robot.rest] or chosen
         delivery = _of(COURIER, -first)
         for number, before in enumerate((here[0], there[0])):
             before.send()
@@ -363,8 +363,8 @@ class _Player:
                 later = robot.odometry()
                 # A robot that still stands may be blocked.
                 return last if later is not None and _moved(end.pose, later.pose) else None
-            for one in chosen:
-                one.send()
+            for refusal in chosen:
+                refusal.send()
         return None
 
     def _send_during(self, sent: list[Refused], active: dict[str, Any], pose: Pose) -> Exchange | None:

@@ -164,7 +164,7 @@ class _Turning:
     def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, By]]:
         """Return the velocities that are sent without renewal."""
         robot = self.robot
-        ahead = robot.drivable(Velocity(*(-one for one in bent)))
+        ahead = robot.drivable(Velocity(*(-number for number in bent)))
         across = robot.drivable(ahead._replace(angular_z=-ahead.angular_z))
         return unrenewed(bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed)
 
@@ -263,7 +263,7 @@ class _Turning:
         sent, until = clock.now(), clock.now() + _MEANWHILE * hold_s
         if disturbed:
             robot.put_linear(_BAD[0])
-            bad = [robot.put_velocity(one) for one in _BAD]
+            bad = [robot.put_velocity(velocity) for velocity in _BAD]
             refuse_goal(robot)
             return self.taken or Command(sent, clock.now(), {}, bad[-1])
         robot.velocity()

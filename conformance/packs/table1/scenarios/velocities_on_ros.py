@@ -32,7 +32,7 @@ class OnRos:
 
     def arrived(self, limits: Limits) -> bool:
         """Return whether a message has the velocity, within the tolerance."""
-        return any(is_near(limits, one, self.wanted) for one in self.seen)
+        return any(is_near(limits, velocity, self.wanted) for velocity in self.seen)
 
 
 @scenario(needs={Need.REST, Need.MOTION})
@@ -48,7 +48,7 @@ def velocities_on_ros(robot: Robot, probe: RosProbe, effort: Effort) -> tuple[On
             exchange = robot.put_velocity(wanted)
             if exchange.response.ok:
                 trace.append(OnRos(wanted, exchange, _seen(robot, seeing, wanted)))
-            if sum(not one.arrived(robot.limits) for one in trace) > 1:
+            if sum(not velocity.arrived(robot.limits) for velocity in trace) > 1:
                 break
         robot.put_velocity(STILL)
     except ProbeError as error:
@@ -63,7 +63,7 @@ def _seen(robot: Robot, seeing: Probe, wanted: Velocity) -> tuple[Velocity, ...]
     seen: list[Velocity] = []
     for _ in poll_for(robot.clock, 0.005, max(ARRIVES_S, robot.settle_s)):
         seen += seeing.velocities()
-        if any(robot.near(one, wanted) for one in seen):
+        if any(robot.near(velocity, wanted) for velocity in seen):
             break
         # A robot that accelerates slowly may end a velocity before it has reached it.
         if robot.clock.now() > renew_at:

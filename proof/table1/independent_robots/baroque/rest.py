@@ -156,7 +156,7 @@ class Rest(rest.Rest):
         elif root == "Twist":
             value = {**value, "unit": "m/s"}
         elif root == "Sensors":
-            value = [{**one, "rate": 10.0} for one in value]
+            value = [{**item, "rate": 10.0} for item in value]
         elif root == "MoveBaseActionGoal":
             value = {**value, "status": {**value["status"], "mood": "fine"}}
         if format_ == "application/xml":
@@ -168,12 +168,12 @@ class Rest(rest.Rest):
         now = time.time()
         return [
             {
-                "request": one.request,
-                "state": "active" if now - one.accepted < _ACTIVE_S else "done",
-                "accepted": stamp(one.accepted),
-                "interface": one.interface,
+                "request": delivery.request,
+                "state": "active" if now - delivery.accepted < _ACTIVE_S else "done",
+                "accepted": stamp(delivery.accepted),
+                "interface": delivery.interface,
             }
-            for one in list(self._body.deliveries)
+            for delivery in list(self._body.deliveries)
         ]
 
     @property
@@ -242,10 +242,10 @@ def _wadl_resource(path: str, methods: list[str]) -> str:
     types = {"integer": "int", "number": "double", "string": "string"}
     said = {
         where: "".join(
-            f"<param style='{style}' name='{one['name']}' type='xsd:{types[one['schema']['type']]}'"
-            f"{' required=' + chr(39) + 'true' + chr(39) if where == 'query' and one['required'] else ''}/>"
-            for one in _parameters("/robot/" + path)
-            if one["in"] == where
+            f"<param style='{style}' name='{parameter['name']}' type='xsd:{types[parameter['schema']['type']]}'"
+            f"{' required=' + chr(39) + 'true' + chr(39) if where == 'query' and parameter['required'] else ''}/>"
+            for parameter in _parameters("/robot/" + path)
+            if parameter["in"] == where
         )
         for where, style in (("path", "template"), ("query", "query"))
     }

@@ -48,9 +48,11 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
         for interface in ("rest", "soap"):
             # A delivery with two messages has no single place in the order, nor has one that was sent at the same time
             # as others.
-            ordered = [one for one in _accepted(batch) if one.interface == interface and one.how not in _TWO]
-            ordered = [one for one in ordered if one.how != "together"]
-            wanted = [trace.key(one.delivery) for one in ordered]
+            ordered = [
+                message for message in _accepted(batch) if message.interface == interface and message.how not in _TWO
+            ]
+            ordered = [message for message in ordered if message.how != "together"]
+            wanted = [trace.key(message.delivery) for message in ordered]
             found = list(dict.fromkeys(key for key in _keys(trace, batch) if key in wanted))
             arrived = [key for key in wanted if key in found]
             if len(arrived) > 1:
@@ -62,7 +64,7 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
 def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
     """Judge that no message arrives besides one for each accepted request."""
     for batch, before in trace.judged():
-        exchange = next((one.exchange for one in _accepted(batch)), None)
+        exchange = next((message.exchange for message in _accepted(batch)), None)
         found, cause = "", ""
         again, refused, unsent = _others(trace, batch, before)
         if again:
@@ -81,16 +83,16 @@ def _arrives_once(trace: Deliveries, how: str) -> Iterator[Case]:
     for batch, before in trace.judged():
         accepted = _accepted(batch)
         arrived = Counter(_keys(trace, batch))
-        wanted = Counter(trace.key(one.delivery) for one in accepted)
-        others = [one.delivery for one in batch.seen if trace.key(one.delivery) not in wanted]
-        for one in accepted:
-            if one.how == how:
-                key = trace.key(one.delivery)
-                problem = _problem(arrived[key], wanted[key], others) or _wrong_interfaces(trace, batch, one)
-                yield _once(one, problem, problem.partition(",")[0])
-        for one in _others(trace, batch, before)[0]:
-            if one.how == how:
-                yield _once(one, "one more message, later", "later")
+        wanted = Counter(trace.key(message.delivery) for message in accepted)
+        others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in wanted]
+        for message in accepted:
+            if message.how == how:
+                key = trace.key(message.delivery)
+                problem = _problem(arrived[key], wanted[key], others) or _wrong_interfaces(trace, batch, message)
+                yield _once(message, problem, problem.partition(",")[0])
+        for message in _others(trace, batch, before)[0]:
+            if message.how == how:
+                yield _once(message, "one more message, later", "later")
 
 
 def _once(one: Sent, problem: str, cause: str) -> Case:
@@ -121,12 +123,14 @@ def _others(
     Returns:
         The deliveries of earlier batches that arrived again, those that were not accepted, and those never sent.
     """
-    known = {trace.key(one.delivery) for one in _accepted(batch)}
+    known = {trace.key(message.delivery) for message in _accepted(batch)}
     sent = list(chain.from_iterable(one.sent for one in (*before, batch)))
-    known |= {trace.key(one.delivery) for one in sent if one.may_arrive}
-    earlier = {trace.key(one.delivery): one for one in chain.from_iterable(map(_accepted, before))}
-    refused = {trace.key(one.delivery): one for one in sent if not one.accepted and not one.may_arrive}
-    others = [one.delivery for one in batch.seen if trace.key(one.delivery) not in known]
+    known |= {trace.key(message.delivery) for message in sent if message.may_arrive}
+    earlier = {trace.key(message.delivery): message for message in chain.from_iterable(map(_accepted, before))}
+    refused = {
+        trace.key(message.delivery): message for message in sent if not message.accepted and not message.may_arrive
+    }
+    others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in known]
     keys = [trace.key(delivery) for delivery in others]
     return (
         [earlier[key] for key in keys if key in earlier],
@@ -144,8 +148,8 @@ def _all(trace: Deliveries, last: Batch) -> Iterator[tuple[Batch, tuple[Batch, .
 
 
 def _accepted(batch: Batch) -> list[Sent]:
-    return [one for one in batch.sent if one.accepted]
+    return [message for message in batch.sent if message.accepted]
 
 
 def _keys(trace: Deliveries, batch: Batch) -> list[bytes]:
-    return [trace.key(one.delivery) for one in batch.seen]
+    return [trace.key(sighting.delivery) for sighting in batch.seen]

@@ -24,7 +24,7 @@ def _same(name: str, scenario: Scenario) -> Rule:
     """Return a rule that judges whether both interfaces show the same state."""
 
     def judge(trace: tuple[StateRead, ...]) -> Iterator[Outcome]:
-        return (case for one in trace if one.name == name for case in one.cases)
+        return (case for read in trace if read.name == name for case in read.cases)
 
     return rule(f"equivalence/{name}", on=(scenario,))(judge)
 

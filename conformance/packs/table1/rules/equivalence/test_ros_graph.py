@@ -67,11 +67,11 @@ def test_sensors_are_on_the_graph(robot: Robot, seeing: Probe, judge: Judge) -> 
 @rule("equivalence/velocity-message", on=(velocities_on_ros,))
 def velocity_message(trace: tuple[OnRos, ...], run: Run) -> Iterator[Outcome]:
     """Judge that an accepted velocity is published on the velocity topic; the robot may smooth it."""
-    for one in trace:
+    for velocity in trace:
         yield Case(
-            one.arrived(said_of(run).limits),
-            one.exchange,
-            f"a message with {one.wanted}, within the tolerance",
-            f"{len(one.seen)} messages, last {one.seen[-1]}" if one.seen else "no message",
-            "another message" if one.seen else "no message",
+            velocity.arrived(said_of(run).limits),
+            velocity.exchange,
+            f"a message with {velocity.wanted}, within the tolerance",
+            f"{len(velocity.seen)} messages, last {velocity.seen[-1]}" if velocity.seen else "no message",
+            "another message" if velocity.seen else "no message",
         )

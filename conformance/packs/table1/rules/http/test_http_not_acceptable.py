@@ -29,8 +29,8 @@ def accepted_goal_is_shown(trace: Puts) -> Iterator[Outcome]:
 
 
 def _has_effect(trace: Puts, path: str) -> Iterator[Case]:
-    for one in trace:
-        if one.path == path and one.has_effect is not None:
-            expected = f"the robot to apply a PUT of {path} to which it responds {one.exchange.response.status}"
+    for refusal in trace:
+        if refusal.path == path and refusal.has_effect is not None:
+            expected = f"the robot to apply a PUT of {path} to which it responds {refusal.exchange.response.status}"
             observed = "no effect, though the same PUT with Accept: application/json has one"
-            yield Case(one.has_effect, one.exchange, expected, observed)
+            yield Case(refusal.has_effect, refusal.exchange, expected, observed)

@@ -57,7 +57,7 @@ def test_list_of_many(api: RestInterface, rest: HttpClient, robot: Robot, judge:
     # A slow robot gets fewer deliveries.
     many = 5 if effort.slow else _LEAST + 5
     sent = [Delivery(3 + index % 2, 0.5, index + 0.25, -1.0, 1e300, 1e-300, index / 3) for index in range(many)]
-    taken = [one for one in sent if put_delivery(api, one.rest_path, fresh=True).response.ok]
+    taken = [delivery for delivery in sent if put_delivery(api, delivery.rest_path, fresh=True).response.ok]
     for _ in poll_for(robot.clock, _STEP_S, _SOON_S):
         entries, problem, exchange = _read(rest)
         listed = Listed(entries, taken, [_request(entry) for entry in before])

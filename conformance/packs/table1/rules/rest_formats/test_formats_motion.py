@@ -18,19 +18,19 @@ from conformance.verdict.evidence import Case
 @rule("rest-formats/same-values", on=(formats_in_motion, formats_of_goals, formats_of_plans))
 def same_values(trace: tuple[FormatsRead, ...]) -> Iterator[Outcome]:
     """Judge that all formats of a resource have the same values."""
-    for one in trace:
-        if one.put:
+    for read in trace:
+        if read.put:
             continue
-        expected = f"the same values in all formats of {one.template}"
-        yield Case(not one.differs, one.exchange, expected, one.differs, cause=one.operation)
+        expected = f"the same values in all formats of {read.template}"
+        yield Case(not read.differs, read.exchange, expected, read.differs, cause=read.operation)
 
 
 @rule("rest-formats/xml-input", on=(formats_of_goals,))
 def xml_input(trace: tuple[FormatsRead, ...]) -> Iterator[Outcome]:
     """Judge that a goal in XML is the goal that the robot then has."""
-    for one in trace:
-        if one.put:
-            yield Case(not one.differs, one.exchange, "the goal that was sent", one.differs, cause="putGoal effect")
+    for read in trace:
+        if read.put:
+            yield Case(not read.differs, read.exchange, "the goal that was sent", read.differs, cause="putGoal effect")
 
 
 @rule("rest-formats/text-quoted", on=(goal_as_text,))

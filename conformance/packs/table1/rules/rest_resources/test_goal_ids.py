@@ -35,7 +35,7 @@ def goal_get(trace: tuple[Put, ...]) -> Iterator[Outcome]:
 @rule("rest-resources/goal-get", on=(goal_poses,))
 def goal_get_pose(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
     """Judge that GET returns each goal unchanged, in every reading."""
-    return (Case(not one.differs, one.exchange, "the goal that was put", one.differs) for one in trace)
+    return (Case(not read.differs, read.exchange, "the goal that was put", read.differs) for read in trace)
 
 
 def _under_its_id(trace: tuple[Put, ...]) -> Iterator[Case]:

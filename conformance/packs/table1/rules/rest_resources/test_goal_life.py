@@ -18,12 +18,12 @@ _NOW_S = 5.0
 def _puts(life: GoalLife) -> Iterator[Put]:
     """Yield the PUTs of new goals."""
     second = life.second if life.renamed is None else None
-    yield from (one for one in (life.first, second, life.reused) if one is not None)
+    yield from (put for put in (life.first, second, life.reused) if put is not None)
 
 
 def _read(life: GoalLife) -> Iterator[Put]:
     """Yield the PUTs of new goals that the robot accepted and showed before they ended."""
-    yield from (one for one in _puts(life) if one.exchange.response.status in NEW | REPEATED and not one.ended)
+    yield from (put for put in _puts(life) if put.exchange.response.status in NEW | REPEATED and not put.ended)
 
 
 def _shown(put: Put) -> Case:
@@ -33,29 +33,31 @@ def _shown(put: Put) -> Case:
 @rule("rest-resources/goal-none", on=(goal_life,))
 def no_goal(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET returns 404 before the first goal."""
-    for one in trace.none:
-        yield Case(one.read.response.status == 404, one.read, "404 without an active goal")
+    for refusal in trace.none:
+        yield Case(refusal.read.response.status == 404, refusal.read, "404 without an active goal")
 
 
 @rule("rest-resources/goal-delete-none", on=(goal_life,))
 def cancelled_without_goal(trace: GoalLife) -> Iterator[Outcome]:
     """Judge the response to DELETE while there is no goal."""
-    for one in trace.none:
-        yield Case(one.cancelled.response.status == 404, one.cancelled, "404 for a DELETE without an active goal")
+    for refusal in trace.none:
+        yield Case(
+            refusal.cancelled.response.status == 404, refusal.cancelled, "404 for a DELETE without an active goal"
+        )
 
 
 @rule("rest-resources/goal-delete-none-success", on=(goal_life,))
 def cancelled_without_goal_or_success(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that a DELETE without a goal is answered 404 or with success."""
-    for one in trace.none:
-        yield Case(one.cancelled.response.status in {404, 200, 204}, one.cancelled, "404 or 204 without a goal")
+    for refusal in trace.none:
+        yield Case(refusal.cancelled.response.status in {404, 200, 204}, refusal.cancelled, "404 or 204 without a goal")
 
 
 @rule("rest-resources/goal-put", on=(goal_life,))
 def goal_put(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that a new goal is accepted."""
-    for one in _puts(trace):
-        yield Case(one.exchange.response.status in NEW, one.exchange, "201 or 202 for a new goal")
+    for put in _puts(trace):
+        yield Case(put.exchange.response.status in NEW, put.exchange, "201 or 202 for a new goal")
 
 
 @rule("rest-resources/goal-id-again", on=(goal_life,))
@@ -72,67 +74,67 @@ def goal_id_again(trace: GoalLife) -> Iterator[Outcome]:
 def goal_get(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET shows the goal that was sent, and does so after a velocity that was refused."""
     yield from map(_shown, _read(trace))
-    for one in trace.kept:
-        expected = f"the active goal, as {one.exchange.request.method} {one.exchange.request.target} was refused"
-        yield Case(not one.differs, one.read, expected, one.differs)
+    for put in trace.kept:
+        expected = f"the active goal, as {put.exchange.request.method} {put.exchange.request.target} was refused"
+        yield Case(not put.differs, put.read, expected, put.differs)
 
 
 @rule("rest-resources/goal-id", on=(goal_life,))
 def goal_id(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET shows the goal's id."""
-    return (_shown(one) for one in _read(trace) if one is trace.first)
+    return (_shown(put) for put in _read(trace) if put is trace.first)
 
 
 @rule("rest-resources/goal-status", on=(goal_life,))
 def goal_status(trace: GoalLife) -> Iterator[Outcome]:
     """Judge the status of an active goal."""
-    for one in _read(trace):
-        if one.shown is not None:
-            wrong = status_fault(one.shown)
-            yield Case(not wrong, one.read, "a status {code, text} with code 1, 2 or 3", wrong)
+    for put in _read(trace):
+        if put.shown is not None:
+            wrong = status_fault(put.shown)
+            yield Case(not wrong, put.read, "a status {code, text} with code 1, 2 or 3", wrong)
 
 
 @rule("rest-resources/goal-repeat", on=(goal_life,))
 def goal_repeat(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that repeating a goal's PUT changes neither the goal nor its stamp."""
-    for one in trace.repeated:
-        accepted, changed = one.exchange.response.status in REPEATED, one.differs
+    for put in trace.repeated:
+        accepted, changed = put.exchange.response.status in REPEATED, put.differs
         # If a goal's stamp stays the same between readings, it must differ from another goal's.
-        stamps = trace.stamps if trace.first is not None and one.body == trace.first.body else ()
-        if not changed and len(stamps) > 1 and stamps[0] == stamps[1] != one.shown["goal_id"]["stamp"]:
-            changed = f"goal_id.stamp {one.shown['goal_id']['stamp']} for {stamps[0]}"
+        stamps = trace.stamps if trace.first is not None and put.body == trace.first.body else ()
+        if not changed and len(stamps) > 1 and stamps[0] == stamps[1] != put.shown["goal_id"]["stamp"]:
+            changed = f"goal_id.stamp {put.shown['goal_id']['stamp']} for {stamps[0]}"
         yield Case(
             accepted and not changed,
-            one.read if accepted else one.exchange,
+            put.read if accepted else put.exchange,
             "200, 202 or 204 for the goal that is active already, which stays as it is",
-            changed if accepted else one.exchange.came,
+            changed if accepted else put.exchange.came,
         )
 
 
 @rule("rest-resources/goal-put-back", on=(goal_life,))
 def goal_put_back(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that the active goal may be put back as GET shows it: the robot ignores its status, or refuses it."""
-    for one in trace.put_back:
-        status = one.exchange.response.status
+    for put in trace.put_back:
+        status = put.exchange.response.status
         answered = status in REPEATED or 400 <= status < 500
         yield Case(
-            answered and not one.differs,
-            one.read if answered else one.exchange,
+            answered and not put.differs,
+            put.read if answered else put.exchange,
             "200, 202, 204 or 4xx for the active goal as GET shows it, which stays as it is",
-            one.differs if answered else one.exchange.came,
+            put.differs if answered else put.exchange.came,
         )
 
 
 @rule("rest-resources/goal-conflict", on=(goal_life,))
 def goal_conflict(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that the robot rejects another pose under the active goal's id."""
-    for one in trace.contradicted:
-        refused = one.exchange.response.status == 409
+    for put in trace.contradicted:
+        refused = put.exchange.response.status == 409
         yield Case(
-            refused and not one.differs,
-            one.read if refused else one.exchange,
+            refused and not put.differs,
+            put.read if refused else put.exchange,
             "409 for another pose under the active goal's id, and the goal as it was",
-            one.differs if refused else one.exchange.came,
+            put.differs if refused else put.exchange.came,
         )
 
 
@@ -141,7 +143,7 @@ def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that another goal replaces the active one."""
     if trace.second is not None and trace.renamed is False:
         yield Case(False, trace.second.exchange, "201 or 202 for another goal")
-    yield from (_shown(one) for one in _read(trace) if one is trace.second)
+    yield from (_shown(put) for put in _read(trace) if put is trace.second)
 
 
 @rule("rest-resources/goal-fills-in", on=(goal_life,))
@@ -185,22 +187,25 @@ def velocity_goal(trace: GoalLife, run: Run) -> Iterator[Outcome]:
 @rule("rest-resources/goal-delete", on=(goal_life,))
 def goal_delete(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that a cancelled goal is gone."""
-    for one in trace.cancelled:
-        accepted = one.exchange.response.status in CANCELLED
+    for cancellation in trace.cancelled:
+        accepted = cancellation.exchange.response.status in CANCELLED
         yield Case(
-            accepted and one.gone,
-            one.read if accepted else one.exchange,
+            accepted and cancellation.gone,
+            cancellation.read if accepted else cancellation.exchange,
             "204 for DELETE, then 404 for GET",
-            f"{one.read.came} for GET" if accepted else "",
+            f"{cancellation.read.came} for GET" if accepted else "",
         )
 
 
 @rule("rest-resources/goal-outcome", on=(goal_life,))
 def goal_outcome(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that the 404 after a DELETE reports that the goal was cancelled."""
-    for one in trace.cancelled:
-        if one.exchange.response.status in CANCELLED and one.gone:
-            wrong = outcome_fault(one.read, CANCELED)
+    for cancellation in trace.cancelled:
+        if cancellation.exchange.response.status in CANCELLED and cancellation.gone:
+            wrong = outcome_fault(cancellation.read, CANCELED)
             yield Case(
-                not wrong, one.read, "a 404 with last_goal {goal_id, status}, which was canceled (code 5)", wrong
+                not wrong,
+                cancellation.read,
+                "a 404 with last_goal {goal_id, status}, which was canceled (code 5)",
+                wrong,
             )

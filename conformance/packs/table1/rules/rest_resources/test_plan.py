@@ -27,14 +27,14 @@ def plan_type(trace: Plans) -> Iterator[Outcome]:
     """Judge that the robot has plans to poses around it, each valid by the schema."""
     if isinstance(trace, PlansFromRobot) and trace.nowhere is not None:
         yield Case(False, trace.nowhere, "a plan to one of 8 poses around the robot")
-    for one in trace.reads:
-        yield Case(not one.problem, one.exchange, _EXPECTED, one.problem)
+    for read in trace.reads:
+        yield Case(not read.problem, read.exchange, _EXPECTED, read.problem)
 
 
 @rule("rest-resources/plan-start", on=(plans_from_robot,))
 def plan_start(trace: PlansFromRobot) -> Iterator[Outcome]:
     """Judge that a plan begins where the robot is."""
-    yield from (one.start.case for one in trace.reads if one.start is not None)
+    yield from (read.start.case for read in trace.reads if read.start is not None)
 
 
 def _played(name: str) -> Rule:
@@ -49,17 +49,17 @@ plan_continuous, plan_frame = _played("plan-continuous"), _played("plan-frame")
 @rule("rest-resources/plan-defaults", on=(plans_from_start,))
 def plan_defaults(trace: PlansFromStart) -> Iterator[Outcome]:
     """Judge that omitted parameters have their defaults."""
-    for one in trace.defaults:
-        problem = one.problem if one.plan is None else _other_plan(one, one.plan)
-        yield Case(not problem, one.exchange, "the plan that yaw=0, frame_id=map and tolerance=0.1 give", problem)
+    for plan in trace.defaults:
+        problem = plan.problem if plan.plan is None else _other_plan(plan, plan.plan)
+        yield Case(not problem, plan.exchange, "the plan that yaw=0, frame_id=map and tolerance=0.1 give", problem)
 
 
 @rule("rest-resources/plan-numbers", on=(plans_from_start,))
 def plan_numbers(trace: PlansFromStart) -> Iterator[Outcome]:
     """Judge that numbers in a query mean the same in every notation."""
-    for one in trace.written:
-        problem = one.problem if one.plan is None else _other_plan(one, one.plan)
-        yield Case(not problem, one.exchange, "the plan for the same numbers in their shortest notation", problem)
+    for plan in trace.written:
+        problem = plan.problem if plan.plan is None else _other_plan(plan, plan.plan)
+        yield Case(not problem, plan.exchange, "the plan for the same numbers in their shortest notation", problem)
 
 
 def _other_plan(one: DefaultPlan, plan: Plan) -> str:
@@ -78,19 +78,19 @@ def _other_plan(one: DefaultPlan, plan: Plan) -> str:
 @rule("rest-resources/plan-frame", on=(plans_in_frames,))
 def plan_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
     """Judge that there is a plan in the requested frame, which `checkers.plans` compares, or a refusal."""
-    for one in trace:
-        problem = "" if is_refused(one.exchange) else one.problem
-        yield Case(not problem, one.exchange, f"path and poses in {one.frame!r}, or 4xx", problem)
+    for plan in trace:
+        problem = "" if is_refused(plan.exchange) else plan.problem
+        yield Case(not problem, plan.exchange, f"path and poses in {plan.frame!r}, or 4xx", problem)
 
 
 @rule("rest-resources/plan-start", on=(plans_in_frames,))
 def plan_starts_in_its_frame(trace: tuple[FramePlan, ...]) -> Iterator[Outcome]:
     """Judge that a plan in the odometry frame begins at the odometry's pose."""
-    for one in trace:
-        if one.plan is not None and one.moved_m is not None and one.plan.frames == {one.frame}:
-            start, expected = one.plan.poses[0], f"{_place(one.begin)} in the odometry's frame"
-            holds = start.distance(one.begin) <= START_OFF + one.moved_m
-            yield Case(holds, one.exchange, expected, _place(start), "odometry's frame")
+    for plan in trace:
+        if plan.plan is not None and plan.moved_m is not None and plan.plan.frames == {plan.frame}:
+            start, expected = plan.plan.poses[0], f"{_place(plan.begin)} in the odometry's frame"
+            holds = start.distance(plan.begin) <= START_OFF + plan.moved_m
+            yield Case(holds, plan.exchange, expected, _place(start), "odometry's frame")
 
 
 @rule("rest-resources/plan-none", on=(plans_outside,))

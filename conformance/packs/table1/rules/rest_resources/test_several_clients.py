@@ -20,25 +20,25 @@ from conformance.verdict.run import Run
 @rule("rest-resources/goal-concurrent", on=(concurrent_goal,))
 def goal_concurrent(trace: tuple[ConcurrentGoal, ...]) -> Iterator[Outcome]:
     """Judge that several clients' PUTs of one new goal make one goal, which one DELETE cancels."""
-    for one in trace:
-        statuses = sorted(put.response.status for put in one.puts)
+    for goal in trace:
+        statuses = sorted(put.response.status for put in goal.puts)
         yield Case(
             statuses.count(201) <= 1 and not NEW.isdisjoint(statuses) and set(statuses) <= NEW | REPEATED,
-            next((put for put in one.puts if put.response.status not in NEW | REPEATED), one.puts[0]),
+            next((put for put in goal.puts if put.response.status not in NEW | REPEATED), goal.puts[0]),
             "one 201 or 202, and 200, 202 or 204 for the others that put the same new goal at that moment",
             f"the statuses {', '.join(map(str, statuses))}",
         )
-        if one.read is not None:
-            yield Case(not one.read.differs, one.read.exchange, "the goal that all clients put", one.read.differs)
-        for read in one.cancelled:
+        if goal.read is not None:
+            yield Case(not goal.read.differs, goal.read.exchange, "the goal that all clients put", goal.read.differs)
+        for read in goal.cancelled:
             yield Case(bool(read.differs), read.exchange, "one goal, gone once it is cancelled", "the goal once more")
 
 
 @rule("rest-resources/concurrent-puts", on=(concurrent_goals,))
 def one_goal_is_active(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
     """Judge that of several clients' goals one is active, with id and pose of the same client."""
-    for one in trace:
-        yield Case(not one.differs, one.exchange, "the goal of one client, with its id and its pose", one.differs)
+    for read in trace:
+        yield Case(not read.differs, read.exchange, "the goal of one client, with its id and its pose", read.differs)
 
 
 @rule("rest-resources/concurrent-puts", on=(concurrent_velocities,))

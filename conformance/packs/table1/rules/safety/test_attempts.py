@@ -15,7 +15,7 @@ from conformance.verdict.run import Run
 @rule("safety/limits-refused", on=(attempts,))
 def limits_refused(trace: Quiet) -> Iterator[Outcome]:
     """Judge that a velocity beyond the limits is rejected with 4xx."""
-    return refused(one for one in trace.tried if one.kind == "beyond")
+    return refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
 
 
 @rule("safety/refused-keeps", on=(attempts,))
@@ -35,12 +35,12 @@ def limits_hold(trace: Quiet, run: Run) -> Iterator[Outcome]:
 @rule("safety/unactuated-refused", on=(attempts,))
 def unactuated_refused(trace: Quiet) -> Iterator[Outcome]:
     """Judge that a velocity in a component that the robot does not actuate is rejected with 4xx."""
-    yield from refused(one for one in trace.tried if one.kind == "unactuated")
-    driven = [one for one in trace.tried if one.kind == "driven"]
-    for one in driven:
-        yield Case(True, one.exchange, f"4xx for {one.what}, or that it drives so")
+    yield from refused(attempt for attempt in trace.tried if attempt.kind == "unactuated")
+    driven = [attempt for attempt in trace.tried if attempt.kind == "driven"]
+    for attempt in driven:
+        yield Case(True, attempt.exchange, f"4xx for {attempt.what}, or that it drives so")
         yield Note("the robot reaches a velocity that its statement leaves out")
-    if not driven and all(one.kind != "unactuated" for one in trace.tried):
+    if not driven and all(attempt.kind != "unactuated" for attempt in trace.tried):
         yield NotClaimed("does not apply: by its statement the robot actuates all six components, so each is driven")
 
 
@@ -63,7 +63,7 @@ def not_acceptable_undone(trace: Quiet, run: Run) -> Iterator[Outcome]:
 
 
 def _nothing_moved(trace: Quiet, run: Run, kind: str) -> Iterator[Outcome]:
-    if any(one.kind == kind for one in trace.tried):
+    if any(attempt.kind == kind for attempt in trace.tried):
         yield from nothing_moved(trace, motion_map_of(said_of(run)), kind)
     else:
         yield Note(f"no attempt of this kind was made: {kind}")

@@ -83,11 +83,11 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
         longest_s = (limits.hold_s or 0.0) + longer_s(limits) + 2 * _period_s(drive)
         wanted = velocity_of(drive.wanted)
         late = [
-            one
-            for one in drive.after
-            if one.sent > last.answered + longest_s
-            and one.speeds
-            and is_near(limits, velocity_of(one.speeds), wanted, _OFF)
+            reading
+            for reading in drive.after
+            if reading.sent > last.answered + longest_s
+            and reading.speeds
+            and is_near(limits, velocity_of(reading.speeds), wanted, _OFF)
         ]
         seen = (late or drive.after)[-1]
         yield Case(
@@ -101,19 +101,19 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 def _let_go(trace: Driven) -> tuple[Drive, ...]:
     """Return the drives that were let go and whose commands were accepted; others are judged by their responses."""
-    return tuple(one for one in trace.let_go if one.after and all(command.accepted for command in one.commands))
+    return tuple(drive for drive in trace.let_go if drive.after and all(command.accepted for command in drive.commands))
 
 
 def _apart(trace: Driven) -> tuple[tuple[Drive, ...], tuple[Drive, ...]]:
     """Return the drives that were let go beside velocities that the robot refused, and the others."""
     drives = _let_go(trace)
-    return tuple(one for one in drives if one.refused), tuple(one for one in drives if not one.refused)
+    return tuple(drive for drive in drives if drive.refused), tuple(drive for drive in drives if not drive.refused)
 
 
 def _period_s(drive: Drive) -> float:
     """Return the time from one odometry sample to the next, s."""
-    seen = [one for one in drive.under_way if one.stamp is not None]
-    stamps = {one.stamp for one in seen}
+    seen = [reading for reading in drive.under_way if reading.stamp is not None]
+    stamps = {reading.stamp for reading in seen}
     lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0
     return min(lasted_s / max(1, len(stamps) - 1), LONGEST_SAMPLE_S)
 
@@ -121,8 +121,8 @@ def _period_s(drive: Drive) -> float:
 @rule("safety/cancel", on=(goal_life,))
 def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
     """Judge that the robot stands still after its goal was cancelled."""
-    for one in judged(trace):
-        yield from outcomes("safety/cancel", one.drive, said_of(run).limits)
+    for cancellation in judged(trace):
+        yield from outcomes("safety/cancel", cancellation.drive, said_of(run).limits)
 
 
 def judged(trace: GoalLife) -> tuple[Cancelled, ...]:
@@ -130,13 +130,13 @@ def judged(trace: GoalLife) -> tuple[Cancelled, ...]:
 
     Where a response was late, the DELETE may have been late on its way to the robot as well: another one is judged.
     """
-    return tuple(one for one in trace.cancelled if not one.late) or trace.cancelled[-1:]
+    return tuple(cancellation for cancellation in trace.cancelled if not cancellation.late) or trace.cancelled[-1:]
 
 
 @rule("safety/stop-answered", on=(straight,))
 def stop_answered(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge how long the responses to zero velocity take."""
-    stops = [one.exchange for one in trace.drive.commands if one.velocity == STILL and not one.renewal]
+    stops = [command.exchange for command in trace.drive.commands if command.velocity == STILL and not command.renewal]
     return answered_in_time(stops, run)
 
 
@@ -149,7 +149,7 @@ def cancel_answered(trace: GoalLife, run: Run) -> Iterator[Outcome]:
 def answered_in_time(exchanges: Sequence[Exchange], run: Run) -> Iterator[Outcome]:
     """Judge that at most one response takes too long: a network may lose one request, and its sender sends it again."""
     longest_s = said_of(run).limits.settle_s + _ANSWERED_S + _USUAL * run.effort.usual_ms / 1000
-    late = [one for one in exchanges if one.response.elapsed_ms / 1000 > longest_s]
+    late = [exchange for exchange in exchanges if exchange.response.elapsed_ms / 1000 > longest_s]
     if len(late) == len(exchanges) == 1:
         yield NotTested("the only response was late, which may be the network's doing")
     elif exchanges:

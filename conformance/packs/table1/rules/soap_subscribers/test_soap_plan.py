@@ -131,7 +131,7 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
     for mark in _MARKS:
         message = delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=f"{_LONG}{mark}")
         answer = call_valid(subscribers, message)
-        others = [one for one in _MARKS if one != mark and one.encode() in answer.exchange.response.body]
+        others = [text for text in _MARKS if text != mark and text.encode() in answer.exchange.response.body]
         judge.check(
             "soap-subscribers/plan-none",
             not others,

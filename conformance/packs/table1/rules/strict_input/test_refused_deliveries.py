@@ -27,14 +27,14 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
         yield Note(f"judged by the responses alone: {reason}")
         return
     seen = trace.seen or ()
-    for one in trace.by_method:
-        accepted = one.exchange.response.ok and one.method not in SAFE_METHODS
+    for count in trace.by_method:
+        accepted = count.exchange.response.ok and count.method not in SAFE_METHODS
         expected = "no DeliveryRequestMsg on ROS: only a PUT to the path that the contract has starts a delivery"
-        yield Case(one.delivery not in seen or accepted, one.exchange, expected, "a message", one.method)
+        yield Case(count.delivery not in seen or accepted, count.exchange, expected, "a message", count.method)
     yield from _without_effect(trace, lambda _: True)
-    unknown = [one for one in seen if one not in trace.known]
+    unknown = [delivery for delivery in seen if delivery not in trace.known]
     # A single delivery that resembles none of the suite's may be another client's.
-    found = [one for one in unknown if _resembles(one)] or (unknown if len(unknown) > 1 else [])
+    found = [delivery for delivery in unknown if _resembles(delivery)] or (unknown if len(unknown) > 1 else [])
     accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
     observed = f"{len(found)} messages, among them {found[0]}" if found else ""
     yield Case(not found, accepted_first, "no message for an invalid delivery", observed)
@@ -43,16 +43,16 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
 @rule("soap-basic-profile/authentication", on=(counted_deliveries,))
 def unauthorized_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a SOAP delivery without credentials makes no message."""
-    return _without_effect(trace, lambda one: one.what == NO_CREDENTIALS)
+    return _without_effect(trace, lambda rejection: rejection.what == NO_CREDENTIALS)
 
 
 def _without_effect(trace: CountedDeliveries, which: Callable[[Rejected], bool]) -> Iterator[Outcome]:
     """Judge that messages with valid values that the robot rejected for another reason are not published."""
-    for one in trace.rejected if _shown(trace) else ():
-        if which(one) and one.is_rejected:
-            arrived = one.delivery in (trace.seen or ())
-            expected = f"no DeliveryRequestMsg for a rejected SOAP message with {one.what}"
-            yield Case(not arrived, one.exchange, expected, "a message", one.what)
+    for rejection in trace.rejected if _shown(trace) else ():
+        if which(rejection) and rejection.is_rejected:
+            arrived = rejection.delivery in (trace.seen or ())
+            expected = f"no DeliveryRequestMsg for a rejected SOAP message with {rejection.what}"
+            yield Case(not arrived, rejection.exchange, expected, "a message", rejection.what)
 
 
 @rule("http/not-acceptable-undone", on=(counted_deliveries,))

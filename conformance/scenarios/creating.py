@@ -1,0 +1,86 @@
+"""Create one thing, and find the path by which it is read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container
+from dataclasses import replace
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+from conformance.api.rest.inputs import usual_inputs, whole_body
+from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.references import is_free_text
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import identified
+from conformance.api.rest.variations import Kind, Variation
+from conformance.documents.json_schema import Schema
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.representation import flat
+from conformance.scenarios.special_bodies import TEXTS, with_owned
+from conformance.scenarios.survey import Probe, Surveyor
+from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.reach import is_same, joined, path_of
+
+
+def created_path(
+    surveyor: Surveyor, create: Operation, read: Operation, statuses: Container[int] = frozenset({201})
+) -> str:
+    """Create a thing; return the path by which it is read, as far as the response says where it is, or nothing.
+
+    Args:
+        surveyor: sends the requests.
+        create: operation that creates it.
+        read: operation that reads it.
+        statuses: of a creation that counts. With 202, a thing may come later, or end by itself.
+    """
+    made: Probe | None = None
+    usual = usual_inputs(create, surveyor.values)[:2]
+    body = with_texts(create, usual[0].body)
+    # Create it with all members, so that each can be written and removed.
+    whole = whole_body(create, surveyor.values)[1]
+    whole = whole if isinstance(whole, dict) else usual[0].body
+    whole = with_texts(create, whole) or whole
+    owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
+    for inputs in (*(replace(usual[0], body=item) for item in (owned, body) if item), *usual):
+        made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
+        if made.ok:
+            break
+    if made is None or made.exchange is None or made.status not in statuses:
+        return ""
+    return located(surveyor.api, read, made.exchange)
+
+
+def located(api: RestInterface, read: Operation, made: Exchange) -> str:
+    """Return the path of a created thing, as far as the response tells its location, or an empty text."""
+    sent, answer = made.request.url, made.response
+    location, targets = answer.header("location"), []
+    if location and is_same(joined(sent, location), sent):
+        targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
+    if id_ := identified(read_json(answer.body).value, read)[1]:
+        base = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/")
+        targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
+    pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
+    usable = list(dict.fromkeys(target for target in targets if re.fullmatch(pattern, target)))
+    # The Location header may be wrong, so try it.
+    found = (text for text in usable if len(usable) == 1 or api.send(Outgoing("GET", text)).response.ok)
+    return next(found, "")
+
+
+def with_texts(create: Operation, body: Any) -> Any:
+    """Return a JSON object with non-ASCII texts in place of its texts, or None."""
+    media_type = next(iter(create.bodies), "")
+    if not is_json(media_type) or not isinstance(body, dict):
+        return None
+    schema = create.bodies[media_type].schema
+    changed = {**body, **other_texts(schema, body)}
+    return changed if changed != body and fits(schema, changed) else None
+
+
+def other_texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
+    """Return another text, beyond ASCII, for each free text of an object."""
+    parts = flat(schema).get("properties", {})
+    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
+    found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
+    return {name: texts[0] for name, texts in found.items() if texts}
