@@ -249,7 +249,7 @@ class SoapMemory:
                     if told.get(name):
                         yield from self._compared(act, writer, write, name, exchange, _joined(told[name]), text)
                 for name in writer.sent.keys() & told.keys() - write.values.keys() - write.key.keys():
-                    # A device that keeps texts of any kind keeps none that its program has written for nothing.
+                    # If a device has stored several texts, "None" for a left-out member comes from its program.
                     is_none = writer.sent[name].builtin in STRINGS and _NO_TEXTS.intersection(told[name])
                     if is_none and len(self._past[writer.noun, act.label, name].kept) >= _KEPT:
                         expected = f"no {name}, since {writer.operation.name} wrote none, or an older one"

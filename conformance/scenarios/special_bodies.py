@@ -220,7 +220,7 @@ def _nulls(
     for name in [text for text in changed if isinstance(changed[text], list) and changed[text] != usable[text]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
     for name, given in ((text, entry_of(flat(parts[text]))) for text in usable if text not in own):
-        # Add an entry to a map beside the existing one, then remove all.
+        # Add two entries to a map; remove one of them beside another new one; then remove all.
         entry = sample(given) if given is not None else None
         if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):
             yield {name: dict.fromkeys(_KEYS[:2], entry)}

@@ -236,7 +236,7 @@ class HttpClient:
         authorized: bool = True,
         timeout_s: float | None = None,
     ) -> Exchange:
-        """Send a request and return it with the complete response, that to the last try if the device puts it off.
+        """Send a request and return it with the complete response; if the device puts it off, to the last try.
 
         Args:
             method: any token.

@@ -139,7 +139,7 @@ class Fetcher:
             self._connection.recorder.record(Passage(request, *link, None, problem, heard=Heard.NEVER))
 
     def _hint(self, url: str, status: int) -> str:
-        """Return a hint by a status on the way to the device, or on the option for the demanded credentials."""
+        """Return a hint for a status: a proxy cannot reach the device, or the option for the demanded credentials."""
         if status in {httpx.codes.BAD_GATEWAY, httpx.codes.SERVICE_UNAVAILABLE, httpx.codes.GATEWAY_TIMEOUT}:
             return ": a proxy answers, and the device behind it does not"
         if status not in {httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN}:

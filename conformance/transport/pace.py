@@ -17,7 +17,7 @@ _SLOWEST_OCTETS_PER_S = 256 * 1024
 _UNDER_WAY = 1024 * 1024
 # A response is late if it takes twice the usual time plus this, s: TCP may have to repeat a segment.
 _LATE_S = 0.1
-#: An endpoint that reached HANGS deadlines within _HANGS_WITHIN_S is not called until that time is over; the time
+#: An endpoint that let HANGS deadlines pass within _HANGS_WITHIN_S is not called until that time is over; the time
 #: doubles with each further hang. Two failures far apart in a long run do not count.
 HANGS: Final = 2
 _HANGS_WITHIN_S: Final = 60.0

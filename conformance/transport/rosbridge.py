@@ -121,9 +121,9 @@ class BridgeClient(HttpClient):
         return (status, last["_octets"]) if last else (None, b"")
 
     def _told(self, link: Stream, refused: HTTPStatus, within_s: float = 0.0) -> tuple[HTTPStatus | None, bytes]:
-        """Return whether the last message was refused, by a status message of the level "error".
+        """Return `refused` and the status message if its level is "error"; otherwise 200, for the last message sent.
 
-        With a time, s, it has to be known; without, silence tells that it was not.
+        With ``within_s``, silence gives None, because the outcome is not known. Without it, silence gives 200.
         """
         behind = f"behind-{next(self._numbers)}"
         self._say(link, op="call_service", id=behind, service=_BEHIND)

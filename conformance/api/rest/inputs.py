@@ -158,7 +158,7 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
 
 
 def _with_files(value: Any, body: Body, media_type: str) -> Any:
-    """Return a form's value with bytes where the schema asks for a file, and a file of a media type that is one."""
+    """Return a form's value with bytes where the schema asks for a file; a file if the whole body must be one."""
     if is_made(media_type):
         return file_of(media_type)
     if media_type != MULTIPART or not isinstance(value, dict):

@@ -155,7 +155,7 @@ def alike_and_apart(schema: Schema) -> tuple[list[Any], list[Any]]:
 
 
 def _another(schema: Schema, item: Any, others: list[Any]) -> Any:
-    """Return an item that differs from the given ones, if one can be made."""
+    """Return an item that differs from the given ones; the item itself if none can be made."""
     number = len(others)
     numbered = item + number if isinstance(item, int | float) else f"{item}{number}" if isinstance(item, str) else item
     candidates = [item, *flat(schema).get("enum", ()), numbered]
