@@ -90,6 +90,7 @@ class VelocityFinder(Finder):
         found: dict[str, dict[tuple[str, str], Response]] = {}
         refused: dict[str, NotPossibleError] = {}
         self._settle_s, self._first = 0.3, dict[str, float]()
+        self._other_way = dict[str, None]()
         for number in self._plan.numbers:
             try:
                 drives = self._forth_and_back(number)
@@ -151,10 +152,15 @@ class VelocityFinder(Finder):
                     )
                     for speed, rested, begun, ended, done in drives
                 ]
-                response = agreed(seen)
                 named = place.rpartition("/")[2].partition(ANGLE)[0]
-                if response is not None and not ECHO.search(f"{operation} {place}") and is_axis(named or "value"):
+                if ECHO.search(f"{operation} {place}") or not is_axis(named or "value"):
+                    continue
+                if (response := agreed(seen)) is not None:
                     found[operation, place] = response
+                if all(one is not None and one.is_position for one in seen) and any(
+                    one.ratio < 0 for one in seen if one
+                ):
+                    self._other_way[f"{place} of {operation}"] = None
         return found
 
     def _measured(self, responses: Mapping[str, Mapping[tuple[str, str], Response]]) -> dict[str, tuple[str, Response]]:
@@ -172,6 +178,7 @@ class VelocityFinder(Finder):
             tried = ", ".join(f"{command.name} at {command.little:g}" for command in self._plan.numbers)
             raise NotPossibleError(
                 f"{self._plan.drive.label} was accepted ({tried}), and no number of {', '.join(counts)} changed with it"
+                f"{self._reversed}"
             )
         self._reads = [one for one in self._reads if one.label == read]
         own = {
@@ -196,8 +203,15 @@ class VelocityFinder(Finder):
                 self._found.notes.append(f"{one.name} stays 0: {why}.")
         found = {name: one for name, one in shown.items() if one}
         if not found:
-            raise NotPossibleError(f"{read} changes when the device is driven, but no number of it is an axis' own")
+            raise NotPossibleError(
+                f"{read} changes when the device is driven, but no number of it is an axis' own{self._reversed}"
+            )
         return found
+
+    @property
+    def _reversed(self) -> str:
+        """What is said of numbers that moved against the sign of a velocity; empty: none did."""
+        return f"; against the sign that was commanded moved {', '.join(self._other_way)}" if self._other_way else ""
 
     def _shown(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
         velocities = {place: one for place, one in own.items() if not one.is_position and 1 / _NEAR < one.ratio < _NEAR}

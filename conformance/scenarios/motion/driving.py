@@ -64,11 +64,17 @@ def with_room(
 
 def _learn(mapped: MappedDevice, name: str) -> None:
     """Drive slowly for a moment at a velocity whose axes the map does not name, and note which ones it changes."""
-    drives, room = mapped.drives, mapped.room
-    room.unknown.discard(name)
+    drives = mapped.drives
+    mapped.room.unknown.discard(name)
     speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}
     mapped.bring_home()
     mapped.come_to_rest()  # a device that has nearly arrived may not accept velocities yet
+    driven_for_a_moment(mapped, speeds)
+
+
+def driven_for_a_moment(mapped: MappedDevice, speeds: Mapping[str, float]) -> list[Reading]:
+    """Drive at a velocity, learn which axes it changes, and come to rest; return the readings under way."""
+    drives, room = mapped.drives, mapped.room
     command, seen = mapped.drive(speeds), list[Reading]()
     until = command.answered + drives.settle_s + _LEARNED_S
     while command.accepted and (mapped.clock.now() < until or len(seen) < SEVERAL):
@@ -79,6 +85,7 @@ def _learn(mapped: MappedDevice, name: str) -> None:
         command = mapped.drive(speeds)
     mapped.drive({})
     mapped.come_to_rest()
+    return seen
 
 
 def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from conformance.scenarios.motion.driving import with_room
+from conformance.scenarios.motion.driving import driven_for_a_moment, with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
-from conformance.scenarios.motion.measuring import steady_since
+from conformance.scenarios.motion.measuring import end_of_travel, steady_since
 from conformance.scenarios.motion.moves import need_positions, recorded
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
 from conformance.scenarios.motion.velocities import MEASURED_S
@@ -99,4 +99,21 @@ def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
 
     seen = mapped.watch(commands[-1].answered + lasts_s, is_over)
     end, since = mapped.drive({}), reached(seen)
-    return Drive("velocities of several clients", {}, tuple(commands), tuple(seen), end, (), since=since)
+    at_end = since is None and any(_is_at_end(mapped, command.targets, seen) for command in commands)
+    what = "velocities of several clients"
+    return Drive(what, {}, tuple(commands), tuple(seen), end, (), since=since, at_end=at_end)
+
+
+def _is_at_end(mapped: MappedDevice, speeds: Position, seen: list[Reading]) -> bool:
+    """Return whether a device that stands also does so if one client alone drives it: then its travel ends there."""
+
+    def stands(readings: list[Reading]) -> bool:
+        found = (end_of_travel(readings, name, wanted, mapped.motion, ()) for name, wanted in speeds.items())
+        return any(place is not None for place in found)
+
+    if not stands(seen):
+        return False
+    mapped.come_to_rest()
+    alone = driven_for_a_moment(mapped, speeds)
+    mapped.room.ends(speeds, alone)
+    return stands(alone)

@@ -136,6 +136,7 @@ class Drive:
         resting: what the device shows at rest.
         since: when it had reached the velocity, or else had to, s; None: the time to settle after the first response.
         rested: since when it was seen at rest, where nobody looked for longer, s; None: until after it had to rest.
+        at_end: whether it stood at an end of its travel that nobody declared.
     """
 
     what: str
@@ -149,6 +150,7 @@ class Drive:
     resting: Resting = Resting()
     since: float | None = None
     rested: float | None = None
+    at_end: bool = False
 
     @property
     def named(self) -> str:
