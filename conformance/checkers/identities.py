@@ -20,8 +20,8 @@ from conformance.verdict.evidence import Case
 _IDS: Final = frozenset({"id", "uuid", "guid"})
 # Identifiers of a run that are remembered.
 _REMEMBERED: Final = 50_000
-# _TAKEN: statuses that refuse a creation with a value in use. _FEW: refused bodies that are remembered. Below: bytes of
-# each.
+# _TAKEN: statuses that refuse a creation with a value in use. _FEW: bodies of each path that are kept. Below: bytes
+# of each.
 _TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
 _FEW: Final = 8
 _OCTETS: Final = 16_384

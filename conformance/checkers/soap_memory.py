@@ -27,9 +27,9 @@ from conformance.verdict.evidence import Case, case
 # _KEPT: values that must be stored before another counts as lost. _SEEN: how often another value must be read.
 _KEPT: Final = 2
 _SEEN: Final = 2
-# If a value reads the same this often, whatever is written, it counts as read-only.
+# If this many reads give the same value, whatever was written, the device never stores it.
 _LOST: Final = 6
-# _FEW: values that are read immediately; a read of the others may come too late if one fails.
+# _FEW: a value with fewer prompt reads for each late one changes in steps. Texts up to this length identify nothing.
 _FEW: Final = 3
 _MOST: Final = 1_000
 # Things of a list that are compared one by one, and reads of a list that show whether it changes by itself.

@@ -37,7 +37,7 @@ _MOST_OCTETS: Final = 65_536
 _SEEN: Final = 2
 # Whole numbers beyond this are not exact as doubles (RFC 8259 6).
 _EXACT: Final = 2**53
-# _EQUAL: doubles with a smaller difference are equal. _CLOSE: with a larger one, the difference is no rounding.
+# Relative differences of doubles. _EQUAL: smaller ones do not count. _CLOSE: larger ones are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
 #: Phrases in a description on members that a PUT leaves out.
 GONE: Final = re.compile(

@@ -38,7 +38,7 @@ _READ_S: Final = 3.0
 _READS_S: Final = 60.0
 _DISCOVERY_S: Final = 15.0
 _SETTLES_S: Final = 1.0
-# _COMMON: names that every ROS node has. _PARAMETER: names of its parts.
+# _COMMON: names that every ROS node has. _PARAMETER: a parameter of a path.
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")

@@ -79,7 +79,7 @@ class Request:
         url: absolute URL with the request target as sent.
         headers: (name, value) pairs in sending order, with variables in place of credentials.
         body: request body.
-        raw: the bytes on the socket if the request was written by hand and is not plain HTTP; otherwise empty.
+        raw: the bytes on the socket if the request was written by hand and is not plain HTTP; otherwise None.
         query: what credentials add to the URL, with variables in their place.
     """
 

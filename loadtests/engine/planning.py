@@ -21,7 +21,7 @@ _STALL_S = 3.0  # users of an open model suffice for a stall of this length befo
 
 
 def duel_plan(settings: Settings, *robots: Robot) -> tuple[Plan, list[str]]:
-    """Return the plan that compares two interfaces or robots, and notes on comparisons that are impossible."""
+    """Return the plan that compares two interfaces or robots, and notes on what cannot be measured."""
     wanted = settings.selection
     workers = max(1, settings.generator.expect)
     interfaces, offers, missing = [], {}, set()

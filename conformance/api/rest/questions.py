@@ -21,7 +21,7 @@ from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import BUSY, Outgoing, Response
 from conformance.transport.parallel import Addressed
 
-# _MARK: start of values that only one client sends. _UNKNOWN: unknown members of a response that are reported.
+# _MARK: start of values that only one client sends. _UNKNOWN: questions for unknown paths.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
 # Characters of a mismatch that a message shows.

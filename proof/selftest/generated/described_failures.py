@@ -11,7 +11,7 @@ from proof.selftest.generated.mutant import Mode, Tally
 from proof.selftest.generated.places import Exchange
 
 _SUCCESS, _BAD_REQUEST = range(200, 300), 400
-# _HANGS_S: how long a hanging mutant waits, s: longer than any deadline. _LATER_S: delay added after each request.
+# _HANGS_S: how long a hanging mutant waits, s: longer than a request's deadline. _LATER_S: delay after each request.
 # _LATEST_S: longest delay.
 _HANGS_S, _LATER_S, _LATEST_S = 30.0, 0.002, 0.4
 _TRACEBACK = json.dumps(

@@ -19,7 +19,7 @@ RARE: Final = 20
 ERROR: Final = 400
 _FROM: Final = 30
 _PAUSE_S: Final = 1.0
-# _SPELL_S: first seconds of each period in which a fault strikes. _OF_S: length of the period, s.
+# _SPELL_S: last seconds of each period in which a fault strikes. _OF_S: length of the period, s.
 _SPELL_S: Final = 2.0
 _OF_S: Final = 10.0
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})

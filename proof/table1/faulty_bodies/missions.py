@@ -170,7 +170,7 @@ class _DeliveryLost(Body):
         self._last = 0.0
 
     def deliver(self, interface: str, **request: float) -> None:
-        """Store a delivery, unless another was stored a moment before."""
+        """Store a delivery, unless another arrived a moment before."""
         lost, self._last = time.time() - self._last < _SOON_S, time.time()
         if not lost:
             super().deliver(interface, **request)

@@ -35,7 +35,7 @@ _END_OFF: Final = 0.3
 _POSES: Final = 200
 _VELOCITIES: Final = 320
 _READ: Final = 4
-# _TURNS: states read over SOAP just after a refused request, and just after one that acts.
+# _TURNS: of this many turns, one begins with a refused request, and one with a request that acts.
 _TURNS: Final = 5
 _NOT_ACCEPTABLE: Final = (("Accept", "image/png"),)
 # _ALONE: reads of each state over REST before and after. _ROUNDS: rounds of several clients. Below: share of their
