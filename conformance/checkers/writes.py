@@ -389,7 +389,8 @@ class Writes:
             if value is None:
                 default = flat(_parts(item.shape).get(name) or {}).get("default")
                 expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
-                is_kept = same(now, was) and not same(was, default)
+                # An empty value may be how the device shows that there is none.
+                is_kept = same(now, was) and not same(was, default) and was not in ("", [], {})
                 wrong = f"{shown(was)} as {name}" if is_kept and change.is_settled(name, change.sent) else ""
             elif isinstance(value, dict) and isinstance(was, dict) and isinstance(now, dict):
                 made = merged(was, value)

@@ -6,7 +6,6 @@ The draft draft-ietf-httpapi-idempotency-key-header, 2.6, says what a device doe
 from __future__ import annotations
 
 import re
-import uuid
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,13 +16,13 @@ from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import Inputs, renewed, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
-from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, identified
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.scenarios.creating import located
+from conformance.scenarios.reaching import key_of, new_key
 from conformance.scenarios.refusing import is_ours, is_refused
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.special_bodies import half_valid
@@ -91,16 +90,6 @@ def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
     if not found:
         raise NoOccasionError("no operation with a parameter Idempotency-Key answered with what it has made")
     return tuple(found)
-
-
-def key_of(operation: Operation) -> Parameter | None:
-    """Return the header parameter of an operation that is its idempotency key, or None."""
-    named = (
-        parameter
-        for parameter in operation.parameter("header")
-        if plain_name(parameter.name).endswith("idempotencykey")
-    )
-    return next(named, None)
 
 
 @dataclass
@@ -219,12 +208,7 @@ class _Rounds:
 
     def _keys(self) -> list[str]:
         """Return keys that the device does not know, as far as the schema allows them."""
-        found = []
-        for _ in range(2 * _KEYS + 1):
-            text = str(uuid.uuid4())
-            candidates = (text, f'"{text}"', text.replace("-", ""), text[:8])
-            found += [next((candidate for candidate in candidates if fits(self.key.schema, candidate)), "")]
-        return [one for one in found if one]
+        return [text for _ in range(2 * _KEYS + 1) if (text := new_key(self.key))]
 
     def _bodies(self, turn: int) -> list[Inputs]:
         """Return inputs with three different bodies, or one if the body cannot vary."""

@@ -1,18 +1,25 @@
-"""Make requests succeed: with new values for unique members, and with the current entity tag."""
+"""Make requests succeed: with new values for unique members and keys, known things, and the current entity tag."""
 
 from __future__ import annotations
 
+import uuid
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
+from urllib.parse import unquote
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import Inputs, renewed, written
+from conformance.api.rest.calls import value_text
+from conformance.api.rest.inputs import Inputs, parameter_verdict, renewed, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.samples import fits
+from conformance.api.rest.validity import VALID
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Variation
 from conformance.checkers.untouched import ALONE, OFTEN, keeps_all
 from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.writing import path_text
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Outgoing
 from conformance.verdict.time_limit import TimeIsOverError
@@ -44,14 +51,45 @@ class Reaching:
     _tags: dict[str, str] = field(default_factory=dict)
 
     def request(self, operation: Operation, variation: Variation) -> Outgoing:
-        """Return the request of a variation, with the entity tag of its resource if it has or needs If-Match.
+        """Return the request of a variation, with the entity tag of its resource if it has or needs If-Match."""
+        request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
+        return request if variation.place.lower() == f"header {_IF_MATCH}" else self._current(operation, request)
+
+    def generated(self, operation: Operation, request: Outgoing) -> Outgoing:
+        """Return a generated request with what only the device or the run knows: its thing, a new key, the tag.
+
+        Otherwise 404, 412 or the refusal of a repeated key would hide what the request is about. DELETE keeps its path:
+        the things that are there are still needed.
+        """
+        has_more = operation.bodies or len(operation.parameter("path")) < len(operation.parameters)
+        if has_more and operation.method != "DELETE":
+            path, mark, query = request.target.partition("?")
+            parts, steps = path.split("/"), operation.template.split("/")
+            known = [self._known(operation, step, part) for step, part in zip(steps, parts, strict=False)]
+            request = replace(request, target="/".join(known + parts[len(known) :]) + mark + query)
+        key = key_of(operation)
+        given, others = _without(request, key.name) if key is not None else ([], ())
+        if key is not None and any(fits(key.schema, text) for text in given):
+            new = new_key(key)
+            request = replace(request, headers=(*others, (key.name, new)) if new else others)
+        return self._current(operation, request)
+
+    def _known(self, operation: Operation, step: str, part: str) -> str:
+        """Return a part of a path, with the known thing in place of a valid text that names none."""
+        parameter = next((one for one in operation.parameter("path") if step == f"{{{one.name}}}"), None)
+        if parameter is None or parameter_verdict(operation, parameter, unquote(part)) != VALID:
+            return part
+        known, ids = self.values.of(operation, parameter), self.values.known_ids(operation, parameter)
+        found = [one for one in known if one in ids] or known
+        return path_text(value_text(parameter, found[0]), parameter.style) if found else part
+
+    def _current(self, operation: Operation, request: Outgoing) -> Outgoing:
+        """Return a request with the entity tag of its resource if it has or needs If-Match.
 
         With any other tag in If-Match, the device would refuse it (RFC 9110 13.1.1).
         """
-        request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
-        others = tuple(pair for pair in request.headers if pair[0].lower() != _IF_MATCH)
-        needs = len(others) < len(request.headers) or operation.label in self.wants_tag
-        if operation.safe or not needs or variation.place.lower() == f"header {_IF_MATCH}":
+        given, others = _without(request, _IF_MATCH)
+        if operation.safe or not (given or operation.label in self.wants_tag):
             return request
         path = request.target.partition("?")[0]
         if path not in self._tags:
@@ -100,3 +138,26 @@ class Reaching:
                     self.api.send(request)
                 for read in reads:
                     self.api.send(Outgoing("GET", read.template))
+
+
+def _without(request: Outgoing, name: str) -> tuple[list[str], tuple[tuple[str, str], ...]]:
+    """Return the values of a header of a request, and the other headers."""
+    others = tuple(pair for pair in request.headers if pair[0].lower() != name.lower())
+    return [pair[1] for pair in request.headers if pair not in others], others
+
+
+def key_of(operation: Operation) -> Parameter | None:
+    """Return the header parameter of an operation that is its idempotency key, or None."""
+    named = (
+        parameter
+        for parameter in operation.parameter("header")
+        if plain_name(parameter.name).endswith("idempotencykey")
+    )
+    return next(named, None)
+
+
+def new_key(key: Parameter) -> str:
+    """Return an idempotency key that the device does not know; empty if the schema allows none that is made here."""
+    text = str(uuid.uuid4())
+    candidates = (text, f'"{text}"', text.replace("-", ""), text[:8])
+    return next((candidate for candidate in candidates if fits(key.schema, candidate)), "")

@@ -192,7 +192,8 @@ class Surveyor:
     paged: list[Paged] = field(default_factory=list)
 
     @cached_property
-    def _reaching(self) -> Reaching:
+    def reaching(self) -> Reaching:
+        """What makes requests succeed."""
         return Reaching(self.api, self.values)
 
     @property
@@ -215,7 +216,7 @@ class Surveyor:
             PartialTraceError: the device does not respond any more.
         """
         by_inputs = request is None
-        request = request or self._reaching.request(operation, variation)
+        request = request or self.reaching.request(operation, variation)
         probe, losses = self._described(operation, variation, request), self.api.run.losses
         try:
             # A device may handle the first request on a connection differently.
@@ -240,7 +241,7 @@ class Surveyor:
                 raise PartialTraceError(self.trace) from none
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
-        if doubted and by_inputs and self._reaching.finds_new(operation, self.usual[operation.label]):
+        if doubted and by_inputs and self.reaching.finds_new(operation, self.usual[operation.label]):
             return self.send(operation, variation, fresh=fresh)
         self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
         self._note(operation, variation.kind, request, exchange)
@@ -259,9 +260,9 @@ class Surveyor:
             self.values.learn(operation, exchange)
             self.values.accepted(operation, request)
         elif status in REFUSALS:
-            self._reaching.refused(status, operation, request)
+            self.reaching.refused(status, operation, request)
         if not operation.safe and status not in REFUSALS - WANTS_CONDITION:
-            self._reaching.acted()
+            self.reaching.acted()
 
     def _is_single(self, operation: Operation) -> bool:
         """Return whether a creation that succeeded is refused the second time, as where names are unique."""
@@ -328,9 +329,9 @@ class Surveyor:
         tried, statuses = usual_inputs(operation, self.values)[:4], self.api.usual_status
         yield from tried
         if statuses.get(operation.label) in WANTS_CONDITION and not operation.safe:
-            self._reaching.wants_tag.add(operation.label)
+            self.reaching.wants_tag.add(operation.label)
             yield tried[0]
-        if statuses.get(operation.label) == CONFLICT and self._reaching.finds_new(operation, tried[0]):
+        if statuses.get(operation.label) == CONFLICT and self.reaching.finds_new(operation, tried[0]):
             yield usual_inputs(operation, self.values)[0]
 
     def cut_short(self, what: str) -> None:
@@ -400,14 +401,14 @@ class Surveyor:
                 self.send(operation, most)
         if is_json(usual.media_type) and operation.label not in self.given_up:
             shown = Variation(Kind.OPTIONAL, "with a charset", _CHARSET, usual)
-            request = self._reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
+            request = self.reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
         # An optional body may be ignored.
         is_judged = is_usable and operation.body_required and "415" in operation.responses
         types = [one for one in _OTHER_TYPES if is_judged and not {one, "text/*", "*/*"} & operation.bodies.keys()]
         for media_type in types[: 1 if self.api.run.effort.name == "quick" else None]:
             other = Variation(Kind.INVALID, f"{media_type}, which is not declared, with 415 declared", _CHARSET, usual)
-            self.send(operation, other, self._reaching.request(operation, other).having_type(media_type))
+            self.send(operation, other, self.reaching.request(operation, other).having_type(media_type))
         # Optional inputs then have their defaults, more than once.
         least = least_inputs(operation, usual)
         for inputs in [usual] if least is None else [least] * 2:
@@ -542,7 +543,6 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
         item.label: item for item in operations_of(run.contract) if allowed(api, item) and item.label not in api.streams
     }
     surveyor = Surveyor(api, values)
-
     for target in targets(run.contract):
         operation = operations.get(target.label)
         if operation is None:
@@ -594,6 +594,7 @@ def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
     request, headers = as_request(case), own_headers(case)
     if request is None or headers is None or operation.label in surveyor.given_up:
         return
-    whole = replace(request, headers=headers)
+    whole = replace(request, headers=(*headers, *request.headers))
     if whole not in surveyor.api.judged:
+        whole = surveyor.reaching.generated(operation, whole)
         surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)

@@ -42,7 +42,7 @@ class Values:
     ) -> None:
         self.collections = collections
         self.unique = Unique(collections)
-        self._accepted: dict[str, set[str]] = defaultdict(set)
+        self._accepted: dict[tuple[str, bool], set[str]] = defaultdict(set)
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)
         self._ids: dict[str, list[Any]] = defaultdict(list)
@@ -93,7 +93,7 @@ class Values:
     def accepted(self, operation: Operation, request: Outgoing) -> None:
         """Remember the values of a request that the device accepted."""
         for name, _, text in values_in(operation, request) if request.method == operation.method else ():
-            self._accepted[plain_name(name)].add(text)
+            self._accepted[plain_name(name), operation.safe].add(text)
 
     def invents(self, operation: Operation, request: Outgoing) -> bool:
         """Return whether a request refers to something that the device has not named so far."""
@@ -105,7 +105,9 @@ class Values:
     def _is_known(self, operation: Operation, name: str, schema: Schema, text: str) -> bool:
         plain = plain_name(name)
         known = [*self.references(operation, name, schema), *self._given.get(plain, [])]
-        return text in self._accepted[plain] or text in map(text_of, known)
+        # A read accepts a filter by a thing that does not exist.
+        accepted = self._accepted[plain, False] | (self._accepted[plain, True] if operation.safe else set())
+        return text in accepted or text in map(text_of, known)
 
     def references(self, operation: Operation, name: str, schema: Schema) -> list[Any]:
         """Return values for a reference of this name from earlier responses, the likeliest first."""

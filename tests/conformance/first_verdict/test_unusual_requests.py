@@ -7,6 +7,9 @@ import jsonschema
 from aiohttp import web
 from small_device import REFUSED, answers, certified, described, error, small_device
 
+from conformance.history.events import Sent, read_history
+from conformance.history.writing import HISTORY_NAME
+
 _RESPONSES = {"200": answers({"type": "object"}), "4XX": REFUSED}
 _WHOLE = {"type": "integer"}
 _ITEM = {
@@ -183,3 +186,9 @@ def test_a_right_device_with_unusual_requests_passes(tmp_path):
     assert seen.exit_code == 0
     taken = {one["operation"] for one in seen.result["api"]["operations"] if {"200", "201"} & one["statuses"].keys()}
     assert {one["operation"] for one in seen.result["api"]["operations"]} - taken <= {"GET /locked"}
+    events = [one for one in read_history(tmp_path / "out" / HISTORY_NAME) if isinstance(one, Sent)]
+    generated = [one for one in events if one.span.endswith("[generated_requests]")]
+    types = {(one.url.removeprefix(url), *pair) for one in generated for pair in one.headers}
+    declared = {(path, "Content-Type", media_type) for path, (_, media_type, *_) in _BODIES.items()}
+    # Schemathesis writes no lines of JSON.
+    assert declared - types == {("/lines", "Content-Type", "application/x-ndjson")}

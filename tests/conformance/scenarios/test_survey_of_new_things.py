@@ -3,7 +3,7 @@
 import itertools
 import json
 import re
-from contextlib import closing
+from contextlib import closing, contextmanager
 
 import pytest
 from hypothesis import given, settings
@@ -24,6 +24,7 @@ from conformance.scenarios.writing import Writer
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement
 from conformance.transport.client import Connection, HttpClient
+from conformance.transport.exchange import Outgoing
 from conformance.verdict.run import Run
 
 _MEMBERS = {
@@ -37,6 +38,7 @@ _SCHEMA = {"type": "object", "required": ["code", "label", "slot", "kind"], "pro
 _BODY = {"required": True, "content": {"application/json": {"schema": _SCHEMA}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}
 _TAG = {"name": "If-Match", "in": "header", "required": True, "schema": {"type": "string"}}
+_KEY = {"name": "Idempotency-Key", "in": "header", "schema": {"type": "string"}}
 _OK = {"200": {"description": "it"}}
 
 
@@ -120,15 +122,21 @@ class _Tubes:
         return server_of(Tubes)
 
 
-def _surveyed(tmp_path, device, label, *headers):
-    """Return the probes of an operation that is surveyed at quick, and the values."""
+@contextmanager
+def _surveyor(tmp_path, device, *headers):
+    """Yield what surveys a device at quick, and the operations by label."""
     description = _description(*headers)
     contract = Contract.load(write_described_pack(tmp_path, description, description))
     with device.server() as server, closing(HttpClient(server.url, Connection())) as client:
         statement = Statement(endpoints=Endpoints(rest=server.url), calls=Calls(allow=("*",)))
         run = Run(statement=statement, contract=contract, seed=1)
         surveyor = Surveyor(RestInterface(run, client, alive=lambda: True), Values({}, frozenset({"tube"})))
-        operations = {one.label: one for one in operations_of(contract)}
+        yield surveyor, {one.label: one for one in operations_of(contract)}
+
+
+def _surveyed(tmp_path, device, label, *headers):
+    """Return the probes of an operation that is surveyed at quick, and the status of another creation."""
+    with _surveyor(tmp_path, device, *headers) as (surveyor, operations):
         for one in ("POST /tubes", "PUT /tubes/{id}"):
             for _ in surveyor.explore(operations[one]):
                 pass
@@ -136,6 +144,22 @@ def _surveyed(tmp_path, device, label, *headers):
                 break
         again = Writer(surveyor.api, surveyor.values).send(operations["POST /tubes"])
         return [one for one in surveyor.probes if one.operation == label], again.response.status
+
+
+def test_a_generated_request_names_a_known_thing_and_has_its_tag_and_a_new_key(tmp_path):
+    device = _Tubes(wants_tag=428)
+    with _surveyor(tmp_path, device, _TAG, _KEY) as (surveyor, operations):
+        surveyor.begin(operations["POST /tubes"])
+        fields = (("If-Match", ""), ("Idempotency-Key", "0"), ("Content-Type", "application/json"))
+        body = json.dumps(device.tubes[1]).encode()
+        made = [
+            surveyor.reaching.generated(operations["PUT /tubes/{id}"], Outgoing("PUT", target, fields, body))
+            for target in ("/tubes/7", "/tubes/7?a=/7", "/tubes/null")
+        ]
+        assert [one.target for one in made] == ["/tubes/2", "/tubes/2?a=/7", "/tubes/null"]
+        assert {one.content_type for one in made} == {"application/json"}
+        assert len({dict(one.headers)["Idempotency-Key"] for one in made} - {"0"}) == len(made)
+        assert surveyor.api.send(made[0]).response.status == 200
 
 
 @pytest.mark.parametrize("there", [True, False])
