@@ -12,7 +12,8 @@ from conformance.api.rest.patches import JSON_PATCH
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
-from conformance.scenarios.keys import UNSPENT, key_of
+from conformance.scenarios.keys import UNSPENT
+from conformance.scenarios.reaching import key_of
 from proof.mutation.messages import Change, Forward, Request, Response
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
