@@ -16,6 +16,9 @@ _BACK_SHARE: Final = 0.4
 _BACK_S: Final = 20.0
 # How long a slow drive lasts that shows which axes it changes, s.
 _LEARNED_S: Final = 0.5
+# _TURNS: how often a device is turned at most to find a way back. _ALONG: share of its way that is along an axis then.
+_TURNS: Final = 8
+_ALONG: Final = 0.5
 
 
 def with_room(
@@ -64,12 +67,10 @@ def with_room(
 
 def _learn(mapped: MappedDevice, name: str) -> None:
     """Drive slowly for a moment at a velocity whose axes the map does not name, and note which ones it changes."""
-    drives = mapped.drives
     mapped.room.unknown.discard(name)
-    speeds = {name: min(drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))}
     mapped.bring_home()
     mapped.come_to_rest()  # a device that has nearly arrived may not accept velocities yet
-    driven_for_a_moment(mapped, speeds)
+    driven_for_a_moment(mapped, {name: _slow(mapped, name)})
 
 
 def driven_for_a_moment(mapped: MappedDevice, speeds: Mapping[str, float]) -> list[Reading]:
@@ -88,6 +89,29 @@ def driven_for_a_moment(mapped: MappedDevice, speeds: Mapping[str, float]) -> li
     return seen
 
 
+def _turned_back(mapped: MappedDevice, axis: str, *, forward: bool) -> list[dict[str, float]]:
+    """Return the velocity that takes a device along an axis by what a slow drive shows; turn it until one does."""
+    drives, room, axes = mapped.drives, mapped.room, mapped.motion.state.axes
+    turns = [name for name, speed in drives.axes.items() if speed.of and axes[speed.of].angle]
+    for _ in range(_TURNS):
+        for name, speed in drives.axes.items():
+            if speed.of or not room.greatest(name, axis):
+                continue
+            slow = _slow(mapped, name)
+            seen = driven_for_a_moment(mapped, {name: slow})
+            least, most = room.note_heading({name: slow}, seen[len(seen) // 2 :]).get(axis, (0.0, 0.0))
+            if abs(least + most) / 2 >= _ALONG * room.greatest(name, axis):
+                return [{name: speed.limits[forward == (least + most > 0)] * _BACK_SHARE}]
+        for name in turns:
+            driven_for_a_moment(mapped, {name: drives.axes[name].limits[1] * _BACK_SHARE})
+    return []
+
+
+def _slow(mapped: MappedDevice, name: str) -> float:
+    """Return the slowest velocity that can be measured."""
+    return min(mapped.drives.axes[name].limits[1], MEASURABLE * mapped.motion.speed_tolerance(name))
+
+
 def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
     """Drive along an axis by velocity until the device is in a span; return whether its travel ends before."""
     forward = mapped.where()[axis] < span[0]
@@ -95,7 +119,7 @@ def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
         {name: speed.limits[forward] * _BACK_SHARE}
         for name, speed in mapped.drives.axes.items()
         if speed.of == axis and speed.limits[forward]
-    ]
+    ] or _turned_back(mapped, axis, forward=forward)
     if not speeds:
         raise NotPossibleError(f"no velocity of the map takes {axis} back to where it has room for a drive")
     until, seen = mapped.clock.now() + _BACK_S, [mapped.read() for _ in range(SEVERAL)]

@@ -145,19 +145,24 @@ class Room:
                     self._axes[of], found = structs.replace(self._axes[of], limits=limits), True
         return found
 
-    def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
-        """Learn from readings at a steady velocity which way it takes the device until the next command."""
+    def greatest(self, name: str, axis: str) -> float:
+        """Return how fast a velocity of 1 changed an axis at most so far, per second."""
+        return max(map(abs, self._rates[name].get(axis, (0.0,))))
+
+    def note_heading(self, speeds: Speeds, readings: Sequence[Reading]) -> Mapping[str, Span]:
+        """Learn from readings at a steady velocity which way it takes the device until the next command, by axis."""
         driven = {name: speed for name, speed in speeds.items() if speed}
         seen = [reading for reading in readings if reading.values]
         lapse_s = seen[-1].sent - seen[0].sent if seen else 0.0
         if driven.keys() != self._driven or len(driven) != 1 or lapse_s < _APART_S:
-            return
+            return {}
         ((name, speed),) = driven.items()
         self._heading[name] = {}
         for axis in self._axes:
             way = (middle_of(seen[-SEVERAL:], axis) - middle_of(seen[:SEVERAL], axis)) / lapse_s / speed
             room = self._unsure(axis) / lapse_s / abs(speed)
             self._heading[name][axis] = way - room, way + room
+        return self._heading[name]
 
     def is_over(self, choices: Sequence[Speeds], readings: Sequence[Reading], rests_s: float) -> bool:
         """Return whether a drive has to end, as the device would pass a limit if it rested ``rests_s`` later."""
