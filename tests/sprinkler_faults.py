@@ -105,5 +105,9 @@ FAULTS = [
             "a retry gets the thing as it is now": "description/idempotency-key",
         },
     ),
+    (
+        "as described",
+        {"the list shows the first valve": "description/same-values", "later rounds take the first valve": _READ},
+    ),
     ("without conditions", {"two at once get one id": "description/created-is-there", "the season stays": _READ}),
 ]

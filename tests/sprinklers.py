@@ -11,6 +11,7 @@ from base64 import b64encode
 from datetime import UTC, datetime
 from functools import partial
 
+import jsonschema
 from aiohttp import web
 from small_device import REFUSED, answers, described, error
 
@@ -26,13 +27,16 @@ _WRITABLE = {
     "starts": {"type": "string", "format": "date-time"},
     "valves": {"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 99}, "maxItems": 8},
 }
+_ROUND = {"valve": {"type": "integer", "minimum": 0, "maximum": 99}, "minutes": {"type": "number", "minimum": 0}}
+_ROUND = {"type": "object", "required": ["valve"], "properties": _ROUND, "additionalProperties": False}
+_WRITABLE["rounds"] = {"type": "array", "items": _ROUND, "maxItems": 8}
 _AREAS, _SORTS = ["front", "back"], ["minutes", "-minutes"]
 _WRITABLE["area"] = {"type": "string", "enum": _AREAS}
 _QUERY = [
     {"name": name, "in": "query", "schema": {"type": "string", "enum": values}}
     for name, values in (("area", _AREAS), ("sort", _SORTS))
 ]
-_FIRST = {"area": "front", "minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": []}
+_FIRST = {"area": "front", "minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": [], "rounds": []}
 _SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "additionalProperties": False}
 _PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
 _STATES = ["idle", "running", "paused", "done"]
@@ -111,6 +115,8 @@ class Sprinklers:
             value |= {"reads": zone["reads"], "seen": datetime.now(UTC).isoformat()}
         if self.has("the list shows another state") and where == "list" and value["state"] == "paused":
             value["state"] = "running"
+        if self.has("the list shows the first valve") and where == "list":
+            value["valves"] = value["valves"][:1]
         if self.has("the list rounds") and where == "list":
             value["minutes"] = round(value["minutes"])
         return value
@@ -274,6 +280,8 @@ class Sprinklers:
         id_ = f"y{self.made}" if self.has("two at once get one id") else ""
         await asyncio.sleep(0.03 if id_ else 0)
         self.made += 1
+        if self.has("later rounds take the first valve"):
+            body = {**body, "rounds": [{**one, "valve": body["rounds"][0]["valve"]} for one in body.get("rounds", ())]}
         value = self.shown(self.add(self.taken(body), id_))
         if key is not None and self.style.get("keys", True):
             self.keys[key] = body, value
@@ -502,6 +510,7 @@ _RULES = {
     "valves": lambda one: (
         isinstance(one, list) and len(one) <= 8 and all(type(part) is int and 0 <= part <= 99 for part in one)
     ),
+    "rounds": jsonschema.Draft202012Validator(_WRITABLE["rounds"]).is_valid,
 }
 
 

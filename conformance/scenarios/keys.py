@@ -116,8 +116,10 @@ class _Rounds:
         if len(keys) < _KEYS or not bodies:
             return
         before = self._listed()
-        request = self._request(keys[0], bodies[0])
-        first = self._send(request)
+        first = self._send(request := self._request(keys[0], rich := self._rich(bodies[0])))
+        if is_refused(first) and rich is not bodies[0]:
+            keys[0] = self._keys()[0]
+            first = self._send(request := self._request(keys[0], bodies[0]))
         made = [first]
         if not first.response.ok or not (name := self._name(first)):
             return
@@ -163,6 +165,8 @@ class _Rounds:
         second = self._name(again) if again.response.ok else ""
         if second and second != name:
             fault = f"{second}, a second one"
+        elif second and (other := self._otherwise(first, again, name)):
+            expected, fault = "the members as in the first response and in the thing itself", other
         elif (before is not None) and self._lister is not None and self._item is not None:
             sent = read_json(first.request.body).value
             listing = read_whole(self.writer, self._lister, self._item, self._lister.template)
@@ -174,6 +178,21 @@ class _Rounds:
             if len(set(new)) > 1:
                 expected, shown, fault = f"a list with {name} alone of what was sent", listing.exchange, ", ".join(new)
         return Keyed(self.operation.label, "same request", shown, expected, fault)
+
+    def _otherwise(self, first: Exchange, again: Exchange, name: str) -> str:
+        """Return a member that the repeated response alone shows in another way; the thing may have gone on."""
+        was, now = members(first, ()), members(again, ())
+        other = [one for one in was.keys() & now.keys() if not same(was[one], now[one])]
+        if not other or self._item is None or not name.startswith("/"):
+            return ""
+        there = members(self.writer.send(self._item, name), was)
+        return ", ".join(f"{shown(now[one])} as {one}" for one in sorted(other) if same(there.get(one), was[one]))
+
+    def _rich(self, inputs: Inputs) -> Inputs:
+        """Return inputs with several items in each list of objects, or the same inputs."""
+        bodies = [inputs.body] if isinstance(inputs.body, dict) else []
+        body = next(iter(self.writer.with_items(self.operation, bodies, _TURN)), inputs.body)
+        return inputs if body is inputs.body else replace(inputs, body=body)
 
     def _unspent(self, keys: list[str], inputs: Inputs, made: list[Exchange]) -> Iterator[Keyed]:
         """Judge a key whose request was refused; a new key shows that the correct request can be accepted."""

@@ -408,7 +408,12 @@ def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[st
 
 
 def _is_other(value: Any, listed: Any) -> bool:
-    """Return whether two scalars differ, apart from shortened texts in lists and times in two notations."""
+    """Return whether two values differ, apart from what lists shorten or leave empty, order, and notations of times."""
+    if isinstance(value, dict) and isinstance(listed, dict):
+        return any(_is_other(value[name], listed[name]) for name in value.keys() & listed.keys())
+    if isinstance(value, list) and isinstance(listed, list) and listed:
+        left = [one for one in value if one not in listed]
+        return len(value) != len(listed) or any(all(_is_other(one, item) for item in listed) for one in left)
     if isinstance(value, bool) or isinstance(listed, bool) or (is_number(value) and is_number(listed)):
         return bool(value != listed)
     if not (isinstance(value, str) and isinstance(listed, str)):

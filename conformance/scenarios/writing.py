@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from conformance.api.rest.inputs import renewed, usual_inputs, whole_body, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, as_answered, differences, represented
+from conformance.api.rest.things import another, as_answered, differences, represented, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -135,6 +135,12 @@ class Writer:
         first = full if fits(schema, full) else base
         return [another(schema, first, turn, self.values.collections), first, usual.body]
 
+    def with_items(self, operation: Operation, bodies: list[dict[str, Any]], turn: int) -> list[dict[str, Any]]:
+        """Return bodies, before them the first one with several items in each list of objects, if that is another."""
+        schemas = [operation.bodies[name].schema for name in operation.bodies if bodies and is_json(name)]
+        rich = [with_items(schema, bodies[0], turn, self.values.collections) for schema in schemas[:1]]
+        return [*(body for body in rich if body != bodies[0]), *bodies]
+
     def until(self, read: Callable[[], _Read], holds: Callable[[_Read], bool]) -> _Read:
         """Return the first read that meets a condition, or the last one after a few seconds."""
         patience = Patience(self.api.client.connection.pace, _SETTLES_S)
@@ -189,7 +195,8 @@ class Writer:
     def change(self, operation: Operation, read: Operation, path: str, turn: int) -> Write | None:
         """Write other values to a thing, and read them back; None if the device does not accept them, or only later."""
         before = self.send(read, path)
-        for body in self.bodies(operation, turn, members(before, ())) if before.response.ok else ():
+        bodies = self.bodies(operation, turn, members(before, ())) if before.response.ok else []
+        for body in self.with_items(operation, bodies, turn):
             sent = self.conditional(operation, read, path, body)
             if sent.response.ok:
                 is_later = sent.response.status == _ACCEPTED

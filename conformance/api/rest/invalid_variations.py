@@ -120,15 +120,14 @@ def _invalid_members(usual: Inputs, value: dict[str, Any], schema: Schema, steps
             body = with_member(usual.body, here, NOTHING)
             yield Variation(Kind.MISSING, f"no {place}", place, replace(usual, body=body))
         inner, filled = value.get(name), usual
-        if name not in value and kinds_of(part) & {"object", "array"}:
+        if inner is None and kinds_of(part) & {"object", "array"}:
             inner = sample(part, whole=True)
             filled = replace(usual, body=with_member(usual.body, here, inner))
         yield from _invalid_part(filled, inner, part, here)
-    if flatter.get("additionalProperties") is False and not steps:
-        body = with_member(usual.body, ("roaas_unknown",), 1)
-        yield Variation(
-            Kind.INVALID, "a member that the schema excludes", "body /roaas_unknown", replace(usual, body=body)
-        )
+    if flatter.get("additionalProperties") is False:
+        here = (*steps, "roaas_unknown")
+        body = with_member(usual.body, here, 1)
+        yield Variation(Kind.INVALID, "a member that the schema excludes", place_of(here), replace(usual, body=body))
 
 
 def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
@@ -140,6 +139,8 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
     for value, why in _beyond(merged):
         if not fits(schema, value):
             yield value, why
+    if "integer" in kinds and not fits(schema, fraction := sample({**merged, "enum": []}) + 0.5):
+        yield fraction, "which is no whole number"
     # Every framework refuses an object in place of a scalar, and a word in place of a number; many take 1 for "1".
     for value in ({"roaas": 1}, UNKNOWN, 17):
         is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})

@@ -37,6 +37,8 @@ _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-tim
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
+# Other items of a list of objects that are made from one.
+_ITEMS: Final = 2
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
 _SECOND: Final = 1.0
 
@@ -112,6 +114,21 @@ def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
     return changed
 
 
+def with_items(schema: Schema, body: Any, turn: int, collections: frozenset[str]) -> Any:
+    """Return a body with several different items in each list of objects, as far as the schema allows it."""
+    parts = flat(schema).get("properties", {}) if isinstance(body, dict) else {}
+    changed = dict(body) if parts else body
+    for name in [name for name in parts if not is_devices(name, parts[name], collections)]:
+        value, items = body.get(name), flat(parts[name]).get("items")
+        if isinstance(value, list) and value and isinstance(value[0], dict) and isinstance(items, dict):
+            made = [another(items, value[0], turn + number, collections) for number in range(_ITEMS)]
+            made = [one for place, one in enumerate(made) if one not in (value[0], *made[:place])]
+            longer = ([*made[:1], value[0], *made[1:]], [*made[:1], value[0]])
+            new = next((one for one in longer if len(one) > 1 and fits(schema, {**changed, name: one})), value)
+            changed[name] = new
+    return changed
+
+
 def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) -> Iterator[Any]:
     """Yield other values of a member, another one first in each turn."""
     given = flat(schema)
@@ -120,7 +137,7 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
     if isinstance(value, dict):
         found = [another(schema, value, turn, collections)]
     elif isinstance(value, list):
-        found = [alike_and_apart(schema)[1]]
+        found = [one for one in [alike_and_apart(schema)[1]] if one]
     elif not found and isinstance(value, bool):
         found = [not value]
     elif not found and is_number(value) and kinds & {"number", "integer"}:
@@ -155,8 +172,36 @@ def differences(
                 f"{difference} in {name}"
                 for difference in differences(value, other, part, shared.get(name), collections)
             )
+        elif _are_objects(value) and _are_objects(other):
+            items = [flat(one).get("items", {}) for one in (part, shared.get(name, {}))]
+            yield from (f"{text} in {name}" for text in _of_items(value, other, items[0], items[1], collections))
         elif not _alike(value, other, flat(part)):
             yield f"{shown(other)} as {name} instead of {shown(value)}"
+
+
+def _are_objects(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
+
+
+def _of_items(
+    sent: list[dict[str, Any]],
+    seen: list[dict[str, Any]],
+    schema: Schema,
+    answer: Schema | None,
+    collections: frozenset[str],
+) -> Iterator[str]:
+    """Yield what a list of objects lacks; another order, more items, and several put together are free."""
+
+    def other(one: dict[str, Any], item: dict[str, Any]) -> list[str]:
+        own = {name: value for name, value in one.items() if not is_shared(name)}
+        return list(differences(own, item, schema, answer, collections))
+
+    if 1 < len(seen) < len(sent) and all(any(not other(one, item) for one in sent) for item in seen):
+        yield f"{len(seen)} of {len(sent)} items"
+    if len(seen) == len(sent):
+        pairs = zip(sent, seen, strict=True)
+        lost = [other(one, item) for one, item in pairs if all(other(one, each) for each in seen)]
+        yield from lost[0][:1] if lost else ()
 
 
 def members_in(schema: Schema, names: Collection[str]) -> dict[str, Any]:

@@ -208,6 +208,16 @@ def test_a_truth_value_stands_for_no_number_however_deep(schema, place, body, re
     ]
 
 
+_AXIS = {"type": "object", "properties": {"um": {"type": "integer", "minimum": 2}}, "additionalProperties": False}
+
+
+@pytest.mark.parametrize("axis", [_AXIS, {"oneOf": [_AXIS, {"type": "null"}], "default": None}])
+@pytest.mark.parametrize("wrong", [{"um": 2.5}, {"um": 2, "roaas_unknown": 1}])
+def test_fractions_and_unknown_members_are_sent_within_objects(axis, wrong):
+    found = _variations(_operation(path="/a", body={"type": "object", "properties": {"z": axis}}), invalid_variations)
+    assert {"z": wrong} in [one.inputs.body for one in found]
+
+
 def test_items_of_a_body_that_is_a_list():
     found = _variations(_operation(path="/a", body=_NUMBERS), invalid_variations)
     assert [False] in [one.inputs.body for one in found]

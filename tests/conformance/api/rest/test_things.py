@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.rest.things import differences
+from conformance.api.rest.things import differences, with_items
 
 _SCHEMA = {
     "type": "object",
@@ -12,6 +12,7 @@ _SCHEMA = {
         "count": {"type": "integer"},
         "level": {"type": "number"},
         "flag": {"type": "boolean"},
+        "steps": {"type": "array", "items": {"properties": {"a": {"type": "integer"}, "rank": {"type": "integer"}}}},
     },
 }
 
@@ -30,7 +31,19 @@ _SCHEMA = {
         ({"level": 1}, {"level": 1.0000001}, False),
         ({"flag": True}, {"flag": False}, True),
         ({"flag": True}, {}, False),
+        ({"steps": [{"a": 1}, {"a": 2}]}, {"steps": [{"a": 2, "b": 1}, {"a": 1}]}, False),
+        ({"steps": [{"a": 1}, {"a": 2}]}, {"steps": [{"a": 1}, {"a": 1}]}, True),
+        ({"steps": [{"a": 1}, {"a": 2}]}, {"steps": [{"a": 3}]}, False),  # put together
+        ({"steps": [{"a": 1}, {"a": 2}, {"a": 3}]}, {"steps": [{"a": 1}, {"a": 2}]}, True),
+        ({"steps": [{"a": 1, "rank": 7}]}, {"steps": [{"a": 1, "rank": 1}]}, False),
     ],
 )
 def test_numbers_are_compared_as_numbers_and_texts_without_their_form(sent, seen, differs):
     assert bool(list(differences(sent, seen, _SCHEMA, _SCHEMA, frozenset()))) is differs
+
+
+@pytest.mark.parametrize(("most", "count"), [(9, 3), (2, 2), (1, 1)])
+def test_lists_of_objects_get_as_many_different_items_as_may_be(most, count):
+    schema = {"properties": {"steps": {**_SCHEMA["properties"]["steps"], "type": "array", "maxItems": most}}}
+    made = with_items(schema, {"steps": [{"a": 1}]}, 1, frozenset())["steps"]
+    assert len({one["a"] for one in made}) == len(made) == count
