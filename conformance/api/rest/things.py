@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Collection, Iterator
 from datetime import UTC, datetime
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from conformance.api.rest.references import refers, singular
 from conformance.api.rest.samples import FORMATS, alike_and_apart, fits
@@ -179,7 +179,7 @@ def differences(
             yield f"{shown(other)} as {name} instead of {shown(value)}"
 
 
-def _are_objects(value: Any) -> bool:
+def _are_objects(value: Any) -> TypeGuard[list[dict[str, Any]]]:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 
