@@ -106,14 +106,17 @@ def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
 
 def _is_at_end(mapped: MappedDevice, speeds: Position, seen: list[Reading]) -> bool:
     """Return whether a device that stands also does so if one client alone drives it: then its travel ends there."""
-
-    def stands(readings: list[Reading]) -> bool:
-        found = (end_of_travel(readings, name, wanted, mapped.motion, ()) for name, wanted in speeds.items())
-        return any(place is not None for place in found)
-
-    if not stands(seen):
-        return False
-    mapped.come_to_rest()
-    alone = driven_for_a_moment(mapped, speeds)
-    mapped.room.ends(speeds, alone)
-    return stands(alone)
+    for name, wanted in speeds.items():
+        place, of = end_of_travel(seen, name, wanted, mapped.motion, ()), mapped.drives.axes[name].of
+        # Another client's velocity, tried before, may have taken it away from there.
+        for _ in range(_CLIENTS):
+            if place is None:
+                break
+            mapped.come_to_rest()
+            alone = [reading for reading in driven_for_a_moment(mapped, speeds) if reading.values]
+            if end_of_travel(alone, name, wanted, mapped.motion, ()) is not None:
+                mapped.room.ends(speeds, alone)
+                return True
+            if not alone or (alone[-1].values[of] - place) * wanted > mapped.motion.tolerance(of) * abs(wanted):
+                break
+    return False

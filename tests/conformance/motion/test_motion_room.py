@@ -4,8 +4,9 @@ import dome
 import pytest
 import rover
 from driven_device import SimulatedClock
-from simulated import RULES, Api, cases_of, map_of, played
+from simulated import RULES, Api, Binding, cases_of, map_of, one_after_another, played
 
+from conformance.scenarios.motion import several
 from conformance.scenarios.motion.binding import SoapBinding
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import MappedDevice
@@ -82,3 +83,24 @@ def test_a_device_that_is_beyond_a_limit_of_another_axis_is_brought_to_where_the
     mapped = MappedDevice(api, map_of(dome.MAP), clock, SoapBinding(api, dome.messages_of()))
     assert with_room(mapped, [{"pan": 0.5}], 0.7) == [{"pan": 0.5}]
     assert mapped.where()["tilt"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_clients_at_an_end_of_travel_are_told_from_a_mixture_that_stands(ends, monkeypatch):
+    clock = SimulatedClock()
+    body = rover.Body({"x": (-0.6, 0.6), "y": (-0.6, 0.6)}, clock.now, clock.sleep)
+    right, at, last = body.drive, body.at, [(-1.0, 0.0)]
+
+    def drive(speeds, hold_s, now):
+        (then, before), last[0] = last[0], (now, speeds["x"])
+        mixed = now - then < 0.01 and before + speeds["x"] == 0
+        right({**speeds, "x": 0.0} if mixed and not ends else speeds, hold_s, now)
+
+    body.drive = drive
+    body.at = lambda now: {name: min(value, 0.01) if ends else value for name, value in at(now).items()}
+    toml = _without_goto(_BY_POSITION).replace("limits = [-0.6, 0.6]", "bound = false, limits = [-0.6, 0.6]")
+    api = Api(rover.Rover(body), clock, lambda: 0.002)
+    mapped = MappedDevice(api, map_of(toml), clock, Binding(api))
+    monkeypatch.setattr(several, "send_together", one_after_another)
+    found = several.of_drivers(mapped, [{"ahead": -0.5, "left": 0.0}, {"ahead": 0.5, "left": 0.0}])
+    assert found.at_end is ends
