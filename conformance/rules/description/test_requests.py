@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
@@ -31,6 +31,11 @@ _TOGETHER = re.compile(
 )
 _SENTENCE = re.compile(r"(?<=[.;])\s+")
 _SAID_OF_IT = re.compile(r": | is | has | should ")
+# What is extreme in a generated value: numbers beyond 32 bits, years of no calendar in use, control characters, which
+# JSON writes as \\u00XX.
+_NUMBER, _LARGEST = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"), 1 << 31
+_YEAR, _FIRST_YEAR, _LAST_YEAR = re.compile(r"\b(\d{4})-\d\d-\d\d"), 1970, 2100
+_CONTROL = re.compile(r"\\u00[01789][0-9a-f]|\\u[de]", re.IGNORECASE)
 _CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
 
 
@@ -182,9 +187,21 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
             return None
         return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange))
 
-    valid = [one for one in generated if one.validity == VALID and not one.invents]
+    valid = [one for one in generated if one.validity == VALID and not one.invents and not _is_extreme(one)]
     yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
     yield from told_once(valid, "a request that the description allows accepted", fault)
+
+
+def _is_extreme(probe: Probe) -> bool:
+    """Return whether a request has a value that a schema without bounds allows and no program is made for."""
+    request = probe.attempt.request
+    text = "\n".join((unquote(request.target.replace("+", " ")), request.body.decode("utf-8", "replace")))
+    return (
+        _CONTROL.search(text) is not None
+        or any(not char.isprintable() and char not in "\r\n\t" for char in text)
+        or any(abs(float(number)) > _LARGEST for number in _NUMBER.findall(text))
+        or any(not _FIRST_YEAR <= int(year) <= _LAST_YEAR for year in _YEAR.findall(text))
+    )
 
 
 def _asked(probe: Probe) -> tuple[str, str, str]:

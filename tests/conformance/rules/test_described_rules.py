@@ -199,6 +199,15 @@ def test_a_fault_is_one_finding(rule, probes, run):
         (requests.enums, [_probe(422), _probe(422, kind=Kind.ENUM)]),
         (requests.optional, [_probe(422), _probe(422, kind=Kind.OPTIONAL)]),
         (requests.valid_accepted, [_probe(400, kind=Kind.GENERATED, validity="valid")]),
+        *(
+            (requests.valid_accepted, [_OK, _probe(400, kind=Kind.GENERATED, validity="valid", sent=sent)])
+            for sent in (
+                b'{"n": -1.7e308}',
+                b'{"at": "0237-06-03T13:10:30Z"}',
+                b'{"at": "a\\u0001"}',
+                b'{"at": "\xc2\x80"}',
+            )
+        ),
         (requests.invalid_refused, [_probe(kind=Kind.GENERATED), _probe(kind=Kind.INVALID, validity="valid")]),
         (requests.required, [_probe(kind=Kind.MISSING, validity="valid")]),
         (requests.valid_accepted, [_OK, _probe(400, kind=Kind.BOUND, validity="invalid")]),
