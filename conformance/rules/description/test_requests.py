@@ -32,7 +32,7 @@ _TOGETHER = re.compile(
 _SENTENCE = re.compile(r"(?<=[.;])\s+")
 _SAID_OF_IT = re.compile(r": | is | has | should ")
 # What is extreme in a generated value: numbers beyond 32 bits, years of no calendar in use, control characters, which
-# JSON writes as \\u00XX.
+# JSON writes as \u00XX.
 _NUMBER, _LARGEST = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"), 1 << 31
 _YEAR, _FIRST_YEAR, _LAST_YEAR = re.compile(r"\b(\d{4})-\d\d-\d\d"), 1970, 2100
 _CONTROL = re.compile(r"\\u00[01789][0-9a-f]|\\u[de]", re.IGNORECASE)
