@@ -31,10 +31,11 @@ _TOGETHER = re.compile(
 )
 _SENTENCE = re.compile(r"(?<=[.;])\s+")
 _SAID_OF_IT = re.compile(r": | is | has | should ")
-# What is extreme in a generated value: numbers beyond 32 bits, years of no calendar in use, control characters, which
-# JSON writes as \u00XX.
+# What is extreme in a generated value: numbers beyond 32 bits, years of no calendar in use, empty texts, and control
+# characters, which JSON writes as \u00XX.
 _NUMBER, _LARGEST = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"), 1 << 31
 _YEAR, _FIRST_YEAR, _LAST_YEAR = re.compile(r"\b(\d{4})-\d\d-\d\d"), 1970, 2100
+_EMPTY = re.compile(r'""|=(?:&|$)', re.MULTILINE)
 _CONTROL = re.compile(r"\\u00[01789][0-9a-f]|\\u[de]", re.IGNORECASE)
 _CONVERTED = re.compile(r"(?: is (.+), not of type (.+)|: (True|False) is not valid under any .+)$", re.DOTALL)
 
@@ -197,7 +198,8 @@ def _is_extreme(probe: Probe) -> bool:
     request = probe.attempt.request
     text = "\n".join((unquote(request.target.replace("+", " ")), request.body.decode("utf-8", "replace")))
     return (
-        _CONTROL.search(text) is not None
+        _EMPTY.search(text) is not None
+        or _CONTROL.search(text) is not None
         or any(not char.isprintable() and char not in "\r\n\t" for char in text)
         or any(abs(float(number)) > _LARGEST for number in _NUMBER.findall(text))
         or any(not _FIRST_YEAR <= int(year) <= _LAST_YEAR for year in _YEAR.findall(text))

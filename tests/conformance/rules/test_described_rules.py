@@ -204,6 +204,7 @@ def test_a_fault_is_one_finding(rule, probes, run):
             for sent in (
                 b'{"n": -1.7e308}',
                 b'{"at": "0237-06-03T13:10:30Z"}',
+                b'{"at": ""}',
                 b'{"at": "a\\u0001"}',
                 b'{"at": "\xc2\x80"}',
             )
