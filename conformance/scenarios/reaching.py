@@ -19,6 +19,7 @@ from conformance.api.rest.variations import Variation
 from conformance.checkers.untouched import ALONE, OFTEN, keeps_all
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.representation import flat
 from conformance.documents.writing import path_text
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Outgoing
@@ -80,7 +81,10 @@ class Reaching:
         if parameter is None or parameter_verdict(operation, parameter, unquote(part)) != VALID:
             return part
         known, ids = self.values.of(operation, parameter), self.values.known_ids(operation, parameter)
-        found = [one for one in known if one in ids] or known
+        found = [value for value in known if value in ids] or known
+        # A value of an enumeration names something, and so does one that is known.
+        if "enum" in flat(parameter.schema) or unquote(part) in map(str, found):
+            return part
         return path_text(value_text(parameter, found[0]), parameter.style) if found else part
 
     def _current(self, operation: Operation, request: Outgoing) -> Outgoing:
