@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from conformance.rules.ros_gateway.judging import fails_as, statuses
@@ -80,28 +80,20 @@ def _older(one: Presence) -> str:
 @rule("ros-gateway/recovers", on=(publishers_end,))
 def recovers(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether messages are returned again after their publisher was away."""
-    for presence in trace.presences:
-        if presence.publisher != _ALL:
-            yield Case(
-                presence.shown,
-                presence.exchange,
-                f"the message of {presence.publisher}",
-                _older(presence),
-                presence.publisher,
-            )
+    yield from _heard(presence for presence in trace.presences if presence.publisher != _ALL)
 
 
 @rule("ros-gateway/qualities", on=(publishers_of_each_quality,))
 def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
     """Judge whether publishers of each reliability and durability are heard."""
-    for presence in trace:
-        yield Case(
-            presence.shown,
-            presence.exchange,
-            f"the message of {presence.publisher}",
-            _older(presence),
-            presence.publisher,
-        )
+    yield from _heard(trace)
+
+
+def _heard(presences: Iterable[Presence]) -> Iterator[Case]:
+    """Judge whether the message of each publisher is returned."""
+    for presence in presences:
+        text = f"the message of {presence.publisher}"
+        yield Case(presence.shown, presence.exchange, text, _older(presence), presence.publisher)
 
 
 @rule("ros-gateway/lists", on=(graph_lists,))
