@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
@@ -22,6 +23,7 @@ _FORMATS: Final = 3
 # Why a value is wrong, for the two faults that frameworks refuse for every parameter.
 _OTHER_TYPE: Final = "which has another type"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
+_BOUNDS: Final = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
 _COMMON: Final = frozenset({_OTHER_TYPE, _NOT_ASCII})
 
@@ -139,7 +141,10 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
     for value, why in _beyond(merged):
         if not fits(schema, value):
             yield value, why
-    if "integer" in kinds and not fits(schema, fraction := sample({**merged, "enum": []}) + 0.5):
+    # An enumeration may have no type. A program that takes texts may take any number as one.
+    bounds = {key: merged[key] for key in _BOUNDS if isinstance(merged.get(key), int | float)}
+    fraction = math.floor(sample({**bounds, "type": "integer"})) + 0.5
+    if "integer" in kinds and "string" not in kinds and not fits(schema, fraction):
         yield fraction, "which is no whole number"
     # Every framework refuses an object in place of a scalar, and a word in place of a number; many take 1 for "1".
     for value in ({"roaas": 1}, UNKNOWN, 17):

@@ -218,6 +218,24 @@ def test_fractions_and_unknown_members_are_sent_within_objects(axis, wrong):
     assert {"z": wrong} in [one.inputs.body for one in found]
 
 
+@pytest.mark.parametrize(
+    ("member", "fractions"),
+    [
+        ({"enum": [1, 2]}, [1.5]),
+        ({"const": 4}, [1.5]),
+        ({"oneOf": [{"type": "integer", "maximum": -3}, {"type": "null"}]}, [-2.5]),
+        ({"type": "integer", "minimum": 0.5}, [-0.5, 0.5]),
+        ({"type": "integer", "minimum": "2"}, []),
+        ({"anyOf": [{"type": "string"}, {"type": "integer"}]}, []),
+        ({"anyOf": [{"type": "integer"}, {"type": "number"}]}, []),
+    ],
+)
+def test_a_fraction_is_sent_for_each_schema_of_integers_alone(member, fractions):
+    found = _variations(_operation(path="/a", body={"type": "object", "properties": {"n": member}}), invalid_variations)
+    sent = [one.inputs.body.get("n") for one in found if isinstance(one.inputs.body, dict)]
+    assert [value for value in sent if isinstance(value, float) and value % 1] == fractions
+
+
 def test_items_of_a_body_that_is_a_list():
     found = _variations(_operation(path="/a", body=_NUMBERS), invalid_variations)
     assert [False] in [one.inputs.body for one in found]
