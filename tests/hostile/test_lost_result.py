@@ -4,7 +4,6 @@ import datetime as dt
 import errno
 import json
 import resource
-import shutil
 import signal
 import subprocess
 import sys
@@ -54,7 +53,8 @@ def _first(action: Callable[[], object]) -> dict[str, Handle]:
 
 
 def _all(out: Path) -> None:
-    shutil.rmtree(out)
+    # In one step: while files are removed one by one, the run may write another.
+    out.rename(out.with_name("lost"))
     out.touch()
 
 

@@ -24,6 +24,14 @@ from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
+# Header fields whose wrong values a server may ignore (RFC 9110 12.5, 13.1, 14.2; RFC 7240 2), whatever is declared.
+_OF_HTTP = frozenset(
+    f"header {name}"
+    for name in (
+        *("if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "if-range", "range"),
+        *("accept", "accept-charset", "accept-encoding", "accept-language", "prefer"),
+    )
+)
 # Phrases in a description which say that two values depend on each other, which no schema can express.
 _TOGETHER = re.compile(
     r"[<>≤≥≠]|\b(than|before|after|below|above|between|exceeds?|equal|differ\w*|both|either|together|unless|requires?)\b",
@@ -60,7 +68,8 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
     sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
     # A thing that a path cannot name does not exist either.
     absent = _deletes_the_absent(trace)
-    sure = [one for one in sure if not (one.ok and one.operation in absent and _is_in_path(one))]
+    sure = [one for one in sure if not (one.ok and one.operation in absent and _place_of(one).startswith("path "))]
+    sure = [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
 
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
@@ -93,8 +102,9 @@ def _deletes_the_absent(trace: Survey) -> set[str]:
     }
 
 
-def _is_in_path(probe: Probe) -> bool:
-    return (probe.place if probe.says else _place_in(probe.why)).startswith("path ")
+def _place_of(probe: Probe) -> str:
+    """Return the place that is wrong in a request."""
+    return probe.place if probe.says else _place_in(probe.why)
 
 
 def _place_in(why: str) -> str:

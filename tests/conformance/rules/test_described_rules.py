@@ -170,6 +170,7 @@ def test_a_right_device_is_not_blamed(rule, run):
         (requests.operations, [_page(405, operation=_PLAIN)]),
         (requests.invalid_refused, [_probe(kind=Kind.INVALID)]),
         (requests.invalid_refused, [_probe(kind=Kind.GENERATED, validity="invalid", why="'x' at n")]),
+        (requests.invalid_refused, [_probe(kind=Kind.GENERATED, validity="invalid", why="'x' at header X-Lane")]),
         (requests.required, [_probe(kind=Kind.MISSING)]),
         (requests.optional, [_probe(422, operation=_PLAIN), _probe(operation=_PLAIN, kind=Kind.OPTIONAL)]),
         (requests.enums, [_OK, _probe(422, kind=Kind.ENUM)]),
@@ -212,6 +213,13 @@ def test_a_fault_is_one_finding(rule, probes, run):
         (requests.invalid_refused, [_probe(kind=Kind.GENERATED), _probe(kind=Kind.INVALID, validity="valid")]),
         (requests.required, [_probe(kind=Kind.MISSING, validity="valid")]),
         (requests.valid_accepted, [_OK, _probe(400, kind=Kind.BOUND, validity="invalid")]),
+        *(
+            (
+                requests.invalid_refused,
+                [_probe(kind=Kind.GENERATED, validity="invalid", why=f"'{{}}' at header {name}")],
+            )
+            for name in ("If-None-Match", "if-match", "Range", "Accept-Language", "Prefer")
+        ),
         (robustness.recovers, [_probe(500), _probe(500, kind=Kind.AGAIN)]),
     ],
 )
