@@ -9,7 +9,7 @@ from conformance.contract.pack import Contract
 from conformance.documents.xml import Node
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.packs.table1.robot import delivery, delivery_messages
+from conformance.packs.table1.robot import delivery, soap_services
 from conformance.packs.table1.statement import Statement
 from conformance.statement.endpoints import Endpoints
 from conformance.transport import raw
@@ -48,14 +48,14 @@ def _with_letters(monkeypatch):
 
 
 def _without_an_element(monkeypatch):
-    make = delivery_messages.delivery
+    make = soap_services.delivery
 
     def wrong(*given, **named):
         whole = make(*given, **named)
         (inside,) = whole.children
         return Node(whole.tag, "", (replace(inside, children=inside.children[1:]),))
 
-    monkeypatch.setattr(delivery_messages, "delivery", wrong)
+    monkeypatch.setattr(soap_services, "delivery", wrong)
 
 
 def _cut_short(monkeypatch):

@@ -17,10 +17,10 @@ from conformance.documents.openapi import is_json
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.documents.xml import NotXmlError, clark, elements, local, parse, text_of
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.probe import ARRIVES_S
 from conformance.packs.table1.robot.robot import DELIVERIES
+from conformance.packs.table1.robot.soap_services import NAMESPACE
 from conformance.papers_robot.delivery import COFFEE, COORDINATES, MESSAGE_FIELDS, PATH_NAMES
 from conformance.transport.exchange import Attempt, Exchange, Request
 from conformance.verdict.evidence import Case, case

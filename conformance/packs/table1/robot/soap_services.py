@@ -1,21 +1,60 @@
-"""Send deliveries to the robot's SOAP services, and read its state from them."""
+"""Send deliveries to the robot's SOAP services, by the contract's XSD, and read its state from them."""
 
 from collections.abc import Iterator
+from functools import cache
+from typing import Final
 
 from lxml import etree
 
 from conformance.api.soap.calls import call, read_exchange, send
 from conformance.api.soap.envelope import envelope
+from conformance.api.soap.messages import filled
 from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_message
 from conformance.api.soap.xml_style import XmlStyle, serialize
-from conformance.documents.wsdl import SoapOperation
-from conformance.documents.xml import Node, elements, local
+from conformance.documents.wsdl import SoapOperation, read_file
+from conformance.documents.xml import Node, clark, elements, local
+from conformance.documents.xsd_shapes import Element
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE, delivery, request
-from conformance.papers_robot.delivery import COFFEE
+from conformance.papers_robot.delivery import COFFEE, EXAMPLE
+from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.parallel import Addressed
+
+NAMESPACE: Final = "http://soap.turtlebot.mybot.org/"
+
+
+def request(operation: str, **values: float | str) -> Node:
+    """Return a SOAP request with its elements in the order of the XSD.
+
+    Args:
+        operation: the operation's name.
+        values: value of each element by name: numbers are written in the shortest exact notation, texts as they are. An
+            element without a value is left out.
+    """
+    texts = {name: value if isinstance(value, str) else repr(value) for name, value in values.items()}
+    return filled(_shape(operation), texts)
+
+
+def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coordinates: str) -> Node:
+    """Return a SOAP delivery request.
+
+    Args:
+        operation: ExecuteDeliveryRequest or ExecuteCoffeeRequest.
+        code: the delivery code, as text.
+        coordinates: coordinates, as text, that differ from those of the paper's example.
+    """
+    return request(operation, **(EXAMPLE | coordinates), message_code=code)
+
+
+@cache
+def _shape(operation: str) -> Element:
+    for service in ("publishers", "subscribers"):
+        shape = read_file(CONTRACT_DIR / f"{service}.wsdl").shape(clark(NAMESPACE, operation))
+        if shape is not None:
+            return shape
+    raise KeyError(operation)
+
 
 # Places to which a robot may have a plan, relative to the robot, m.
 _NEAR = ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5))

@@ -13,9 +13,8 @@ from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.documents.xml import ENVELOPE, Node, clark
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
 from conformance.packs.table1.robot.delivery import Delivery, path_of, put_delivery
-from conformance.packs.table1.robot.delivery_messages import request
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
-from conformance.packs.table1.robot.soap_services import send_delivery
+from conformance.packs.table1.robot.soap_services import request, send_delivery
 from conformance.papers_robot.delivery import COFFEE, COURIER
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Leaves, Need, Stage

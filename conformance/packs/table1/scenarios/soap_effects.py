@@ -11,7 +11,7 @@ from conformance.api.soap.valid_messages import call_valid
 from conformance.contract.classes import Interface
 from conformance.documents.xml import ENVELOPE, Node, clark
 from conformance.observe.clock import Patience, poll
-from conformance.packs.table1.robot import delivery_messages
+from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.goal import NEW, goal_body, put_goal
 from conformance.packs.table1.robot.message_shapes import DELIVERIES, read_as
 from conformance.packs.table1.robot.robot import DELIVERIES as DELIVERIES_PATH
@@ -71,12 +71,12 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
     answers: list[tuple[Exchange, int | None]] = []
     for number in range(effort.cases(4)):
         depot_x = _DEPOT_X + number
-        answer = call_valid(service, delivery_messages.delivery(depot_x=repr(depot_x)), headers=(block,))
+        answer = call_valid(service, soap_services.delivery(depot_x=repr(depot_x)), headers=(block,))
         if answer.code != "MustUnderstand":
             continue
         # A valid delivery afterwards shows when the robot has handled both.
         marker = depot_x + 0.5
-        call_valid(service, delivery_messages.delivery(depot_x=repr(marker)))
+        call_valid(service, soap_services.delivery(depot_x=repr(marker)))
         through = _until(partial(_listed, robot, marker), robot.patience(_LISTED_S), robot)
         answers.append((answer.exchange, _listed(robot, depot_x) if through else None))
     return Misunderstood(lists=True, answers=tuple(answers))
@@ -103,7 +103,7 @@ def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
     reads: list[tuple[Exchange, str | None]] = []
 
     def ask_goal() -> SoapResponse:
-        return call_valid(service, Node(clark(delivery_messages.NAMESPACE, "GetGoal")))
+        return call_valid(service, Node(clark(soap_services.NAMESPACE, "GetGoal")))
 
     def shows() -> bool:
         answer = ask_goal()

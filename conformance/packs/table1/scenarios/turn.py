@@ -1,5 +1,6 @@
-"""Turning: at the highest speed, renewed also after rejected commands, along an arc; and velocities not renewed."""
+"""Drives: straight ahead and back, turning, along an arc, renewed also after rejected commands, and not renewed."""
 
+import random
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -17,18 +18,66 @@ from conformance.packs.table1.robot.no_commands import no_commands, refuse_goal
 from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
-from conformance.packs.table1.robot.unrenewed import slow, unrenewed
-from conformance.packs.table1.robot.velocity_range import along_arc, both, fastest, handy, reach, slowest_along
+from conformance.packs.table1.robot.velocity_range import (
+    along_arc,
+    both,
+    direction,
+    fastest,
+    handy,
+    reach,
+    slow,
+    slowest,
+    slowest_along,
+    unrenewed,
+)
 from conformance.packs.table1.scenarios.trace import Driven, longer_s
 from conformance.rules.motion.test_velocities import fails, held
 from conformance.scenarios.motion import trace as generic
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Command
 from conformance.scenarios.motion.velocities import SILENT, Part, left_alone
-from conformance.scenarios.scenario import partial_trace, scenario
+from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
+
+_WAYS: Final[tuple[By, ...]] = ("velocity", "linear", "xml")
+
+
+@scenario(needs={Need.REST, Need.MOTION})
+def straight(robot: Robot, run: Run) -> Driven:
+    """Drive ahead for less than a second, back to the start, and stop."""
+    if not robot.actuated(0):
+        raise NotPossibleError("the statement says that the robot cannot drive straight ahead")
+    make_room(robot)
+    drive = Drive(robot)
+    with partial_trace(lambda: Driven(drive.whole)):
+        _play(robot, drive, run)
+    return Driven(drive.whole)
+
+
+def _play(robot: Robot, drive: Drive, run: Run) -> None:
+    drive.look()
+    reach(drive, slowest(robot))
+    sign = direction(robot)
+    ahead = Velocity(linear_x=fastest(robot, AHEAD, sign))
+    reached = reach(drive, ahead)
+    drive.keep(0.2 if reached else 0.0)
+    back = Velocity(linear_x=fastest(robot, AHEAD, -sign))
+    if not any(back):
+        # a robot without a reverse gear stops where it is
+        back = ahead
+    elif reached := reach(drive, back):
+        drive.keep(0.2)
+    # Forth and back with each path that commands a velocity; at quick, the seed chooses one.
+    ways = [random.Random(f"{run.seed}/stop").choice(_WAYS)] if run.effort.name == "quick" else _WAYS  # noqa: S311
+    for by in ways if reached else ():
+        if by != ways[0]:
+            back = Velocity(*(-part for part in back))
+            drive.refresh(back)
+        if not drive.stop(back, by) or not robot.reverses:
+            return
+
 
 # Share of the hold time after which a command is repeated.
 _AGAIN: Final = 0.25

@@ -9,8 +9,8 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.envelope import envelope
 from conformance.packs.table1.checkers.deliveries import Deliveries
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_messages import delivery
 from conformance.packs.table1.robot.robot import DELIVERIES
+from conformance.packs.table1.robot.soap_services import delivery
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import Exchange, Request, Response

@@ -10,8 +10,8 @@ from conformance.documents.writing import xml_bytes
 from conformance.packs.table1.checkers.interfaces import AcrossInterfaces
 from conformance.packs.table1.checkers.lists import Lists
 from conformance.packs.table1.checkers.plans import Plans
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, POSE, SENSORS, VELOCITY
+from conformance.packs.table1.robot.soap_services import NAMESPACE
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response, Unanswered
 from conformance.verdict.evidence import CheckerListener

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from conformance.packs.table1.checkers.lists import Lists
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import SENSORS
+from conformance.packs.table1.robot.soap_services import NAMESPACE
 from conformance.transport.exchange import Exchange, Request, Response
 
 _LIDAR = {"name": "lidar", "topic": "/scan", "type": "sensor_msgs/LaserScan"}

@@ -7,9 +7,9 @@ import pytest
 from toy_messages import exchange, header, pose
 
 from conformance.packs.table1.checkers.plans import Plans, longest_leap
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.geometry import Pose, middle_of
 from conformance.packs.table1.robot.plan import Plan, start_of
+from conformance.packs.table1.robot.soap_services import NAMESPACE
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import CheckerListener

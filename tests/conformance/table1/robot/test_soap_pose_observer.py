@@ -7,8 +7,8 @@ from toy_messages import STILL, ZERO, odometry
 
 from conformance.documents.writing import xml_bytes
 from conformance.packs.table1.checkers.soap_poses import SoapPoses
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE
 from conformance.packs.table1.robot.robot import POSE
+from conformance.packs.table1.robot.soap_services import NAMESPACE
 from conformance.transport.exchange import Exchange, Request, Response
 
 _FAST = STILL | {"linear": ZERO | {"x": 0.3}}

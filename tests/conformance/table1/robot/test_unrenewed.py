@@ -1,7 +1,7 @@
 import pytest
 
 from conformance.packs.table1.robot.robot import Velocity
-from conformance.packs.table1.robot.unrenewed import unrenewed
+from conformance.packs.table1.robot.velocity_range import unrenewed
 
 _BENT, _AHEAD = Velocity(linear_x=-0.1, angular_z=-0.8), Velocity(linear_x=0.1, angular_z=0.8)
 _ACROSS = Velocity(linear_x=0.1, angular_z=-0.8)

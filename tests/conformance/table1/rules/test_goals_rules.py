@@ -20,10 +20,9 @@ from conformance.packs.table1.robot.goal_trace import (
 )
 from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
-from conformance.packs.table1.rules.rest_resources import test_goal_ids as ids
 from conformance.packs.table1.rules.rest_resources import test_goal_life as life
-from conformance.packs.table1.rules.rest_resources import test_goal_refused as rules
 from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
+from conformance.packs.table1.rules.rest_resources import test_special_goals as ids
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain
 from conformance.packs.table1.statement import Statement
@@ -46,9 +45,9 @@ def _holds(rule, trace):
 )
 def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
     put = (SpecialGoal("a quaternion of length 2", exchange(status)),)
-    assert _holds(rules.goal_quaternion, RefusedGoals(not_unit=put)) == [refused]
-    assert _holds(rules.goal_frame, RefusedGoals(unknown_frames=put)) == [refused]
-    assert _holds(rules.goal_quaternion_taken, RefusedGoals(unit=put)) == [accepted]
+    assert _holds(ids.goal_quaternion, RefusedGoals(not_unit=put)) == [refused]
+    assert _holds(ids.goal_frame, RefusedGoals(unknown_frames=put)) == [refused]
+    assert _holds(ids.goal_quaternion_taken, RefusedGoals(unit=put)) == [accepted]
 
 
 @pytest.mark.parametrize(
@@ -62,7 +61,7 @@ def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
 )
 def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observed):
     far = FarGoal(exchange(status), None if read is None else exchange(read), 60.0)
-    (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
+    (case,) = ids.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
 
 

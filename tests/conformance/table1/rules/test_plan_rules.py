@@ -8,8 +8,8 @@ from toy_messages import exchange
 
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.plan import NOTATIONS, Plan, Start
-from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.rules.rest_resources import test_plan as rules
+from conformance.packs.table1.scenarios.plans import DefaultPlan, FramePlan, PlanRead, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.statement import Statement
 
 _HERE, _THERE, _ASIDE = Pose(0.0, 0.0, 0.0), Pose(0.9, 0.0, 0.0), Pose(0.9, 0.5, 0.0)

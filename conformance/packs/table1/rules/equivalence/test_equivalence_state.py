@@ -13,12 +13,11 @@ from conformance.api.soap.service import SoapService
 from conformance.documents.representation import flattened, projected
 from conformance.packs.table1.checkers.single_readings import BesideOdometry
 from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
-from conformance.packs.table1.robot.delivery_messages import request
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TWIST
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
 from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
-from conformance.packs.table1.robot.soap_services import ask, outgoing
+from conformance.packs.table1.robot.soap_services import ask, outgoing, request
 from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
 from conformance.scenarios.rule import record
 from conformance.transport.exchange import Exchange

@@ -9,9 +9,8 @@ from conformance.packs.table1.robot.geometry import pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
 from conformance.packs.table1.robot.motion_map import velocity_of
 from conformance.packs.table1.robot.robot import STILL, is_near
-from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven, shown
-from conformance.packs.table1.scenarios.turn import further_axes, turn
+from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, rule

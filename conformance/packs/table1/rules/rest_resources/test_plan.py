@@ -5,8 +5,11 @@ from http import HTTPStatus
 
 from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.plan import START_OFF, Plan
-from conformance.packs.table1.robot.plan_trace import DefaultPlan, FramePlan, PlansFromRobot, PlansFromStart
 from conformance.packs.table1.scenarios.plans import (
+    DefaultPlan,
+    FramePlan,
+    PlansFromRobot,
+    PlansFromStart,
     is_refused,
     plans_from_robot,
     plans_from_start,

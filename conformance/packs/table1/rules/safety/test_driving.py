@@ -11,9 +11,8 @@ from conformance.packs.table1.robot.robot import STILL, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.straight import straight
 from conformance.packs.table1.scenarios.trace import Driven, longer_s, shown
-from conformance.packs.table1.scenarios.turn import further_axes, turn
+from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.rules.motion import test_velocities as generic

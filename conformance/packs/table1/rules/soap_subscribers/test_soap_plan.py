@@ -10,7 +10,7 @@ from conformance.api.soap.calls import SoapResponse, call, judge_answer
 from conformance.api.soap.service import SoapService
 from conformance.api.soap.valid_messages import call_valid
 from conformance.documents.xml import Node, clark
-from conformance.packs.table1.robot import delivery_messages, soap_services
+from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.message_shapes import GET_PLAN
 from conformance.packs.table1.robot.plan import START_OFF, plan_of
@@ -62,7 +62,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         # Frame and tolerance may be left out; the defaults are map and 0.1 (contract, REST).
         given = {"frame_id": frame, "tolerance": repr(_TOLERANCE)} if number % 2 or frame != "map" else {}
         before = _here(soap, subscribers) or here
-        request = delivery_messages.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
+        request = soap_services.request("GetPlan", x=target.x, y=target.y, yaw="0.0", **given)
         answer = call_valid(subscribers, request)
         after = _here(soap, subscribers) or before
         if answer.fault is not None:
@@ -92,7 +92,7 @@ def _after_refusals(subscribers: SoapService, judge: Judge, request: Node) -> No
     """Judge that a valid request right after a rejected one gets a path, if it does otherwise."""
     none = 0
     for _ in range(_REFUSALS):
-        call(subscribers, Node(clark(delivery_messages.NAMESPACE, "GetNothing")))
+        call(subscribers, Node(clark(soap_services.NAMESPACE, "GetNothing")))
         answer = call_valid(subscribers, request)
         if answer.fault is None:
             problem = _told(answer)[1]
@@ -109,18 +109,18 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
     # Plan to the robot's own place, so that only the frame can be the reason for a refusal.
     here = _here(soap, subscribers) or Pose(0.0, 0.0, 0.0)
     for message, what in (
-        (delivery_messages.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
+        (soap_services.request("GetPlan", x=1e7, y=-1e7), "a position 10,000 km away"),
         (
-            delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id="no_such_frame"),
+            soap_services.request("GetPlan", x=here.x, y=here.y, frame_id="no_such_frame"),
             "a frame that the robot does not know",
         ),
         (
-            delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=_LONG),
+            soap_services.request("GetPlan", x=here.x, y=here.y, frame_id=_LONG),
             f"a frame with a name of {len(_LONG)} characters, with markup and beyond ASCII",
         ),
     ):
         # Another client's fault in place of this response would then be noticed.
-        call_valid(subscribers, delivery_messages.request("GetVelocity"))
+        call_valid(subscribers, soap_services.request("GetVelocity"))
         answer = call_valid(subscribers, message)
         path, _ = _told(answer)
         # A robot in an open world may have a plan to anywhere; then the plan has to end there.
@@ -129,7 +129,7 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
             judge, "soap-subscribers/plan-none", answer.fault is not None or arrives, answer, f"a fault for {what}"
         )
     for mark in _MARKS:
-        message = delivery_messages.request("GetPlan", x=here.x, y=here.y, frame_id=f"{_LONG}{mark}")
+        message = soap_services.request("GetPlan", x=here.x, y=here.y, frame_id=f"{_LONG}{mark}")
         answer = call_valid(subscribers, message)
         others = [text for text in _MARKS if text != mark and text.encode() in answer.exchange.response.body]
         judge.check(

@@ -12,9 +12,8 @@ from conformance.api.soap.valid_messages import call_valid, require_valid_docume
 from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.representation import flattened
 from conformance.documents.xml import Node, clark
-from conformance.packs.table1.robot.delivery_messages import NAMESPACE, request
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
-from conformance.packs.table1.robot.soap_services import ask, outgoing
+from conformance.packs.table1.robot.soap_services import NAMESPACE, ask, outgoing, request
 from conformance.packs.table1.robot.state_over_soap import answered
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together

@@ -1,10 +1,12 @@
-"""Rules on PUTs whose Accept header excludes all formats (contract, several clients)."""
+"""Rules on PUTs whose Accept header excludes all formats, and on several deliveries at the same moment."""
 
 from collections.abc import Iterator
 
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, VELOCITY
+from conformance.packs.table1.scenarios.concurrent_puts import concurrent_deliveries
 from conformance.packs.table1.scenarios.not_acceptable import NotAcceptable, not_acceptable
 from conformance.scenarios.rule import Outcome, rule
+from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
 Puts = tuple[NotAcceptable, ...]
@@ -34,3 +36,11 @@ def _has_effect(trace: Puts, path: str) -> Iterator[Case]:
             expected = f"the robot to apply a PUT of {path} to which it responds {refusal.exchange.response.status}"
             observed = "no effect, though the same PUT with Accept: application/json has one"
             yield Case(refusal.has_effect, refusal.exchange, expected, observed)
+
+
+@rule("http/concurrent-answers", on=(concurrent_deliveries,))
+def concurrent_answers(trace: tuple[tuple[bool, Exchange], ...]) -> Iterator[Outcome]:
+    """Judge that the robot accepts the valid deliveries and rejects the others."""
+    for valid, exchange in trace:
+        expected = f"{'2xx' if valid else '4xx'} for this delivery, while others are answered"
+        yield Case(exchange.response.ok == valid, exchange, expected, cause="another's answer")
