@@ -15,6 +15,7 @@ _XS = 'xmlns:xs="http://www.w3.org/2001/XMLSchema"'
 _SETTINGS = (
     '<xs:element name="Rate" type="c:Rate"/><xs:element name="Label" type="c:Label"/>'
     '<xs:element name="Mode" type="c:Mode"/><xs:element name="Quiet" type="xs:boolean"/>'
+    '<xs:element name="Offset" type="xs:double"/><xs:element name="Note" type="c:Label" nillable="true"/>'
 )
 _NOTHING = "<xs:complexType><xs:sequence/></xs:complexType>"
 _ELEMENTS = {
@@ -81,7 +82,14 @@ class Feeder(Device):
     style: str = ""
     faults: frozenset[str] = frozenset()
     settings: dict[str, str] = field(
-        default_factory=lambda: {"Rate": "2", "Label": "feeder", "Mode": "even", "Quiet": "false"}
+        default_factory=lambda: {
+            "Rate": "2",
+            "Label": "feeder",
+            "Mode": "even",
+            "Quiet": "false",
+            "Offset": "0.5",
+            "Note": "new",
+        }
     )
     bins: dict[str, str] = field(default_factory=lambda: {"1": "3", "2": "4"})
     recipes: dict[str, str] = field(default_factory=dict)
@@ -159,6 +167,8 @@ class Feeder(Device):
         if "mode burst refused" in self.faults and values["Mode"] == "burst":
             return None
         values["Label"] = self._label(values["Label"])
+        values |= {"Note": values["Note"] or self.settings["Note"]} if "nil stays" in self.faults else {}
+        values |= {"Offset": "0"} if "NaN is zero" in self.faults and values["Offset"] == "NaN" else {}
         if "burst is slow" in self.faults and values["Mode"] == "burst":
             values["Mode"] = "slow"
         if "quiet stays" in self.faults and values["Quiet"] == "false":

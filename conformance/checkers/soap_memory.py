@@ -19,7 +19,7 @@ from lxml import etree
 
 from conformance.api.soap.roles import KEEPS, MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
 from conformance.documents.wsdl import Wsdl
-from conformance.documents.xml import local
+from conformance.documents.xml import XSI, clark, local
 from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Simple, is_alike, number_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
@@ -37,8 +37,11 @@ _ITEMS: Final = 50
 _STEADY: Final = 3
 # What programs write in place of a text that is not there.
 _NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
+# Values that are as good as none.
+_NOTHING: Final = frozenset({"", "0", "0.0", "false"})
 # Values that may say that a thing is removed, though it is still told.
 _STATES: Final = re.compile(r"stat(?:e|us)|delet|remov|activ|enabl|valid|archiv|exist")
+_NIL: Final = clark(XSI, "nil")
 # Separator between the values of one name: a character that XML cannot contain.
 _BETWEEN: Final = "\0"
 _WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
@@ -181,7 +184,8 @@ class SoapMemory:
         elif not response.ok or self._types.invalid(payload):
             self._forget()
         else:
-            yield from self._done(act, attempt, sent, told)
+            nil = {local(str(one.tag)).lower() for one in payload.iter(etree.Element) if one.get(_NIL) in {"true", "1"}}
+            yield from self._done(act, attempt, sent, told, nil - act.emptied)
 
     def _forget(self) -> None:
         self._written.clear()
@@ -193,15 +197,17 @@ class SoapMemory:
             for name, texts in sent.items():
                 write.refused[name].update(texts)
 
-    def _done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
-        """Keep what a successful request did; judge whether what it created is a thing of its own."""
+    def _done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts, unsaid: set[str]) -> Iterator[Case]:
+        """Keep what a successful request did; judge whether what it created is a thing of its own.
+
+        A device may leave the values of ``unsaid`` as they were, or not.
+        """
         at_s, keys = exchange.response.received_s, self._keys[act.label]
         others: list[_Write] = []
         if act.role is Role.WRITES or act.role in MAKERS:
             named = sent if act.role is Role.WRITES else told
             key = {name: texts[0] for name, texts in named.items() if name in keys and len(texts) == 1}
-            # A device may leave a value as it is for xsi:nil.
-            names = {name for name in sent.keys() & act.sent.keys() - keys if "nil" not in sent or sent[name] != [""]}
+            names = sent.keys() & act.sent.keys() - keys - unsaid
             if act.role is Role.OTHER:
                 names = {name for name in names if REFERS.search(name)}  # what it does may change all else
             values = {name: _joined(told.get(name, sent[name])) for name in names}
@@ -246,8 +252,10 @@ class SoapMemory:
                 if is_other or (sent is told and not write.key):
                     continue
                 for name, text in write.values.items():
-                    if told.get(name):
-                        yield from self._compared(act, writer, write, name, exchange, _joined(told[name]), text)
+                    # A part of a list may lack what the other parts have, and a program may leave out 0 and false.
+                    has_it = text not in _NOTHING and name in act.told and sent is not told
+                    if texts := told.get(name) or ([act.told[name].default] if has_it else []):
+                        yield from self._compared(act, writer, write, name, exchange, _joined(texts), text)
                 for name in writer.sent.keys() & told.keys() - write.values.keys() - write.key.keys():
                     # If a device has stored several texts, "None" for a left-out member comes from its program.
                     is_none = writer.sent[name].builtin in STRINGS and _NO_TEXTS.intersection(told[name])
@@ -292,7 +300,7 @@ class SoapMemory:
         )
         if is_begun:  # what was begun for one thing is not about another one
             has_to = not is_shown and got in others
-        is_ignored = self._is_ignored(act, writer, past)
+        is_ignored = self._is_ignored(act, writer, past, name)
         if has_to or is_ignored:
             requirement = "soap/refused-keeps" if is_refused else "soap/written-is-read"
             expected += ": what was written later was refused" if is_refused else ""
@@ -301,7 +309,7 @@ class SoapMemory:
             past.pending = [*past.pending, (0.0 if is_ignored or is_begun else age_s, got, found)][-_MOST:]
             yield from past.lasted(past.longest(got), "")
 
-    def _is_ignored(self, act: Act, writer: Act, past: _Past) -> bool:
+    def _is_ignored(self, act: Act, writer: Act, past: _Past, name: str) -> bool:
         """Return whether a device stores the values beside one, and never that value."""
         beside = [
             self._past[writer.noun, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
@@ -311,7 +319,7 @@ class SoapMemory:
             and not any(_BETWEEN in text for text in past.lost)
             and len({*past.lost, *past.kept}) == 1
             and act.noun == writer.noun
-            and bool(KEEPS.search(act.noun))
+            and (bool(KEEPS.search(act.noun)) if any(past.lost) else name in writer.inherited)
             and any(len(other.kept) >= _KEPT and not other.moves for other in beside)
         )
 
@@ -427,10 +435,13 @@ def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
     """Return whether a device that keeps some values has to keep this one: it lies between them, or has to be taken."""
     if simple.enumeration or simple.builtin == "boolean" or any(text in type_.enumeration for type_ in simple.others):
         return True
-    if simple.many or _BETWEEN in text:
+    if simple.many or _BETWEEN in text or not text:
         return True
     if simple.builtin in NUMBERS:
         number, numbers = number_in(text), [decimal for decimal in map(number_in, kept) if decimal is not None]
+        if number is not None and number.is_nan():
+            return True  # no limit makes a number of it
+        numbers = [decimal for decimal in numbers if decimal.is_finite()]
         if number is None or not numbers:
             return False
         return min(numbers) <= number <= max(numbers)

@@ -56,6 +56,7 @@ class SoapOperation:
         messages: local names of the input and output messages.
         parts: names of the parts of the input and the output message.
         faults: tags of the elements that its declared faults have in their detail.
+        documentation: what its documentation element says.
     """
 
     name: str
@@ -70,6 +71,7 @@ class SoapOperation:
     messages: tuple[str, ...] = ()
     parts: tuple[tuple[str, ...], ...] = ()
     faults: frozenset[str] = frozenset()
+    documentation: str = ""
 
 
 @dataclass(frozen=True)
@@ -353,6 +355,7 @@ class _Reader:
             tuple(map(name, messages)),
             tuple(tuple(map(name, element.iterfind(clark(WSDL, "part")))) for element in messages),
             frozenset(self._faults(declared)),
+            " ".join((declared.findtext(clark(WSDL, "documentation")) or "").split()),
         )
 
     def _faults(self, declared: etree._Element) -> Iterator[str]:

@@ -106,6 +106,7 @@ def clark(space: str | None, name: str) -> str:
     return f"{{{space}}}{name}" if space else name
 
 
+_TYPE: Final = clark(XSI, "type")
 _USUAL: Final = {ENVELOPE: "soap", XSI: "xsi", ADDRESSING: "wsa"}
 
 
@@ -180,6 +181,7 @@ class Node:
 
 def _namespaces(node: Node) -> set[str]:
     found = {namespace(node.tag)} | {namespace(name) for name, _ in node.attributes}
+    found |= {namespace(value) for name, value in node.attributes if name == _TYPE}
     for child in node.children:
         found |= _namespaces(child)
     return found - {""}
@@ -190,7 +192,8 @@ def _text(node: Node, prefixes: dict[str, str], bindings: str = "") -> str:
         space = namespace(tag)
         return f"{prefixes[space]}:{local(tag)}" if space else tag
 
-    attributes = "".join(f" {named(name)}={quoteattr(value)}" for name, value in node.attributes)
+    values = [(named(name), named(value) if name == _TYPE else value) for name, value in node.attributes]
+    attributes = "".join(f" {name}={quoteattr(value)}" for name, value in values)
     inside = escape(node.text) + "".join(_text(child, prefixes) for child in node.children)
     tag = named(node.tag)
     return f"<{tag}{bindings}{attributes}>{inside}</{tag}>" if inside else f"<{tag}{bindings}{attributes}/>"

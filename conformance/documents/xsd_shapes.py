@@ -10,7 +10,7 @@ from itertools import zip_longest
 from math import isclose
 from typing import TYPE_CHECKING, Any, Final
 
-from conformance.documents.xml import XSD, Node, clark, elements, local, text_of
+from conformance.documents.xml import XSD, XSI, Node, clark, elements, local, text_of
 from conformance.documents.xsd_assembly import UNKNOWN
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Simple:
         patterns: regular expressions (XML Schema) that a value must match.
         many: whether it is a list of such values.
         others: the further members of a union, whose first member this is.
+        default: the value that the declaration gives if none is there, or empty.
     """
 
     builtin: str
@@ -45,6 +46,7 @@ class Simple:
     patterns: tuple[str, ...] = ()
     many: bool = False
     others: tuple[Simple, ...] = ()
+    default: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ class Complex:
         attributes: (name in Clark notation, type, required) for each.
         wildcard: whether it allows elements or attributes that the schema does not name.
         unknown: whether no document declares it.
+        derived: types that may take its place, each with its name in Clark notation; a message names it by xsi:type.
     """
 
     content: Group | None = None
@@ -85,6 +88,7 @@ class Complex:
     attributes: tuple[tuple[str, Simple, bool], ...] = ()
     wildcard: bool = False
     unknown: bool = False
+    derived: tuple[tuple[str, Complex], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,12 +116,20 @@ class Element:
         return tuple(self.type.content.elements())
 
 
+def as_typed(declared: Element, node: Node) -> Element:
+    """Return the declaration of an element, with the derived type that its xsi:type names, if it names one."""
+    kind, name = declared.type, dict(node.attributes).get(clark(XSI, "type"))
+    found = None if name is None or isinstance(kind, Simple) else dict(kind.derived).get(name)
+    return declared if found is None else replace(declared, type=found)
+
+
 @dataclass
 class _Reader:
     """Reads declarations of xmlschema; ``left`` is how many elements of one message may yet be read."""
 
     left: int = _MOST
     path: list[int] = field(default_factory=list)
+    by_base: dict[str, list[Any]] | None = None
 
     def element(self, declared: Any) -> Element:
         """Return the content that an element declaration allows."""
@@ -129,7 +141,7 @@ class _Reader:
             unknown = Complex(wildcard=True, unknown=True)
             return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
         own = self._type(declared.type)
-        own = _fixed(own, declared.fixed) if isinstance(own, Simple) else own
+        own = _fixed(own, declared) if isinstance(own, Simple) else own
         return Element(tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable)
 
     def _type(self, declared: Any) -> Simple | Complex:
@@ -141,7 +153,7 @@ class _Reader:
         if self.path.count(id(declared)) > 1 or self.left < 0:
             return Complex()
         attributes = tuple(
-            (str(name), _fixed(_simple(attribute.type), attribute.fixed), attribute.use == "required")
+            (str(name), _fixed(_simple(attribute.type), attribute), attribute.use == "required")
             for name, attribute in declared.attributes.items()
             if name is not None and attribute.use != "prohibited"
         )
@@ -150,9 +162,22 @@ class _Reader:
             return Complex(None, _simple(declared.content), attributes, wildcard)
         self.path.append(id(declared))
         content = self._group(declared.content)
+        others = [one for one in self._derived(declared) if self.left > 0]
+        derived = tuple((str(one.name), kind) for one in others if isinstance(kind := self._type(one), Complex))
         self.path.pop()
         wildcard = wildcard or any(map(_is_any, declared.content.iter_elements()))
-        return Complex(content, None, attributes, wildcard)
+        return Complex(content, None, attributes, wildcard, derived=derived)
+
+    def _derived(self, declared: Any) -> list[Any]:
+        """Return the global types that are derived from a type directly and have a content of elements."""
+        if self.by_base is None:
+            self.by_base = {}
+            for one in declared.maps.types.values():
+                base: Any = getattr(one, "base_type", None)
+                own = str(base.name or "") if base is not None and one.is_complex() and not one.abstract else ""
+                if own and not own.startswith(clark(XSD, "")) and one.has_complex_content():
+                    self.by_base.setdefault(own, []).append(one)
+        return self.by_base.get(declared.name, []) if declared.name else []
 
     def _group(self, declared: Any) -> Group:
         items: list[Element | Group] = []
@@ -188,9 +213,11 @@ def _is_any(declared: Any) -> bool:
     return type(declared).__name__.endswith("AnyElement")
 
 
-def _fixed(simple: Simple, value: str | None) -> Simple:
-    """Return a type with only the fixed value of a declaration, if it has one."""
-    return simple if value is None else replace(simple, enumeration=(value,))
+def _fixed(simple: Simple, declared: Any) -> Simple:
+    """Return a type with the default of a declaration, or with only its fixed value, if it has one."""
+    if declared.fixed is None:
+        return replace(simple, default=declared.default) if declared.default else simple
+    return replace(simple, enumeration=(declared.fixed,))
 
 
 def _simple(declared: Any) -> Simple:
@@ -429,6 +456,8 @@ def plain(simple: Simple) -> str:
 def is_alike(simple: Simple, one: str, two: str) -> bool:
     """Return whether two texts are the same value of a type (2.2)."""
     one, two = one.strip(), two.strip()
+    if one == two:  # NaN as well (3.2.5)
+        return True
     if simple.many:
         item, pairs = replace(simple, many=False), list(zip_longest(one.split(), two.split(), fillvalue=""))
         return all(is_alike(item, *pair) for pair in pairs)

@@ -16,12 +16,12 @@ from itertools import islice
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
-from conformance.api.soap.forms import another, extreme, rewritten, shortest
-from conformance.api.soap.messages import declarations, ordinary, simple_leaves, with_text
+from conformance.api.soap.forms import another, boundless, extreme, rewritten, shortest
+from conformance.api.soap.messages import declarations, derived, ordinary, simple_leaves, with_text
 from conformance.api.soap.mutations import branches, invalid_ones, mutations
 from conformance.api.soap.roles import KEEPS, REFERS, SETTLES_S, Act, Role, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
-from conformance.documents.xml import NEXT_12, NEXT_ACTOR, XSI, Node, clark, parse
+from conformance.documents.xml import NEXT_12, NEXT_ACTOR, XSI, Node, clark, local, parse
 from conformance.documents.xsd_shapes import NUMBERS, STRINGS, Element, Simple, is_alike, plain
 from conformance.scenarios.described_messages import fields_of, target_of
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, scenario
@@ -185,7 +185,9 @@ class _Changes:
     def _ends(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
         """Write the longest and the shortest values, and none, and read what comes of it."""
         until = time.monotonic() + _BUDGET_S
-        for says, texts in (("the longest values", extreme), ("empty texts and negative numbers", shortest)):
+        ends = [("the longest values", extreme), ("empty texts and negative numbers", shortest)]
+        ends += [(f"{number} as each number", partial(boundless, number=number)) for number in ("INF", "NaN")]
+        for says, texts in ends:
             tried = [node]
             for leaves in (free, *([one] for one in free)):
                 made = node
@@ -201,12 +203,13 @@ class _Changes:
                     self._wait(readers, made, leaves)
                     if leaves is free:
                         break
-        names = {node.at(path).name for path, _ in free}
-        for says, made in _without(declared, node):
+        names = {node.at(path).name.lower() for path, _ in free} | act.inherited
+        for says, made in (*_without(declared, node), *_derived(declared, node)):
             if time.monotonic() < until and not self.caller.messages.found.types.invalid(parse(made.written())):
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
-                left = [one for one in simple_leaves(declared, made) if one[0] and made.at(one[0]).text]
-                self._wait(readers, made, [one for one in left if made.at(one[0]).name in names])
+                left = [(path, kind, made.at(path)) for path, kind in simple_leaves(declared, made) if path]
+                left = [one for one in left if one[2].text or one[2].name.lower() in act.emptied]
+                self._wait(readers, made, [one[:2] for one in left if one[2].name.lower() in names])
 
     def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> bool:
         """Read until a written value is read, or the time for it is over; return whether any was."""
@@ -302,9 +305,12 @@ class _Changes:
                 time.sleep(_LASTS_S)
             self._read(lists, node)
             yield
+        typed = [_told(probe) for probe in self._created_as_derived(act, declared, node)]
+        made += [texts[0] for told in typed for name, texts in told.items() if REFERS.search(name)][: len(typed)]
+        own = [Node("", "", tuple(Node(name, texts[0]) for name, texts in told.items())) for told in typed]
         time.sleep(SETTLES_S)
         self._read(lists, node)
-        for asked in asks * 3:
+        for asked in (*asks * 3, *own * _TURNS[0]):
             self._read(readers, asked)
         for kind in (0, _REFUSALS - 1):
             self._refuse(act, declared, _varied(node, free, _THINGS), kind)
@@ -316,6 +322,15 @@ class _Changes:
         self._read(lists, node, times=2)
         for asked in asks:
             self._read(readers, asked)
+
+    def _created_as_derived(self, act: Act, declared: Element, node: Node) -> Iterator[SoapProbe]:
+        """Create a thing of a derived type, and again if that is refused; yield the success."""
+        for says, made in islice(_derived(declared, node), 1):
+            for kind in (Kind.TRIED, Kind.VARIED):
+                probe = self.caller.ask(act, made, says, kind)
+                if probe.succeeded:
+                    yield probe
+                    break
 
     def remove(self, act: Act, node: Node, id_: str) -> None:
         """Remove a thing by its id."""
@@ -488,6 +503,13 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
 def _turned(node: Node) -> Node:
     """Return a message whose attributes are in another order."""
     return replace(node, children=tuple(map(_turned, node.children)), attributes=node.attributes[::-1])
+
+
+def _derived(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield messages in which a derived type takes the place of its base, each with what is special about it."""
+    for made in derived(declared, node):
+        names = [text for path in made.paths() for name, text in made.at(path).attributes if name == clark(XSI, "type")]
+        yield f"xsi:type {local(names[-1])}", made
 
 
 def _without(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:

@@ -174,6 +174,12 @@ def shortest(simple: Simple, text: str, is_free: bool) -> str:  # noqa: FBT001 -
     return "" if simple.builtin in STRINGS and not simple.min_length else text
 
 
+def boundless(simple: Simple, text: str, is_free: bool, number: str) -> str:  # noqa: FBT001 - as another()
+    """Return INF or NaN, as ``number`` says, if a type allows it; else the same value."""
+    is_bounded = simple.minimum is not None or simple.maximum is not None
+    return text if _is_limited(simple) or is_bounded or not is_free or simple.builtin not in FLOATS else number
+
+
 def _is_limited(simple: Simple) -> bool:
     return bool(simple.enumeration or simple.patterns or simple.many or simple.others)
 

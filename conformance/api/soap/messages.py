@@ -1,6 +1,6 @@
 """Make messages from a schema: one ordinary message, and strategies for all valid ones."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -9,8 +9,8 @@ from hypothesis.strategies import SearchStrategy
 
 from conformance.api.soap import forms
 from conformance.documents import xsd_shapes as lexical
-from conformance.documents.xml import Node, local
-from conformance.documents.xsd_shapes import Complex, Element, Group, Simple
+from conformance.documents.xml import XSI, Node, clark, local
+from conformance.documents.xsd_shapes import Complex, Element, Group, Simple, as_typed
 
 # Most elements of one kind in a message: a schema that demands more is not supported.
 _MOST: Final = 1000
@@ -87,6 +87,16 @@ def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
     return node.replaced(path, replace(node.at(path), text=text))
 
 
+def derived(element: Element, node: Node) -> Iterator[Node]:
+    """Yield the message with a derived type in place of one that it has, in turn; the values in common stay."""
+    for path, declared in declarations(element, node):
+        for name, kind in () if isinstance(declared.type, Simple) else declared.type.derived:
+            full, own = ordinary(replace(declared, type=kind), optional=True), node.at(path)
+            more = tuple(child for child in full.children if child.tag not in {one.tag for one in own.children})
+            attributes = (*own.attributes, (clark(XSI, "type"), name))
+            yield node.replaced(path, replace(own, children=(*own.children, *more), attributes=attributes))
+
+
 def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], Element]]:
     """Return path and declaration of each descendant of a valid message, if it has one."""
     found: list[tuple[tuple[int, ...], Element]] = []
@@ -94,6 +104,7 @@ def declarations(element: Element, node: Node) -> list[tuple[tuple[int, ...], El
     for index, child in enumerate(node.children):
         declared = by_tag.get(child.tag)
         if declared is not None:
+            declared = as_typed(declared, child)
             found.append(((index,), declared))
             found += [((index, *path), inner) for path, inner in declarations(declared, child)]
     return found

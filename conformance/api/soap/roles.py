@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
@@ -15,7 +15,7 @@ from conformance.documents.multipart import in_utf_8
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl
 from conformance.documents.wsdl_pack import each, label_of
 from conformance.documents.xml import NotXmlError, elements, local, parse
-from conformance.documents.xsd_shapes import STRINGS, Element, Simple
+from conformance.documents.xsd_shapes import STRINGS, Complex, Element, Simple
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 #: Ends of element names by which a device identifies its things.
@@ -26,6 +26,10 @@ KEEPS: Final = re.compile(r"settings?$|config(?:uration)?$|options?$|preferences
 TEXTS: Final = STRINGS | {"anyURI", "ID", "IDREF", "NCName", "NMTOKEN", "Name", "QName"}
 #: A device may apply a change or a removal this long after its response, s.
 SETTLES_S: Final = 1.0
+# A sentence by which xsi:nil removes a value, and what one says by which it does not.
+_NIL: Final = re.compile(r"\b(?:nil|null)\b", re.IGNORECASE)
+_REMOVES: Final = re.compile(r"\b(?:remov|clear|delet|eras|unset|empt)", re.IGNORECASE)
+_NOT: Final = re.compile(r"\b(?:not|never|no|keep|leav|ignor|unchang)|n't", re.IGNORECASE)
 # Elements of a message that are nested deeper than this are not compared.
 _DEEPEST: Final = 6
 # A message longer than this is not read, octets.
@@ -68,6 +72,9 @@ class Act:
         sent: simple types of the values in its request by their names in lower case; required ones in ``needs``.
         needs: names of values that each request has.
         told: simple types of the values in its response.
+        emptied: names of values that have none any more once they were sent with xsi:nil: where the schema demands the
+            element, or the documentation says so. Elsewhere, a device may take xsi:nil for "as it was".
+        inherited: names of values that a derived type demands, and its base does not know.
     """
 
     port: SoapPort
@@ -77,6 +84,8 @@ class Act:
     sent: dict[str, Simple] = field(default_factory=dict)
     needs: frozenset[str] = frozenset()
     told: dict[str, Simple] = field(default_factory=dict)
+    emptied: frozenset[str] = frozenset()
+    inherited: frozenset[str] = frozenset()
 
     @property
     def makes(self) -> dict[str, Simple]:
@@ -139,7 +148,35 @@ def _act(found: Wsdl, port: SoapPort, operation: SoapOperation) -> Act:
         {name: simple for name, (simple, _) in sent.items()},
         frozenset(name for name, (_, needed) in sent.items() if needed),
         {name: simple for name, simple, _ in _values(response)} if response else {},
+        frozenset(_emptied(request, clears=_is_cleared_by_nil(operation.documentation))) if request else frozenset(),
+        frozenset(_inherited(request)) if request else frozenset(),
     )
+
+
+def _is_cleared_by_nil(documentation: str) -> bool:
+    """Return whether a documentation says that xsi:nil removes a value."""
+    sentences = re.split(r"[.;]", documentation)
+    return any(_NIL.search(one) and _REMOVES.search(one) and not _NOT.search(one) for one in sentences)
+
+
+def _emptied(declared: Element, depth: int = 0, *, clears: bool) -> Iterator[str]:
+    for child in declared.children if depth < _DEEPEST else ():
+        if child.nillable and (child.minimum or clears):
+            yield local(child.tag).lower()
+        yield from _emptied(child, depth + 1, clears=clears)
+
+
+def _inherited(declared: Element, depth: int = 0) -> Iterator[str]:
+    for child in declared.children if depth < _DEEPEST else ():
+        known = {name for name, _, _ in _values(replace(child, type=_without_derived(child.type)))}
+        for _, other in () if isinstance(child.type, Simple) else child.type.derived:
+            needed = {name for name, _, needs in _values(replace(child, type=_without_derived(other))) if needs}
+            yield from needed - known
+        yield from _inherited(child, depth + 1)
+
+
+def _without_derived(kind: Simple | Complex) -> Simple | Complex:
+    return kind if isinstance(kind, Simple) else replace(kind, derived=())
 
 
 def _is_id(name: str, simple: Simple) -> bool:
@@ -169,6 +206,8 @@ def _values(declared: Element, depth: int = 0, *, needed: bool = True) -> Iterat
         if depth:
             yield local(declared.tag).lower(), kind, needed
         return
+    for _, other in kind.derived if depth < _DEEPEST else ():
+        yield from _values(replace(declared, type=other), depth, needed=False)
     for name, simple, required in kind.attributes:
         yield local(name).lower(), simple, needed and required
     if kind.text is not None:

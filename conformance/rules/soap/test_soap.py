@@ -25,7 +25,9 @@ _ON = (soap_survey, soap_changes)
 _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
 _CHILDREN_11 = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
+_CHILDREN_12 = ("Code", "Reason", "Node", "Role", "Detail")
 _CODES_12 = frozenset({"VersionMismatch", "MustUnderstand", "DataEncodingUnknown", "Sender", "Receiver"})
+_SUBCODE = clark(ENVELOPE_12, "Subcode")
 _LANG = "{http://www.w3.org/XML/1998/namespace}lang"
 # A message that shows no version of SOAP may be answered by a fault of any version, or by none.
 _OF_NO_VERSION = frozenset({Kind.VERSION, Kind.UNREADABLE, Kind.EMPTY})
@@ -137,7 +139,7 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
     found = services_of(run.contract)
 
     def wrong(probe: SoapProbe) -> str | None:
-        if found is None or not probe.succeeded or probe.exchange is None or probe.response is None:
+        if found is None or not probe.succeeded or probe.exchange is None:
             return None
         try:
             inside = probe.inside()
@@ -145,8 +147,9 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
             return None
         if probe.response and found.types.shape(probe.response) is None:
             return None
-        if not probe.response:
-            return "" if not inside else f"{inside[0].tag} in a Body that must be empty"
+        if not probe.response:  # WS-I BP 1.1, R2714, if the WSDL has no output
+            what = "a Body that must be empty" if probe.response is not None else "response to a one-way operation"
+            return "" if not inside else f"{inside[0].tag} in {what}"
         if len(inside) != 1 or inside[0].tag != probe.response:
             return f"{inside[0].tag if inside else 'an empty Body'} in place of {probe.response}"
         return found.types.invalid(inside[0])
@@ -216,12 +219,28 @@ def _wrong_fault_12(found: etree._Element) -> str:
     prefix, _, name = (text_of(value).strip() if value is not None else "").rpartition(":")
     if value is None or value.nsmap.get(prefix or None) != ENVELOPE_12 or name not in _CODES_12:
         return f"the code {text_of(value).strip() if value is not None else ''!r}, which SOAP 1.2 does not have"
-    if wrong := next(filter(None, map(_undeclared, found.iter(clark(ENVELOPE_12, "Value")))), ""):
-        return wrong
+    parts = (by_name["Code"], *found.iter(_SUBCODE))
+    wrong = [*map(_undeclared, found.iter(clark(ENVELOPE_12, "Value"))), *map(_wrong_code_12, parts), _disorder(found)]
+    if any(wrong):
+        return next(filter(None, wrong))
     texts = [element for element in elements(by_name["Reason"]) if local(str(element.tag)) == "Text"]
     if not texts or not text_of(texts[0]).strip():
         return "a Reason without Text"
     return "" if all(element.get(_LANG) for element in texts) else "a Text of Reason without xml:lang"
+
+
+def _disorder(found: etree._Element) -> str:
+    """Return that a fault of SOAP 1.2 has other children than its schema allows, or in another order."""
+    names = [str(element.tag) for element in elements(found)]
+    allowed = [tag for name in _CHILDREN_12 if (tag := clark(ENVELOPE_12, name)) in names]
+    return "" if names == allowed else f"not {', '.join(map(local, allowed))} alone, once each and in this order"
+
+
+def _wrong_code_12(code: etree._Element) -> str:
+    """Return what is wrong with the children of a Code or Subcode (SOAP 1.2 Part 1, 5.4.1)."""
+    names = [str(element.tag) for element in elements(code)]
+    is_right = names[:1] == [clark(ENVELOPE_12, "Value")] and names[1:] in ([], [_SUBCODE])
+    return "" if is_right else f"a {local(str(code.tag))} that is not a Value and at most one Subcode"
 
 
 @rule("soap/fault-status", on=_ON)

@@ -209,6 +209,33 @@ def test_mutants_by_rule_are_killed(name, tmp_path, secret):
     assert len(survivors) <= 0.05 * number, survivors
 
 
+@pytest.mark.parametrize(("answer", "wrong"), [((200, "", b""), False), (None, True)])
+def test_a_one_way_operation_has_no_message_in_its_response(answer, wrong, tmp_path, secret):
+    """WS-I BP 1.1, R2714."""
+    device = camera()
+    device.wsdl = device.wsdl.replace('<output message="c:AbsoluteMoveOut"/>', "")
+    device.alter = lambda request, *came: answer if answer and b"AbsoluteMove" in request and came[0] == 200 else came
+    broken, judged = _judged(device, tmp_path, secret)
+    assert "soap/response-valid" in judged
+    assert broken == ({"soap/response-valid"} if wrong else set())
+
+
+@pytest.mark.parametrize(
+    ("after", "more", "wrong"),
+    [
+        ("</s:Value>", "<s:Subcode><s:Value>s:NotKnown</s:Value></s:Subcode>", False),
+        ("</s:Reason>", "<s:Node>urn:table</s:Node><s:Role>urn:table</s:Role><s:Detail/>", False),
+        ("</s:Value>", "<s:Subcode>s:NotKnown</s:Subcode>", True),
+        ("</s:Reason>", "<s:Role>urn:table</s:Role><s:Node>urn:table</s:Node>", True),
+        ("</s:Reason>", "<detail/>", True),
+    ],
+)
+def test_a_fault_of_soap_1_2_has_the_parts_of_its_schema(after, more, wrong, tmp_path, secret):
+    device = table()
+    device.alter = _replacing(after.encode(), f"{after}{more}".encode(), faults=True)
+    assert _judged(device, tmp_path, secret)[0] == ({"soap/fault"} if wrong else set())
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -18,11 +18,13 @@ _FAULTS = (
     },
     {
         "refused label applied": ("refused-keeps", "label '"),
+        "nil stays": ("written-is-read", "note '"),
         "bins share": ("written-is-read", "weight '"),
         "delete takes all": ("created-is-there", "AddRecipe"),
     },
     {
         "label ignored": ("written-is-read", "label '"),
+        "NaN is zero": ("written-is-read", "offset 'NaN'"),
         "burst is slow": ("written-is-read", "mode '"),
         "delete does nothing": ("deleted-is-gone", "which was removed"),
     },
