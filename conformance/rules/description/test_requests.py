@@ -9,12 +9,13 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
+from conformance.api.rest.conversions import is_converted
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.writing import json_text
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.rule import Outcome, rule
@@ -62,14 +63,9 @@ def operations(trace: Survey, run: Run) -> Iterable[Outcome]:
 
 
 @rule("description/invalid-refused", on=(survey, generated_requests))
-def invalid_refused(trace: Survey) -> Iterable[Outcome]:
-    """Judge whether requests with values that the description forbids are refused."""
-    sure = [one for one in trace.probes if one.kind in _WRONG and one.validity != VALID and one.exchange is not None]
-    sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
-    # A thing that a path cannot name does not exist either.
-    absent = _deletes_the_absent(trace)
-    sure = [one for one in sure if not (one.ok and one.operation in absent and _place_of(one).startswith("path "))]
-    sure = [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
+def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether requests with values that the description forbids are refused, unless they are converted."""
+    sure = _forbidden(trace)
 
     def fault(probe: Probe) -> Fault | None:
         if not probe.ok:
@@ -87,8 +83,46 @@ def invalid_refused(trace: Survey) -> Iterable[Outcome]:
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from held_back(sure)
-    acted = [one for one in sure if one.status not in HELD]
+    converted = _converted(sure, run)
+    acted = [one for one in sure if one.status not in HELD and one not in converted]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
+
+
+@rule("description/types", on=(survey, generated_requests))
+def types(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether a value of another type is refused, also where the device converts it without loss."""
+    sure = _forbidden(trace)
+    converted = _converted(sure, run)
+
+    def fault(probe: Probe) -> Fault | None:
+        why = "" if probe.says else f", although {probe.why}"
+        return Fault("a type converted", f"status {probe.status}{why}") if probe in converted else None
+
+    acted = [one for one in sure if one in converted or one.status in _REFUSED]
+    yield from told_once(acted, "status 4xx for a value of a type that the description does not declare", fault)
+
+
+def _forbidden(trace: Survey) -> list[Probe]:
+    """Return the answered requests that the description forbids without doubt."""
+    sure = [one for one in trace.probes if one.kind in _WRONG and one.validity != VALID and one.exchange is not None]
+    sure += [one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == INVALID and one.exchange]
+    # A thing that a path cannot name does not exist either.
+    absent = _deletes_the_absent(trace)
+    sure = [one for one in sure if not (one.ok and one.operation in absent and _place_of(one).startswith("path "))]
+    return [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
+
+
+def _converted(probes: Iterable[Probe], run: Run) -> list[Probe]:
+    """Return the probes whose JSON body was accepted, as a value of the declared type means the same."""
+    bodies = {operation.label: operation.bodies for operation in operations_of(run.contract)}
+    found = []
+    for probe in probes:
+        request = probe.attempt.request
+        media_type = request.media_type
+        given = bodies.get(probe.operation, {}).get(media_type)
+        if probe.ok and probe.exchange and given and is_json(media_type) and _place_of(probe).startswith("body"):
+            found += [probe] if is_converted(given.schema, request.body, probe.exchange.response.body) else []
+    return found
 
 
 def _deletes_the_absent(trace: Survey) -> set[str]:

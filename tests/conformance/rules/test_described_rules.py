@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from conformance.api.rest.conversions import is_converted
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
@@ -123,6 +124,7 @@ _ALL = [
     answers.headers,
     requests.operations,
     requests.invalid_refused,
+    requests.types,
     requests.required,
     requests.optional,
     requests.enums,
@@ -261,6 +263,67 @@ def test_types_that_a_framework_converts_are_told_once(run):
     ]
     found = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
     assert sorted(one.cause for one in found) == ["a boolean converted", "number ['string', 'null']", "string integer"]
+
+
+_LENIENT = {
+    "required": ["n"],
+    "properties": {
+        "n": {"type": "integer", "minimum": 0},
+        "on": {"anyOf": [{"type": "boolean"}, {"type": "null"}]},
+        "text": {"type": "string"},
+        "set": {"type": "array", "uniqueItems": True, "items": {"type": "integer"}},
+        "at": {"type": "string", "format": "date-time"},
+        "in": {"type": "object", "properties": {"x": {"type": "number"}}},
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("sent", "said", "is_same"),
+    [
+        ('{"n": "5"}', '{"n": 5}', True),
+        ('{"n": "5"}', '{"data": {"n": 5}}', True),
+        ('{"n": "5"}', '{"id": 1}', True),
+        ('{"n": "5"}', "", True),
+        ('{"n": "5"}', '{"n": "5"}', False),
+        ('{"n": "5"}', '{"n": 0}', False),
+        ('{"n": "5 mm"}', "", False),
+        ('{"n": "-5"}', "", False),
+        ('{"n": false}', '{"n": 0}', True),
+        ('{"n": false}', '{"n": false}', False),
+        ('{"n": null}', '{"n": 0}', False),
+        ('{"n": 1, "on": 0}', '{"n": 1, "on": false}', True),
+        ('{"n": 1, "on": "false"}', '{"n": 1, "on": false}', True),
+        ('{"n": 1, "on": "false"}', '{"n": 1, "on": true}', False),
+        ('{"n": 1, "on": 2}', '{"n": 1, "on": true}', False),
+        ('{"n": 1, "text": 5.0}', '{"text": "5"}', True),
+        ('{"n": 1, "text": true}', '{"text": "1"}', False),
+        ('{"n": 1, "text": null}', '{"text": "a"}', True),
+        ('{"n": 1, "set": [2, 1, 2]}', '{"set": [1, 2]}', True),
+        ('{"n": 1, "set": [2, 1, 2]}', '{"set": [2]}', False),
+        ('{"n": 1, "set": "2"}', '{"set": [2]}', True),
+        ('{"n": 1, "at": 0}', '{"at": "1970-01-01T00:00:00Z"}', True),
+        ('{"n": 1, "in": {"x": "2.5"}}', '{"in": {"x": 2.5}}', True),
+        ('{"n": 1, "in": {"x": "2.5"}}', '{"in": {"x": 2}}', False),
+        ('{"n": "1", "in": 5}', "", False),
+        ('{"n": 1}', '{"n": 1}', False),
+    ],
+)
+def test_a_conversion_without_loss_keeps_the_meaning(sent, said, is_same):
+    assert is_converted(_LENIENT, sent.encode(), said.encode()) is is_same
+
+
+@pytest.mark.parametrize("text", ["5", "five"])
+def test_a_device_that_converts_types_without_loss_is_warned_once(text, run):
+    body = json.dumps({"n": text}).encode()
+    two = [
+        _probe(
+            body={"n": 5}, kind=Kind.INVALID, operation=_OTHER, says="a text as body /n", place="body /n", sent=body
+        ),
+        _probe(body={"n": 5}, kind=Kind.GENERATED, operation=_OTHER, validity="invalid", why="n: 'a' is b", sent=body),
+    ]
+    failed = [len(_failed(rule, Survey(tuple(two)), run)) for rule in (requests.types, requests.invalid_refused)]
+    assert failed == ([1, 0] if text == "5" else [0, 1])
 
 
 def test_what_an_operation_does_not_check_in_one_place_is_told_once(run):
