@@ -17,6 +17,7 @@ from conformance.commandline.out_folder import write_atomically
 from conformance.contract.described import MOTION
 from conformance.contract.toml_file import basic_string
 from conformance.documents.openapi import operations_of
+from conformance.statement.motion_calls import named_by
 from conformance.statement.statement import Calls, StatementError, motion_map_of
 from conformance.target.naming import Judged
 
@@ -34,6 +35,13 @@ _OPTIONS = (
     ),
     options_of(Group.CALLS, rare=True),
     click.option("--read", metavar="OPERATION", help="With --drive: 'GET /state' tells where it is.  [default: found]"),
+    click.option(
+        "--before",
+        multiple=True,
+        metavar="OPERATION",
+        help="With --drive: 'POST /enable' is sent before the robot can move; repeatable, with JSON behind it if it "
+        "needs some.  [default: found]",
+    ),
     click.option("--yes", is_flag=True, help="With --drive: move the robot without asking."),
     click.option(
         "--save-map",
@@ -66,7 +74,12 @@ def checked(options: CertifyOptions, *, named: bool) -> CertifyOptions:
         click.UsageError: they do not fit together, or nobody can be asked.
     """
     if options.drive is None:
-        given = {"--read": options.read, "--yes": options.yes, "--save-map": options.save_map}
+        given = {
+            "--read": options.read,
+            "--before": options.before,
+            "--yes": options.yes,
+            "--save-map": options.save_map,
+        }
         for name in (name for name, value in given.items() if value):
             raise click.UsageError(f"{name} says more on --drive: give --drive 'METHOD /path' as well")
         return options
@@ -113,13 +126,14 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         raise StatementError("the statement has a motion map: leave --drive out, or take [motion] out")
     drive = options.drive or ""
     try:
-        plan = plan_of(operations_of(judged.contract), drive, options.read, options.calls)
+        operations = operations_of(judged.contract)
+        plan = plan_of(operations, drive, options.read, options.calls, options.before)
         for line in plan.told():
             click.echo(inert(line), err=True)
         if not options.yes and not click.confirm("May the robot move?", err=True):
             raise KeyboardInterrupt
-        named = plan.named or plan.drive
-        calls = Calls((*statement.calls.allow, named.label), statement.calls.never)
+        sent = named_by(plan.preparing.calls, [operation.label for operation in operations])
+        calls = Calls((*statement.calls.allow, (plan.named or plan.drive).label, *sorted(sent)), statement.calls.never)
         run.statement = msgspec.structs.replace(statement, calls=calls)
         connection = connection_of(statement.endpoints)
         connection.permit = Permission(run).refusal

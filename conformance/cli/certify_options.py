@@ -39,6 +39,7 @@ class CertifyOptions(DeviceOptions):
     as_json: bool = False
     drive: str | None = None
     read: str | None = None
+    before: tuple[str, ...] = ()
     yes: bool = False
     save_map: Path | None = None
 

@@ -14,21 +14,39 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from conformance.api.call_rules import CallRules, harmful_words, matches
+import msgspec
+
+from conformance.api.call_rules import CallRules, harmful_words
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import Operation, is_json
 from conformance.engine.commanded import Commanded, body_schema, commanded_by, is_velocity, numbers_in, template_of
 from conformance.engine.driven_numbers import Looks, numbers_of
+from conformance.engine.found_preparation import (
+    NOTHING,
+    Preparing,
+    is_excluded,
+    lease_header,
+    lease_place,
+    members_of,
+    named_preparing,
+    preparing_of,
+    wants_lease,
+    wants_more,
+)
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding
+from conformance.scenarios.motion.preparing import Preparation
 from conformance.scenarios.motion.templates import NoValueError, filled
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_calls import named_by, names_operation
-from conformance.transport.exchange import Exchange
+from conformance.transport.exchange import Exchange, Outgoing
 
 _PACE_S: Final = 0.02
 _MOST_NUMBERS, _MOST_READS = 8, 6
+# _READY_S: how long a device may take to get ready; _AT_ONCE_S: so soon it is ready at once, s. _LONG: no state is a
+# text of so many characters.
+_READY_S, _AT_ONCE_S, _LONG = 20.0, 0.3, 40
 _STATE: Final = re.compile(
     r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle", re.IGNORECASE
 )
@@ -52,6 +70,8 @@ class Plan:
         is_velocity: whether it commands velocities; else positions.
         stop: the operation beside it that stops the device, by its name; or None.
         named: the operation that commands as the description has it, without values in its path; None: the same.
+        preparing: what the device may want before it moves.
+        is_prepared: whether the user says that it wants that.
     """
 
     drive: Operation
@@ -60,6 +80,8 @@ class Plan:
     is_velocity: bool
     stop: Operation | None = None
     named: Operation | None = None
+    preparing: Preparing = NOTHING
+    is_prepared: bool = False
 
     def told(self) -> Iterator[str]:
         """Yield the planned steps as lines for the user."""
@@ -72,6 +94,7 @@ class Plan:
             )
             yield f"  {command.name:<16} {declared}; tried at {command.little:g}"
         yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
+        yield from self.preparing.told()
         far = max(abs(end) for command in self.numbers for end in command.limits)
         room = max(ROOM_M, ROOM_S * far)
         driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
@@ -93,14 +116,16 @@ class Found:
     drives_on_s: float | None = None
 
 
-def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules: CallRules) -> Plan:
-    """Return the operations to command and to read, from a description.
+def plan_of(
+    operations: Sequence[Operation], drive: str, read: str | None, rules: CallRules, before: Sequence[str] = ()
+) -> Plan:
+    """Return the operations to command and to read, from a description; ``before``: what the user sends before.
 
     Raises:
         NotPossibleError: it says too little; the message says what.
     """
     named = _named(operations, drive, "--drive")
-    if named.never or any(matches(pattern, named) for pattern in rules.never):
+    if is_excluded(named, rules):
         raise NotPossibleError(f"{named.label} must never be called: the description or --never says so")
     chosen, values = _with_values(named, drive)
     numbers = commanded_by(chosen)[:_MOST_NUMBERS]
@@ -125,7 +150,8 @@ def plan_of(operations: Sequence[Operation], drive: str, read: str | None, rules
     reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(operations, chosen), named)
+    preparing = named_preparing(operations, before, rules) if before else preparing_of(operations, named, rules)
+    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(operations, chosen), named, preparing, bool(before))
 
 
 def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, str]]:
@@ -148,7 +174,8 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
             and _STOP.fullmatch(named)
             and operation.method in {"POST", "PUT"}
         ):
-            return None if operation.never or operation.parameters else operation
+            wanted = [one.name for one in operation.parameters if one.name != lease_header(operation)]
+            return None if operation.never or wanted else operation
     return None
 
 
@@ -217,22 +244,116 @@ class Finder(ABC):
 
     def __init__(self, api: RestInterface, binding: Binding, plan: Plan, clock: Clock = WALL_CLOCK) -> None:
         self._api, self._binding, self._plan, self._clock = api, binding, plan, clock
-        self._looks, self._turn = Looks(), 0
-        schema = body_schema(plan.drive)
-        named = {place: value for command in plan.numbers for place, value in command.templates.items()}
-        self._body = template_of(schema, named) if schema is not None else None
-        self._reads = list(plan.reads)
-        self._found = Found()
+        self._begin()
         self._answer: Any = None
+        self._left, self._used, self._is_accepted = plan.preparing, NOTHING, False
+        self._asked, self._words = 0.0, dict[str, Any]()
+        self._ready = Preparation(self._used, binding, self._exchange, clock)
 
-    @abstractmethod
+    def _begin(self) -> None:
+        self._looks, self._turn, self._reads, self._found = Looks(), 0, list(self._plan.reads), Found()
+
     def found(self) -> Found:
-        """Return the map of the device.
+        """Return the map of the device, which is made ready first if it wants that, and left as it was.
 
         Raises:
             NotPossibleError: nothing shows that it moves; the message says what was tried.
             NoAnswerError: there is no response.
         """
+        try:
+            is_needed = self._plan.is_prepared or (self._left.lease is not None and wants_lease(self._plan.drive))
+            while is_needed and self._prepare() and self._plan.is_prepared:
+                pass
+            try:
+                self._find()
+            except NotPossibleError:
+                if not (self._is_accepted and self._prepare()):
+                    raise
+                while self._prepare():
+                    pass
+                self._begin()
+                self._find()
+        finally:
+            try:
+                self._ready.end()
+            except NotPossibleError as problem:
+                self._found.notes.append(f"{problem}.")
+        self._found.lines = [*self._used.lines(), *self._found.lines]
+        return self._found
+
+    @abstractmethod
+    def _find(self) -> None:
+        """Drive the device a little, and keep the lines of its map.
+
+        Raises:
+            NotPossibleError: nothing shows that it moves; the message says what was tried.
+            NoAnswerError: there is no response.
+        """
+
+    def _prepare(self) -> bool:
+        """Send the next of what the device may want before it moves; return whether it accepted one."""
+        lease, drive = self._left.lease, self._plan.named or self._plan.drive
+        if lease is not None:
+            self._left = replace(self._left, lease=None)
+            exchange = self._send(lease.acquire, lease.body)
+            if exchange.response.ok:
+                content = self._binding.content(exchange.response.body)
+                self._used = replace(self._used, lease=lease).with_token(drive, content)
+                self._ready.motion = self._used
+                self._ready.hold(self._used.lease or lease, exchange)
+                return True
+            self._found.notes.append(f"{lease.acquire} got {exchange.came}.")
+        while self._left.steps:
+            (step, ends), *rest = self._left.steps
+            self._left = replace(self._left, steps=tuple(rest))
+            self._words = self._states()
+            exchange = self._send(step.send, step.body)
+            if exchange.response.ok:
+                self._used = replace(self._used, steps=(*self._used.steps, (step, ends)))
+                self._ready.motion, self._asked = self._used, self._clock.now()
+                return True
+            self._found.notes.append(f"{step.send} got {exchange.came}.")
+        return False
+
+    def _waits(self) -> bool:
+        """Wait a little while the device gets ready; return whether it still has time for that."""
+        self._clock.sleep(_PACE_S)
+        return bool(self._used.steps) and self._clock.now() < self._asked + _READY_S
+
+    def _note_ready(self) -> None:
+        """Note what shows that the device is ready, if it had to be awaited after the last step: what changed since."""
+        if self._is_accepted and self._used.steps and self._clock.now() > self._asked + _AT_ONCE_S and self._words:
+            words, read = self._states(), self._plan.reads[0].label
+            (step, ends), changed = (
+                self._used.steps[-1],
+                [at for at, word in words.items() if self._words.get(at) != word],
+            )
+            if changed:
+                step = msgspec.structs.replace(step, read=read, at=changed[0], shows=words[changed[0]])
+                self._used = replace(self._used, steps=(*self._used.steps[:-1], (step, ends)))
+        self._words = {}
+
+    def _states(self) -> dict[str, Any]:
+        """Return what is neither number nor long in the first reading: states, by JSON pointer."""
+        content = self._binding.content(self._send(self._plan.reads[0].label, None).response.body)
+        members = members_of(content)
+        return {
+            at: word for at, word in members if isinstance(word, bool) or (isinstance(word, str) and len(word) < _LONG)
+        }
+
+    def _template(self, names: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Return the body of a command with templates at some places, and with the lease where it belongs there."""
+        schema = body_schema(self._plan.drive)
+        if schema is None:
+            return None
+        lease = self._used.lease
+        at = lease_place(self._plan.drive) if lease and lease.token and not lease.header else ""
+        return template_of(schema, {**names, at: "{lease}"} if at else names)
+
+    @property
+    def _body(self) -> dict[str, Any] | None:
+        """The body of a command."""
+        return self._template({at: value for number in self._plan.numbers for at, value in number.templates.items()})
 
     def _look(self) -> None:
         """Read one operation; an operation without numbers is not read again."""
@@ -258,17 +379,29 @@ class Finder(ABC):
             least -= 1
 
     def _send(self, call: str, body: Any) -> Exchange:
-        made = self._binding.made(call, body)
+        self._ready.keep()
+        return self._exchange(self._ready.with_lease(self._binding.made(call, body)))
+
+    def _exchange(self, made: Outgoing) -> Exchange:
         return self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
 
     def _command(self, values: Mapping[str, float]) -> Exchange:
-        """Command some numbers; the others are 0, or as near as their limits allow."""
+        """Command some numbers; the others are 0, or as near as their limits allow.
+
+        As long as the device refuses each command, it gets what it may want before it moves.
+        """
         zero = {command.name: min(max(0.0, command.limits[0]), command.limits[1]) for command in self._plan.numbers}
-        written = {**zero, **values, "seconds": self.seconds}
+        written: dict[str, Any] = {**zero, **values, "seconds": self.seconds}
         for command in self._plan.numbers:
             if command.schema.get("type") == "integer":
                 written[command.name] = round(written[command.name])
-        try:
-            return self._send(filled(self._plan.drive.label, written), filled(self._body, written))
-        except NoValueError as error:
-            raise NotPossibleError(str(error)) from error
+        while True:
+            written["lease"] = self._ready.lease
+            try:
+                exchange = self._send(filled(self._plan.drive.label, written), filled(self._body, written))
+            except NoValueError as error:
+                raise NotPossibleError(str(error)) from error
+            self._is_accepted = self._is_accepted or exchange.response.ok
+            if not wants_more(exchange) or self._is_accepted or not (self._prepare() or self._waits()):
+                self._note_ready()
+                return exchange

@@ -7,19 +7,9 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from conformance.engine.commanded import (
-    FAST,
-    Commanded,
-    axis_of,
-    body_schema,
-    bounds_of,
-    numbers_in,
-    parts_of,
-    template_of,
-    unit_of,
-)
+from conformance.engine.commanded import FAST, Commanded, axis_of, body_schema, bounds_of, numbers_in, parts_of, unit_of
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import ECHO, REFUSED, Finder, Found
+from conformance.engine.finding import ECHO, REFUSED, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise
 from conformance.scenarios.motion.templates import filled
@@ -62,8 +52,7 @@ class PositionFinder(Finder):
 
     seconds = 0.5
 
-    def found(self) -> Found:
-        """Return the map; see Finder.found()."""
+    def _find(self) -> None:
         self._refused: list[str] = []
         self._watch(_BEFORE_S)
         counts = {operation.label: self._named_places(operation.label) for operation in self._reads}
@@ -78,10 +67,7 @@ class PositionFinder(Finder):
         self._relative = all(command.is_relative for command in self._plan.numbers if command.name in counts[read])
         schemas = dict(numbers_in(self._reads[0].shape or {}))
         self._schemas = {name: schemas.get(place, {}) for name, place in counts[read].items()}
-        # Optional inputs are left out, so that other parts of the robot stay where they are.
-        schema = body_schema(self._plan.drive)
-        named = {command.place: f"{{{command.name}}}" for command in self._plan.numbers if command.name in counts[read]}
-        self._body = None if schema is None else template_of(schema, named)
+        self._places = counts[read]
         begun = self._clock.now() - _BEFORE_S
         start = {
             name: median(value for _, value in self._looks.samples(read, place, begun))
@@ -106,7 +92,12 @@ class PositionFinder(Finder):
             said = " ".join(self._found.notes)
             raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} followed no target: {said}")
         self._found.lines = list(self._goto_lines(read, start, moved))
-        return self._found
+
+    @property
+    def _body(self) -> dict[str, Any] | None:
+        """The body of a move: optional inputs are left out, so that other parts of the robot stay where they are."""
+        own = (number for number in self._plan.numbers if number.name in self._places)
+        return self._template({number.place: f"{{{number.name}}}" for number in own})
 
     def _is_called_alike(self, operation: str) -> bool:
         """Return whether an operation is called as something that is commanded."""
@@ -242,7 +233,7 @@ class PositionFinder(Finder):
         yield f"send = {string(template)}"
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in moved}
-            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}'}))}"
+            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}', 'lease': '{lease}'}))}"
         if self._relative:
             yield "relative = true"
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'

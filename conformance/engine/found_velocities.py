@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
+from conformance.documents.json_schema import Schema
 from conformance.engine.commanded import (
     Commanded,
     bounds_of,
@@ -17,7 +19,7 @@ from conformance.engine.commanded import (
     unit_of,
 )
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import ECHO, REFUSED, ROOM_M, ROOM_S, Finder, Found
+from conformance.engine.finding import ECHO, REFUSED, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.responses import Response, agreed, response_to, rests_from
 from conformance.measures.samples import Sample
@@ -27,7 +29,9 @@ from conformance.scenarios.scenario import NotPossibleError
 # _DRIVEN_S: duration of a drive. _KEPT_S: interval of commands. _BEFORE_S, _AFTER_S: how long the device is watched, s.
 _DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
 # _LET_GO_S: how long at most no command is sent. _SURE_S: how long the device must rest to count as stopped, s.
-_LET_GO_S, _SURE_S = 3.0, 0.5
+_LET_GO_S, _SURE_S = 10.0, 0.5
+# The hold time that a device must have for which none was seen or declared, s.
+_DEMANDED_S: Final = 2.0
 # _UNITS: by units in one m or one rad, their names.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
@@ -43,8 +47,7 @@ _COORDINATES: Final = frozenset("xyz")
 class VelocityFinder(Finder):
     """Finds the map of a device that is given velocities."""
 
-    def found(self) -> Found:
-        """Return the map; see Finder.found()."""
+    def _find(self) -> None:
         try:
             responses = self._responses()
             shown = self._measured(responses)
@@ -56,7 +59,6 @@ class VelocityFinder(Finder):
         finally:
             self._command({})
         self._found.lines = list(self._lines(responses, shown, settle_s, hold_s))
-        return self._found
 
     def _drive(self, number: Commanded, speed: float, *, end: bool = True) -> tuple[float, float]:
         """Drive at a velocity and end it; return when it had begun, and when the last command was answered.
@@ -101,6 +103,11 @@ class VelocityFinder(Finder):
                 found[number.name] = {}
                 continue
             found[number.name] = self._alike(drives)
+            positions = [one for one in found[number.name].values() if one.is_position]
+            if number.direction and positions and all(one.ratio < 0 for one in positions):
+                # Which of two words is the positive one, only the position says.
+                self._turn_words(number)
+                found[number.name] = {at: one._replace(ratio=-one.ratio) for at, one in found[number.name].items()}
             for (operation, place), response in found[number.name].items():
                 speed, _, _, ended, done = drives[-1]
                 after = self._looks.samples(operation, place, ended, done)
@@ -111,6 +118,14 @@ class VelocityFinder(Finder):
         self._found.notes += [f"{name} stays 0: {problem}" for name, problem in refused.items()]
         self._refused = frozenset(refused)
         return found
+
+    def _turn_words(self, number: Commanded) -> None:
+        """Exchange the words for both directions of a number."""
+        at, positive, negative = number.direction or ("", "", "")
+        turned = replace(number, direction=(at, negative, positive))
+        numbers = tuple(turned if one is number else one for one in self._plan.numbers)
+        self._plan = replace(self._plan, numbers=numbers)
+        self._other_way.clear()
 
     def _forth_and_back(self, number: Commanded) -> list[tuple[float, ...]]:
         """Drive to each side; return the velocities, each with when it rested, began, ended and was looked at last.
@@ -240,9 +255,14 @@ class VelocityFinder(Finder):
         self._watch(_BEFORE_S)
         _, last = self._drive(number, speed, end=False)
         read, moving = self._reads[0].label, response.ratio * speed
+        least, most = bounds_of(self._schema_at(place)) or (-math.inf, math.inf)
+        # A device stands at the end of its travel as if it had stopped: it is stopped a second before that.
+        near, samples = abs(moving), list[Sample]()
         while self._clock.now() < last + _LET_GO_S:
             self._look()
             samples = self._looks.samples(read, place, last)
+            if response.is_position and samples and not least + near <= samples[-1][1] <= most - near:
+                break
             since = self._still_since(samples, response, moving)
             if since is not None and self._clock.now() >= since + _SURE_S:
                 held_s = since - last
@@ -256,6 +276,10 @@ class VelocityFinder(Finder):
             f"Let go, it drove on for all of the {self._found.drives_on_s:.1f} s that it was watched."
         )
         return None
+
+    def _schema_at(self, place: str) -> Schema:
+        """Return what the description says of the number at a place."""
+        return dict(numbers_in(self._reads[0].shape or {})).get(place.partition(ANGLE)[0], {})
 
     @staticmethod
     def _still_since(samples: list[Sample], response: Response, moving: float) -> float | None:
@@ -308,7 +332,7 @@ class VelocityFinder(Finder):
         still = {command.name: 0 for command in self._plan.numbers if command.name not in shown}
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in shown}
-            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1}))}"
+            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1, 'lease': '{lease}'}))}"
             yield from (direction_line(numbers[name]) for name in shown if numbers[name].direction)
         widest = {name: max(map(abs, numbers[name].limits)) for name in shown}
         off = {name: _OFF if numbers[name].has_unit else _OFF_WITHOUT_UNIT for name in shown}
@@ -317,6 +341,9 @@ class VelocityFinder(Finder):
         yield f"settle_s = {min(settle_s, 2.0):.2f}  # seen: so long it took to rest, and half as long again"
         if hold_s is not None:
             yield f"hold_s = {hold_s:.2f}  # seen: let go, it stopped by itself"
+        else:
+            yield f"hold_s = {_DEMANDED_S:g}  # the suite's: none was seen in {self._found.drives_on_s:.1f} s"
+            yield "# If the robot by design holds a velocity until it is told otherwise, take out the line above."
         refuses = bool(REFUSED & self._plan.drive.responses.keys()) and all(numbers[name].declared for name in shown)
         if refuses:
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
@@ -343,7 +370,7 @@ class VelocityFinder(Finder):
         scale, (way, turn) = _unit(response.ratio)
         turns = number.turns if number else ANGLE in place
         pointer, _, angle = place.partition(ANGLE)
-        schema = dict(numbers_in(self._reads[0].shape or {})).get(pointer, {})
+        schema = self._schema_at(place)
         unit = unit_of(pointer, schema) or (turn if turns else way)
         # One that was seen to turn in degrees is known by the same factor of a radian.
         scale = next((factor for factor, units in _UNITS.items() if unit and unit in units), scale)

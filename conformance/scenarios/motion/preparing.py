@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from conformance.observe.clock import Clock
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import NoValueError, at, filled
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.statement.motion_map import MotionMap, Step
+from conformance.statement.motion_map import Lease, Step
 from conformance.transport.client import is_drafting
 from conformance.transport.exchange import Exchange, Outgoing
 
@@ -20,21 +20,38 @@ _LOOKS_S: Final = 0.05
 WANTS_LEASE: Final = frozenset({409, 423, 428})
 
 
+class Wanted(Protocol):
+    """What a device wants before it moves, and after that: a motion map, or what was found of one."""
+
+    @property
+    def lease(self) -> Lease | None:
+        """What a client must hold."""
+
+    @property
+    def before(self) -> tuple[Step, ...]:
+        """What is sent before the device can move, in order."""
+
+    @property
+    def after(self) -> tuple[Step, ...]:
+        """What is sent last, in order."""
+
+
 class Preparation:
     """Keeps a device ready to move: begins, keeps, and ends.
 
     Args:
-        motion: the map.
+        motion: what the device wants.
         binding: how calls become requests.
         send: sends a request and returns the exchange.
         clock: the run's.
 
     Attributes:
+        motion: what the device wants; may grow while it is found.
         lease: its value; "held" where it has none; empty: there is no lease now.
     """
 
-    def __init__(self, motion: MotionMap, binding: Binding, send: Callable[[Outgoing], Exchange], clock: Clock) -> None:
-        self._motion, self._binding, self._send, self._clock = motion, binding, send, clock
+    def __init__(self, motion: Wanted, binding: Binding, send: Callable[[Outgoing], Exchange], clock: Clock) -> None:
+        self.motion, self._binding, self._send, self._clock = motion, binding, send, clock
         self._busy = False
         self._is_ready = not (motion.lease or motion.before)
         self._kept_s = 0.0
@@ -52,7 +69,7 @@ class Preparation:
             return
         self._busy = True
         try:
-            lease = self._motion.lease
+            lease = self.motion.lease
             if lease and self.lease and lease.renew and self._clock.now() >= self._kept_s + _SOON * lease.every_s:
                 exchange = self._called(lease.renew, lease.renew_body)
                 self._kept_s = self._clock.now()
@@ -63,7 +80,7 @@ class Preparation:
                 self._acquire()
             if not self._is_ready:
                 self._is_ready = True
-                self._steps(self._motion.before)
+                self._steps(self.motion.before)
         finally:
             self._busy = False
 
@@ -77,7 +94,7 @@ class Preparation:
 
     def lost(self, exchange: Exchange) -> bool:
         """Return whether a response shows that the lease has ended, which a silent client cannot have renewed."""
-        lease = self._motion.lease
+        lease = self.motion.lease
         wants = exchange.response.status in WANTS_LEASE and not self._busy
         if not (lease and wants and self._clock.now() > self._kept_s + lease.every_s):
             return False
@@ -86,7 +103,7 @@ class Preparation:
 
     def with_lease(self, made: Outgoing) -> Outgoing:
         """Return a request with the lease, where it goes into a header."""
-        lease = self._motion.lease
+        lease = self.motion.lease
         if not (lease and self.lease and lease.header):
             return made
         others = tuple(pair for pair in made.headers if pair[0] != lease.header)
@@ -106,29 +123,37 @@ class Preparation:
             return
         self._busy = True
         try:
-            self._steps(self._motion.after)
-            if self._motion.lease and self.lease and self._motion.lease.release:
-                self._called(self._motion.lease.release, None)
+            self._steps(self.motion.after)
+            if self.motion.lease and self.lease and self.motion.lease.release:
+                self._called(self.motion.lease.release, None)
         finally:
             self._busy, self.lease = False, ""
-            self._is_ready = not self._motion.before
+            self._is_ready = not self.motion.before
 
     def _draft_end(self) -> None:
         """Draft the requests that end the use of the device, for the guard process to send if this one is killed."""
-        lease = self._motion.lease
+        lease = self.motion.lease
         if not lease or self.lease:
-            for step in self._motion.after:
+            for step in self.motion.after:
                 self._called(step.send, step.body)
             if lease and lease.release:
                 self._called(lease.release, None)
 
     def _acquire(self) -> None:
-        lease = self._motion.lease
+        lease = self.motion.lease
         if lease is None:
             return
         exchange = self._called(lease.acquire, lease.body)
         if not exchange.response.ok:
             raise NotPossibleError(f"[motion.lease] {lease.acquire} got {exchange.came}")
+        self.hold(lease, exchange)
+
+    def hold(self, lease: Lease, exchange: Exchange) -> None:
+        """Hold a lease that a response gave.
+
+        Raises:
+            NotPossibleError: the response has no token where it must be.
+        """
         self._kept_s, self.lease = self._clock.now(), "held"
         if lease.token:
             try:

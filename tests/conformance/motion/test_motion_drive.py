@@ -1,17 +1,21 @@
 """``roaas certify --drive``: the axes are found by driving, and four questions are answered, without a file."""
 
+import copy
 import json
 import sys
 import tomllib
 
 import pytest
 import rover
+import winch
 from arm import Arm
 from body import Body
 from judged_devices import RUNS
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
+from starlette.responses import JSONResponse
+from winch import Winch
 
 from conformance.statement.statement import motion_map_of
 from reports.rendering import render
@@ -67,6 +71,8 @@ def test_a_rover_that_drives_on_when_its_client_vanishes_is_told(tmp_path):
         done, _, given = _driven(url, tmp_path)
     assert given[2] == "no", done.stdout
     assert "no" not in given[:2], done.stdout
+    assert done.returncode == 1, "nobody declares that it drives on by design"
+    assert "hold_s = 2  # the suite's" in done.stderr
 
 
 def test_an_arm_that_is_sent_to_positions_is_found_by_the_names_of_its_joints(tmp_path):
@@ -75,6 +81,44 @@ def test_an_arm_that_is_sent_to_positions_is_found_by_the_names_of_its_joints(tm
     assert "no" not in given, done.stdout
     assert given[0] == "yes", done.stdout
     assert 'body = { id = "{goto:/id}" }' in done.stderr, "the stop takes what the move told"
+
+
+class Homing(Winch):
+    """A winch that is homed only a while after it was told so, and declares where it wants its lease."""
+
+    HOMES_S = 0.6
+
+    async def _description(self, _):
+        key = {"name": "X-Lease", "in": "header", "required": True, "schema": {"type": "string"}}
+        paths = copy.deepcopy(winch.DESCRIPTION["paths"])
+        for path, item in paths.items():
+            for operation in item.values():
+                if path in {"/speed", "/enable", "/home", "/disable"}:
+                    operation["parameters"] = [key]
+        return JSONResponse({**winch.DESCRIPTION, "paths": paths})
+
+    @property
+    def mode(self):
+        return "ready" if self.home_at and self.body.now() > self.home_at + self.HOMES_S else self.said
+
+    @mode.setter
+    def mode(self, word):
+        self.said, self.home_at = ("homing", self.body.now()) if word == "ready" else (word, 0.0)
+
+
+def test_a_winch_gets_a_lease_and_is_enabled_and_homed_before_it_moves_and_is_left_as_it_was(tmp_path):
+    device, saved = Homing(), tmp_path / "winch.toml"
+    with serving_app(device.app()) as url:
+        done, _, given = _driven(url, tmp_path, "--save-map", saved, drive="PUT /speed")
+    assert "no" not in given, done.stdout
+    assert given[0] == "yes", done.stdout + done.stderr
+    assert "first sends POST /lease, POST /enable, POST /home" in done.stderr
+    motion = tomllib.loads(saved.read_text(encoding="utf-8"))["motion"]
+    assert [step["send"] for step in motion["before"]] == ["POST /enable", "POST /home"]
+    assert motion["before"][1]["shows"] == "ready", "the state that was seen to follow is awaited"
+    assert (motion["lease"]["header"], motion["lease"]["release"]) == ("X-Lease", "DELETE /lease/{lease}")
+    assert device.told[-2:] == ["disable", "release"]
+    assert not device.is_leased
 
 
 class Refusing(Rover):

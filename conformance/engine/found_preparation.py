@@ -1,0 +1,337 @@
+"""Find what a device wants before it moves: a lease, and commands such as enable and home, by the description's words.
+
+The suite sends none of these operations before the device has refused a command, or accepted it and stayed where it is.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import posixpath
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import msgspec
+
+from conformance.api.call_rules import CallRules, harmful_words, matches, words_of
+from conformance.documents.openapi import Operation
+from conformance.engine.commanded import body_schema, commanded_by, parts_of, template_of
+from conformance.engine.map_text import inline
+from conformance.scenarios.motion.preparing import WANTS_LEASE
+from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_calls import NAME, names_operation
+from conformance.statement.motion_map import Lease, Step
+from conformance.transport.exchange import Exchange
+
+_LEASES: Final = frozenset(
+    {"lease", "leases", "lock", "control", "acquire", "claim", "reserve", "reservation", "session"}
+)
+_KEEPS: Final = frozenset({"renew", "heartbeat", "keepalive", "keep", "refresh", "extend"})
+_RELEASES: Final = frozenset({"release", "unlock", "free", "return", "relinquish"})
+# What makes a device ready, with the word for the opposite, in the usual order; an empty word: it has none.
+_READY: Final = {
+    "enable": "disable", "arm": "disarm", "activate": "deactivate", "on": "off", "energize": "deenergize", "home": "",
+    "homing": "", "calibrate": "",
+}  # fmt: skip
+# Members of a body that switch something on.
+_SWITCHES: Final = re.compile(r"enabled?|armed|active|on|power(?:ed)?|motors?", re.IGNORECASE)
+# Names of what a lease is known by, in a response and in a command.
+_TOKEN: Final = re.compile(r"token|lease|lock|session|control|(?:^|_)id$|(?:^|_)key$", re.IGNORECASE)
+_NO_LEASE: Final = re.compile(r"authorization|idempotency|request.?id|api.?key|if-match", re.IGNORECASE)
+_LASTS: Final = re.compile(r"ttl|expires?_?in|timeout|duration|valid_for|lifetime", re.IGNORECASE)
+# What a refusal says that wants more than another number.
+_WANTS: Final = re.compile(
+    r"lease|lock|control|session|token|owner|enabl|disabled|arm(?:ed)?\b|motors?\b|power|activ|servo|brake|ready|hom(?:e|ing)",
+    re.IGNORECASE,
+)
+_FORBIDDEN: Final = 403
+_LOCKED: Final = frozenset({"423", "428"})
+# How long the suite asks for a lease, s; how often it renews one of which nobody says how long it lasts, s.
+_ASKED_S, _USUAL_S = 30, 2.0
+_STRANGER: Final = "roaas"
+_MOST_STEPS: Final = 4
+_OF_STEP: Final = ("send", "body", "read", "at", "shows")
+
+
+@dataclass(frozen=True)
+class Preparing:
+    """What a device wants before it moves.
+
+    Attributes:
+        lease: what a client must hold; None: nothing.
+        steps: commands in order, each with those that end what it began.
+    """
+
+    lease: Lease | None = None
+    steps: tuple[tuple[Step, tuple[Step, ...]], ...] = ()
+
+    @property
+    def before(self) -> tuple[Step, ...]:
+        """What is sent before the device can move, in order."""
+        return tuple(step for step, _ in self.steps)
+
+    @property
+    def after(self) -> tuple[Step, ...]:
+        """What is sent last, in order."""
+        return tuple(end for _, ends in reversed(self.steps) for end in ends)
+
+    @property
+    def calls(self) -> tuple[str, ...]:
+        """The operations."""
+        lease = self.lease
+        held = (lease.acquire, lease.renew, lease.release) if lease else ()
+        found = (*held, *(step.send for step in (*self.before, *self.after)))
+        return tuple(filter(None, found))
+
+    def told(self) -> Iterator[str]:
+        """Yield what may be sent before the device moves, as lines for the user."""
+        first = [*([self.lease.acquire] if self.lease else []), *(step.send for step in self.before)]
+        last = [step.send for step in self.after]
+        last += [self.lease.release] if self.lease and self.lease.release else []
+        if first:
+            yield f"If it refuses that, or stays where it is, the suite first sends {', '.join(first)},"
+            yield f"and at the end {', '.join(last) or 'nothing, as no operation is known that ends it'}."
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines of a map."""
+        if self.steps:
+            yield "[motion]"
+            for name, steps in (("before", self.before), ("after", self.after)):
+                given = [
+                    {at: said for at in _OF_STEP if (said := getattr(step, at)) not in (None, "")} for step in steps
+                ]
+                yield from ([f"{name} = {inline(given)}"] if given else [])
+            yield ""
+        if self.lease:
+            yield "[motion.lease]"
+            found = msgspec.structs.asdict(self.lease)
+            yield from (f"{name} = {inline(value)}" for name, value in found.items() if value not in (None, ""))
+            yield ""
+
+    def with_token(self, drive: Operation, content: Any) -> Preparing:
+        """Return the same with what the response to the lease's acquisition says: its token, and how long it lasts."""
+        if self.lease is None:
+            return self
+        members = dict(members_of(content))
+        token = min(
+            (at for at, said in members.items() if _TOKEN.search(at) and not isinstance(said, bool)),
+            key=_rank,
+            default="",
+        )
+        lasts_s = [_seconds(at, value) for at, value in members.items() if _LASTS.search(at) and _is_positive(value)]
+        lease = msgspec.structs.replace(
+            self.lease,
+            token=token,
+            header=lease_header(drive) if token else "",
+            every_s=round(min(lasts_s, default=_USUAL_S), 3),
+            # The last part of a path that names a lease is its token.
+            release=self.lease.release if token or "{" not in self.lease.release else "",
+            renew=self.lease.renew if token or "{" not in self.lease.renew else "",
+        )
+        return replace(self, lease=lease)
+
+
+NOTHING: Final = Preparing()
+
+
+def preparing_of(operations: Sequence[Operation], drive: Operation, rules: CallRules) -> Preparing:
+    """Return what a device may want before it moves, by the words of its operations: those nearest to the drive."""
+    known = [one for one in operations if not is_excluded(one, rules)]
+    near = sorted(
+        filter(_may_prepare, known),
+        key=lambda one: (-len(posixpath.commonpath([one.template, drive.template])), one.method != "POST"),
+    )
+    lease = next((_lease_of(one, known) for one in near if _is_lease(one)), None)
+    steps = dict[str, tuple[Step, tuple[Step, ...]]]()
+    for word in _READY:
+        found = ((one, step) for one in near if (step := _ready_step(one, word)) is not None)
+        for one, step in itertools.islice(found, 1):
+            steps.setdefault(one.label, (step, _ends(one, step, known)))
+    return Preparing(lease, tuple(steps.values())[:_MOST_STEPS])
+
+
+def named_preparing(operations: Sequence[Operation], calls: Iterable[str], rules: CallRules) -> Preparing:
+    """Return what a user says that a device wants before it moves: "POST /enable", or with JSON behind the path.
+
+    Raises:
+        NotPossibleError: one is no operation of the description, or must never be called.
+    """
+    known = [one for one in operations if not is_excluded(one, rules)]
+    found = Preparing()
+    for call in calls:
+        label, brace, body = call.strip().partition(" {")
+        operation = next((one for one in known if names_operation(one.label, label)), None)
+        if operation is None:
+            raise NotPossibleError(f"--before {label!r} is no operation of the description that may be called")
+        if not brace and found.lease is None and _is_lease(operation):
+            found = replace(found, lease=_lease_of(operation, known))
+            continue
+        try:
+            step = Step(label, json.loads(f"{{{body}") if brace else _body(operation, on=True))
+        except ValueError as error:
+            raise NotPossibleError(f"--before {call!r}: its body is no JSON ({error})") from error
+        found = replace(found, steps=(*found.steps, (step, _ends(operation, step, known))))
+    return found
+
+
+def is_excluded(operation: Operation, rules: CallRules) -> bool:
+    """Return whether an operation must never be called: the description or the user says so."""
+    return operation.never or any(matches(pattern, operation) for pattern in rules.never)
+
+
+def wants_lease(operation: Operation) -> bool:
+    """Return whether a description says that an operation wants a lease: by a status, or a header that carries one."""
+    return bool(_LOCKED & operation.responses.keys()) or bool(lease_header(operation))
+
+
+def lease_header(operation: Operation) -> str:
+    """Return the name of the header in which an operation takes a lease; empty: in none."""
+    return next((one.name for one in operation.parameter("header") if _carries_lease(one.name)), "")
+
+
+def lease_place(operation: Operation) -> str:
+    """Return the JSON pointer of a text in an operation's body that names a lease; empty: none does."""
+    for part in parts_of(body_schema(operation)):
+        for name, member in part.get("properties", {}).items():
+            if _carries_lease(name) and any(one.get("type") == "string" for one in parts_of(member)):
+                return f"/{name}"
+    return ""
+
+
+def wants_more(exchange: Exchange) -> bool:
+    """Return whether a device refused a command for what it wants before, by status or words of the response."""
+    if exchange.response.ok:
+        return False
+    said = exchange.response.body[:2000].decode("utf-8", "replace")
+    return exchange.response.status in WANTS_LEASE | {_FORBIDDEN} or bool(_WANTS.search(said))
+
+
+def _may_prepare(operation: Operation) -> bool:
+    """Return whether an operation may be sent before the device moves."""
+    return (
+        operation.method in {"POST", "PUT"}
+        and not (operation.stop or "{" in operation.template or harmful_words(operation))
+        and not commanded_by(operation)
+    )
+
+
+def _words(operation: Operation) -> set[str]:
+    """Return the words of the last part of an operation's path, and of its id."""
+    named = "" if operation.id == operation.label else operation.id
+    return words_of(f"{posixpath.basename(operation.template)} {named}")
+
+
+def _is_lease(operation: Operation) -> bool:
+    is_acquired = bool(_words(operation) & _LEASES) and not _words(operation) & (_RELEASES | _KEEPS)
+    return is_acquired and not lease_header(operation)
+
+
+def _lease_of(acquire: Operation, operations: Sequence[Operation]) -> Lease:
+    """Return a lease with the operations beside its acquisition that renew and release it."""
+    path = acquire.template
+    folder = posixpath.dirname(path)
+    beside = [one for one in operations if one.template == path or one.template.startswith(f"{path.rstrip('/')}/")]
+    beside += [one for one in operations if one not in beside and posixpath.dirname(one.template) == folder]
+    renew = next((one for one in beside if _words(one) & _KEEPS and not one.safe), None)
+    renew = renew or next((one for one in beside if one.method in {"PUT", "PATCH"} and _names_lease(one, path)), None)
+    release = next((one for one in beside if one.method == "DELETE" and _names_lease(one, path)), None)
+    release = release or next((one for one in beside if _words(one) & _RELEASES and not one.safe), None)
+    return Lease(
+        acquire.label,
+        _body(acquire),
+        renew=_with_token(renew) if renew else "",
+        renew_body=_body(renew) if renew else None,
+        release=_with_token(release) if release else "",
+    )
+
+
+def _names_lease(operation: Operation, path: str) -> bool:
+    """Return whether a path is that of a lease, or that with the lease's id."""
+    return operation.template == path or bool(re.fullmatch(rf"{re.escape(path)}/\{{[^{{}}]*\}}", operation.template))
+
+
+def _with_token(operation: Operation) -> str:
+    return f"{operation.method} {NAME.sub('{lease}', operation.template)}"
+
+
+def _body(operation: Operation, *, on: bool | None = None) -> Any:
+    """Return a usual body of an operation; ``on``: what a member has that switches something; None: without one."""
+    schema = body_schema(operation)
+    if schema is None:
+        return None
+    made = filled(template_of(schema, {}), {"seconds": _ASKED_S})
+    for part in parts_of(schema):
+        for name, member in part.get("properties", {}).items():
+            if on is not None and _SWITCHES.fullmatch(name) and (said := _switched(member, on=on)) is not None:
+                made[name] = said
+            elif made.get(name) == "":
+                made[name] = _STRANGER
+    return made
+
+
+def _switched(member: Any, *, on: bool) -> Any:
+    """Return the value of a member that switches something on or off; None: it has none."""
+    for part in parts_of(member):
+        if part.get("type") == "boolean":
+            return on
+        words = {str(item).lower(): item for item in part.get("enum", ())}
+        for pair in _READY.items():
+            if set(pair) <= words.keys():
+                return words[pair[0] if on else pair[1]]
+    return None
+
+
+def _ready_step(operation: Operation, word: str) -> Step | None:
+    """Return the step by which an operation makes a device ready; None: it does not, by this word."""
+    words = _words(operation)
+    body = _body(operation, on=True)
+    # PUT /motors {"enabled": true}
+    is_switch = word == "enable" and body != _body(operation, on=False)
+    if (word in words and not words & set(_READY.values())) or is_switch:
+        return Step(operation.label, body)
+    return None
+
+
+def _ends(operation: Operation, step: Step, operations: Sequence[Operation]) -> tuple[Step, ...]:
+    """Return the step that ends what another one began; empty: there is none."""
+    off = _body(operation, on=False)
+    if step.body is not None and step.body == _body(operation, on=True) != off:
+        return (Step(operation.label, off),)
+    folder, last = posixpath.split(operation.template.lower())
+    opposites = {
+        posixpath.join(folder, re.sub(rf"\b{word}(?=\b|_)|(?<=_){word}\b", opposite, last))
+        for word, opposite in _READY.items()
+        if opposite
+    } - {operation.template.lower()}
+    found = (one for one in operations if one.method == operation.method and one.template.lower() in opposites)
+    return tuple(Step(one.label, _body(one)) for one in itertools.islice(found, 1))
+
+
+def members_of(value: Any, at: str = "", depth: int = 2) -> Iterator[tuple[str, Any]]:
+    """Yield the texts, numbers and truth values of a response by JSON pointer."""
+    for name, item in value.items() if isinstance(value, Mapping) else ():
+        if isinstance(item, Mapping) and depth:
+            yield from members_of(item, f"{at}/{name}", depth - 1)
+        elif isinstance(item, str | int | float):
+            yield f"{at}/{name}", item
+
+
+def _rank(at: str) -> tuple[bool, int]:
+    """Return how likely a member is not the token of a lease: a token rather than an id, outside rather than within."""
+    return "token" not in at.lower(), at.count("/")
+
+
+def _carries_lease(name: str) -> bool:
+    """Return whether a header or member of this name carries a lease."""
+    return bool(_TOKEN.search(name.replace("-", "_"))) and not _NO_LEASE.search(name)
+
+
+def _is_positive(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and value > 0
+
+
+def _seconds(at: str, value: float) -> float:
+    return value / 1000 if re.search(r"_ms$|milli", at, re.IGNORECASE) else float(value)
