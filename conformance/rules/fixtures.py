@@ -10,8 +10,8 @@ import pytest
 
 from conformance.api.device import device_of
 from conformance.api.interfaces import Interfaces
+from conformance.api.rest.description import KeptExchanges
 from conformance.api.rest.habits import Habits
-from conformance.api.rest.kept_exchanges import KeptExchanges
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
 from conformance.api.soap.service import SoapService

@@ -16,14 +16,16 @@ import msgspec
 from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_ros, lacking_soap
 from conformance.commandline.help_pages import USUAL_STATEMENT
-from conformance.commandline.out_folder import FolderError, held
+from conformance.commandline.out_folder import FolderError, held, own_folder, write_atomically, write_json
 from conformance.contract.described import MOTION, ROS, STATES
 from conformance.contract.pack import DEFAULT_PACK, Contract
+from conformance.contract.toml_file import basic_string
 from conformance.documents.description import is_url
 from conformance.documents.openapi import operations_of
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.motion_calls import named_by
 from conformance.statement.motion_map import MotionMap
+from conformance.statement.ros_map import RosMap
 from conformance.statement.statement import (
     Api,
     Calls,
@@ -36,7 +38,6 @@ from conformance.statement.statement import (
     load_statement,
     maps_in,
 )
-from conformance.target.bridging import description_of, usual_map
 from conformance.target.connecting import connection_of, keyed
 from conformance.target.describing import described_contract, is_wsdl, soap_contract
 
@@ -356,3 +357,48 @@ def lock_result_folder(out: Path) -> None:
         click.get_current_context().with_resource(held(out))
     except FolderError as error:
         raise click.UsageError(f"{advice('--out ')}{out}: {error}") from error
+
+
+_MAP: Final = """# {url} as it was judged: change the topics and services, and give this file in place of the URL.
+[ros]
+domain_id = {domain_id}
+
+[ros.rosbridge]
+url = {url}
+subscribe = {{ "/odom" = "nav_msgs/msg/Odometry", "/note" = "std_msgs/msg/String" }}
+publish = {{ "/cmd_vel" = "geometry_msgs/msg/Twist", "/say" = "std_msgs/msg/String" }}
+call = {{ "/enable" = "std_srvs/srv/SetBool" }}
+"""
+
+
+def usual_map(url: str, domain_id: int, out: Path) -> Path:
+    """Write a statement with a usual map of a rosbridge; return its file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    file = own_folder(out) / "rosbridge.toml"
+    write_atomically(file, _MAP.format(url=basic_string(url), domain_id=domain_id))
+    return file
+
+
+def description_of(ros: RosMap, out: Path) -> str:
+    """Write an OpenAPI description of a rosbridge's operations; return its file.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    paths: dict[str, dict[str, Any]] = {}
+    for call in ros.calls:
+        method, _, path = call.partition(" ")
+        names = [
+            {"name": name, "in": "path", "required": True, "schema": {"type": "string"}}
+            for name in re.findall(r"\{(\w+)\}", path)
+        ]
+        responses = {"200": {"description": "what came"}}
+        paths.setdefault(path, {})[method.lower()] = {"responses": responses, "parameters": names}
+    server = {"url": ros.rosbridge.replace("ws", "http", 1)}
+    info = {"title": "rosbridge", "version": "2"}
+    file = own_folder(out) / "rosbridge.json"
+    write_json(file, {"openapi": "3.1.0", "info": info, "servers": [server], "paths": paths})
+    return str(file)

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from conformance.api.expectation import expect
 from conformance.api.rest.calls import JSON, Call
+from conformance.api.rest.effects import steady
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.snapshot import steady
 from conformance.documents.json_schema import Schema
 from conformance.documents.representation import UnreadableError, flattened, read
 from conformance.transport.exchange import Exchange, Outgoing

@@ -7,9 +7,8 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest.calls import example_call
-from conformance.api.rest.description import Described, described_by_openapi, differences
+from conformance.api.rest.description import Described, KeptExchanges, contradiction, described_by_openapi, differences
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.kept_exchanges import KeptExchanges, contradiction
 from conformance.api.rest.presence import judge_there
 from conformance.documents.description_faults import openapi_fault
 from conformance.documents.json_text import read_json

@@ -7,9 +7,8 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import applicable_operations, reads, usable_operations
 from conformance.api.rest.calls import JSON, Call, example_call
-from conformance.api.rest.effects import reader_of, settles_at
+from conformance.api.rest.effects import changed, changes_by_itself, flatten, reader_of, settles_at, take_snapshots
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, take_snapshots
 from conformance.api.rest.statuses import is_taken
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Judge

@@ -6,11 +6,12 @@ from typing import Any, Final
 
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.json_mutations import near_misses
+from conformance.documents.openapi import operations_of
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import goal_body, put_goal
 from conformance.packs.table1.robot.goals import choose_goals
-from conformance.packs.table1.robot.invalid_bodies import elsewhere, invalid_bodies, put_body
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.stopping import await_rest
@@ -25,6 +26,33 @@ from conformance.scenarios.motion.trace import Quiet, Tried
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange, Outgoing
+
+
+def invalid_bodies(api: RestInterface, path: str, valid: dict[str, Any], number: str) -> list[tuple[str, str, bytes]]:
+    """Return bodies that would move the robot if it accepted them, as (what is wrong, media type, body).
+
+    Args:
+        api: the robot's REST interface.
+        path: the resource.
+        valid: a valid JSON object.
+        number: where in the object a number is, as names with dots between them.
+    """
+    put = next(item for item in operations_of(api.run.contract) if (item.method, item.template) == ("PUT", path))
+    made = near_misses(valid, put.bodies[JSON].schema, tuple(number.split(".")))
+    return [*((item.what, JSON, item.made) for item in made), ("text/plain", "text/plain", body_of(valid))]
+
+
+def put_body(robot: Robot, path: str, media_type: str, body: bytes) -> Exchange:
+    """PUT a body of a media type, and return the exchange."""
+    return robot.rest.send("PUT", path, headers=(("Content-Type", media_type),), body=body)
+
+
+def elsewhere(robot: Robot, path: str) -> Iterator[tuple[str, str]]:
+    """Yield methods that a resource does not have, and PUT without its slash (contract.md#addresses), with the path."""
+    allowed = robot.rest.send("OPTIONS", path).response.header("Allow") or ""
+    yield from ((method, path) for method in ("POST", "PATCH") if method not in allowed)
+    yield "PUT", path.rstrip("/")
+
 
 #: Marks a goal in the list of things that a robot at rest must not have.
 GOAL: Final = "an active goal"

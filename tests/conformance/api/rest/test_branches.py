@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.rest.branches import branches_in, branches_of
+from conformance.api.rest.operation_log import branches_in, branches_of
 
 POSE = {"type": "object", "properties": {"x": {"type": "number"}, "frame": {"type": "string"}}}
 

@@ -5,9 +5,8 @@ import json
 
 import pytest
 
-from conformance.api.rest.description import described_by_openapi
+from conformance.api.rest.description import KeptExchanges, contradiction, described_by_openapi
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.kept_exchanges import KeptExchanges, contradiction
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement

@@ -8,15 +8,14 @@ from dataclasses import replace
 import pytest
 from lending_library import CONTRACT, Library, open_library
 
+from conformance.api.rest import effects
 from conformance.api.rest.applicable import answered, applicable_operations, readable, reads
 from conformance.api.rest.calls import example_call
-from conformance.api.rest.effects import reader_of, settles_at
 from conformance.api.rest.formats import disagreements
 from conformance.api.rest.generated import as_request, targets
 from conformance.api.rest.guard import tell
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
-from conformance.api.rest.snapshot import changed, changes_by_itself, flatten, steady, take_snapshots
 from conformance.api.rest.statuses import is_refusal
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
@@ -65,12 +64,12 @@ def test_reads_and_what_is_answered(api, library):
 
 def test_what_was_put_is_got(api, library):
     call = example_call(api, _operation(api, "putBook"))
-    assert reader_of(api, call).path == call.path
-    assert settles_at(api, call).startswith("'Emma' as title instead of ")
+    assert effects.reader_of(api, call).path == call.path
+    assert effects.settles_at(api, call).startswith("'Emma' as title instead of ")
     call.send(api)
-    assert settles_at(api, call) == ""
+    assert effects.settles_at(api, call) == ""
     library.books.clear()
-    assert settles_at(api, call) is None
+    assert effects.settles_at(api, call) is None
 
 
 def test_formats_disagree_only_where_they_do(api, library):
@@ -87,12 +86,12 @@ def test_formats_disagree_only_where_they_do(api, library):
 
 def test_what_changes_is_told_from_what_is_steady(api, library):
     call = readable(api, _operation(api, "getBook"))
-    before = take_snapshots(api, [call])["getBook"][0]
+    before = effects.take_snapshots(api, [call])["getBook"][0]
     assert before["price"] == 7.25
     library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
-    assert changed(before, flatten(call.send(api))) == {"price": (7.25, 8.0)}
-    assert not changes_by_itself(api, call, "price", 0.05)
-    assert steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
+    assert effects.changed(before, effects.flatten(call.send(api))) == {"price": (7.25, 8.0)}
+    assert not effects.changes_by_itself(api, call, "price", 0.05)
+    assert effects.steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
 
 
 def test_a_slow_robot_is_asked_less(api):

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import pytest
 
-from conformance.api.rest.snapshot import steady
+from conformance.api.rest.effects import steady
 from conformance.api.soap.service import SoapService
 from conformance.documents.representation import flattened, projected
 from conformance.packs.table1.checkers.single_readings import BesideOdometry
