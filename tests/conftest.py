@@ -42,11 +42,17 @@ _OF_COMMANDS = {
 _HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in ("command", "workers", "locust", "against")}
 
 
+#: Their tests share nothing, and wait for most of their minutes.
+_APART = ("test_ros_gateway.py", "test_ros_proposals.py")
+
+
 class _Sharing(LoadFileScheduling):
-    """Give each process whole modules, and all load tests to two processes."""
+    """Give each process whole modules, those of some modules one by one, and all load tests to two processes."""
 
     def _split_scope(self, nodeid: str) -> str:
         module = super()._split_scope(nodeid)
+        if module.endswith(_APART):
+            return nodeid
         if not module.startswith("tests/loadtests/test_load_"):
             return module
         return f"load tests, {module in _HALF_OF_LOAD_TESTS}"

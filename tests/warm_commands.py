@@ -24,9 +24,10 @@ from pathlib import Path
 from pkgutil import walk_packages
 
 _IMPORTED = (
-    "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "httpx", "hypothesis", "jinja2", "jsonschema",
-    "jsonschema_rs", "jsonpath", "lxml.etree", "msgspec", "pytest", "regress",
-    "schemathesis", "schemathesis.graphql", "schemathesis.specs.openapi.schemas", "securesystemslib", "segno", "yaml",
+    "anyio", "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "h2.connection",
+    "httpcore", "httpx", "hypothesis", "jinja2", "jsonschema", "jsonschema_rs", "jsonpath", "lxml.etree", "msgspec",
+    "pdb", "pytest", "readline", "regress", "schemathesis", "schemathesis.graphql",
+    "schemathesis.specs.openapi.schemas", "securesystemslib", "segno", "yaml",
 )  # fmt: skip
 # The guard is a program that reads its stdin.
 _NOT_IMPORTED = "conformance.api.rest.guard_process"
@@ -73,6 +74,8 @@ def _serve(name: str) -> None:
     for package in _IMPORTED:
         with suppress(ModuleNotFoundError):  # of an extra that is not installed
             import_module(package)
+    for plugin in import_module("_pytest.config").default_plugins:
+        import_module(f"_pytest.{plugin}")
     for room in map(import_module, ("conformance", "reports")):
         for module in walk_packages(room.__path__, f"{room.__name__}."):
             if not module.name.startswith(_NOT_IMPORTED):
