@@ -309,14 +309,10 @@ def _load(folder: Path, url: str) -> subprocess.Popen[str]:
     command = (sys.executable, "-m", "roaas", "load", _statement(folder, url), "--operation", "PUT /velocity")
     more = (
         "--allow-motion",
-        "--call",
-        "PUT /velocity",
-        "--rate",
-        "50",
-        "--duration",
-        "60",
-        "--warmup",
-        "0",
+        "--call=PUT /velocity",
+        "--rate=50",
+        "--duration=60",
+        "--warmup=0",
         "--out",
         folder / "out",
     )
@@ -403,18 +399,7 @@ def test_the_runs_of_a_fleet_that_is_killed_end_in_order(tmp_path):
         statement = _statement(tmp_path, url)
         fleet = tmp_path / "fleet.toml"
         fleet.write_text(f'[[robot]]\nname = "cart"\nstatement = "{statement.name}"\n', encoding="utf-8")
-        command = (
-            *_CERTIFY,
-            "--fleet",
-            fleet,
-            "--allow-motion",
-            "--effort",
-            "quick",
-            "--class",
-            "motion",
-            "--out",
-            out,
-        )
+        command = (*_CERTIFY, "--fleet", fleet, *_OPTIONS[:-2], "--out", out)
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True) as process:
             assert device.await_that(_drives(1), process)
             process.kill()

@@ -247,14 +247,19 @@ def _failure(url, *, method="GET", path="/a", headers=(), body=b"", raw=None):
 
 
 @pytest.mark.parametrize("name", ACTING)
-def test_what_does_not_provably_read_is_not_sent(well_made, tmp_path, name):
+def test_what_does_not_provably_read_needs_permission(name):
+    assert moves(_failure("http://r2", **ACTING[name]))
+
+
+def test_what_needs_permission_is_not_sent(well_made, tmp_path):
     sent, heard = well_made.sent(tmp_path / "sent"), []
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(30)
         threading.Thread(target=lambda: heard.append(_accepted(server)), daemon=True).start()
         url = f"http://127.0.0.1:{server.getsockname()[1]}"
         document = well_made.document("result/result.json")
-        document["requirements"] = [document["requirements"][0] | {"failures": [_failure(url, **ACTING[name])]}]
+        failures = [_failure(url, **ACTING[name]) for name in ("a vertical tab", "MOVE", "an override")]
+        document["requirements"] = [document["requirements"][0] | {"failures": failures}]
         document["web_server"] = {"requirements": []}
         (sent / "result" / "result.json").write_text(json.dumps(document))
         done = run("replay {}/result", sent)
