@@ -13,13 +13,9 @@ from reports.pages.page import counted as in_pages
 
 ROOT = Path(__file__).parents[1]
 PLACES = (
-    "conformance/cli",
-    "conformance/engine",
-    "conformance/verdict",
-    "conformance/api",
-    "conformance/fleet",
+    "conformance/cli", "conformance/engine", "conformance/verdict", "conformance/api", "conformance/fleet",
     "reports",
-)
+)  # fmt: skip
 NOUNS = "operations|requirements|requests|robots|checks|scenarios|findings|failures|messages|rules|classes|envelopes"
 COUNT = re.compile(rf"(?<!of )\{{[^{{}}]*\}}+ (?:more |other |new )?(?:{NOUNS})\b(?!/s)")
 # Sentences that never speak of one, by words of theirs.

@@ -47,21 +47,8 @@ def commands():
 COMMANDS = list(commands())
 # Of others: what is here of them is looked at, and they are run by hand.
 OTHERS = {
-    ".",
-    "curl",
-    "docker",
-    "eval",
-    "gh",
-    "make",
-    "openssl",
-    "pip",
-    "python",
-    "ros2",
-    "sudo",
-    "umask",
-    "uvx",
-    "zcat",
-}
+    ".", "curl", "docker", "eval", "gh", "make", "openssl", "pip", "python", "ros2", "sudo", "umask", "uvx", "zcat",
+}  # fmt: skip
 OTHERS |= {"roaas", "roaas-ci", "roaas-load-node", "st", "zcat", "grep"}
 
 

@@ -17,18 +17,12 @@ NAMES = (
 ROAAS = Path(sys.executable).with_name("roaas")
 # In this order: the later ones read what the earlier ones wrote.
 COMMANDS = (
-    "certify {url}/openapi.json --effort quick --out first",
-    "certify --fleet fleet.toml --effort quick --out fleet",
+    "certify {url}/openapi.json --effort quick --out first", "certify --fleet fleet.toml --effort quick --out fleet",
     "load {url}/openapi.json --operation GET./a --rate 20 --warmup 0 --duration 1 --processes 1 --out load",
-    "judge first",
-    "report first",
-    "diff first first",
-    "compare load load",
-    "keygen keys",
-    "sign first --key keys/signing-key.pem",
-    "verify first/certificate.intoto.json --key keys/public-key.pem",
+    "judge first", "report first", "diff first first", "compare load load", "keygen keys",
+    "sign first --key keys/signing-key.pem", "verify first/certificate.intoto.json --key keys/public-key.pem",
     "registry build first --keys keys --out site",
-)
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module", name="place")

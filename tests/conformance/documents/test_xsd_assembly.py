@@ -268,16 +268,8 @@ _UNION = '<xs:simpleType name="U"><xs:union memberTypes="xs:gMonthDay t:L"/></xs
 
 def test_a_message_can_be_made_of_each_kind_of_value():
     names = (
-        "t:L",
-        "t:U",
-        "xs:gYear",
-        "xs:gYearMonth",
-        "xs:gMonth",
-        "xs:gMonthDay",
-        "xs:gDay",
-        "xs:NMTOKENS",
-        "xs:QName",
-    )
+        "t:L", "t:U", "xs:gYear", "xs:gYearMonth", "xs:gMonth", "xs:gMonthDay", "xs:gDay", "xs:NMTOKENS", "xs:QName",
+    )  # fmt: skip
     values = "".join(f'<xs:element name="v{number}" type="{name}"/>' for number, name in enumerate(names))
     fixed = '<xs:element name="f" type="xs:int" fixed="7"/>'
     attribute = '<xs:attribute name="a" type="xs:token" use="required" fixed="always"/>'

@@ -117,24 +117,11 @@ _RIGHT = [
     _silent(NoAnswer.TIMEOUT, operation="GET /events"),
 ]
 _ALL = [
-    answers.status_declared,
-    answers.media_type,
-    answers.body_schema,
-    answers.formats,
-    answers.headers,
-    requests.operations,
-    requests.invalid_refused,
-    requests.types,
-    requests.required,
-    requests.optional,
-    requests.enums,
-    requests.examples,
-    requests.defaults,
-    requests.valid_accepted,
-    robustness.no_crash,
-    robustness.no_hang,
+    answers.status_declared, answers.media_type, answers.body_schema, answers.formats, answers.headers,
+    requests.operations, requests.invalid_refused, requests.types, requests.required, requests.optional, requests.enums,
+    requests.examples, requests.defaults, requests.valid_accepted, robustness.no_crash, robustness.no_hang,
     robustness.recovers,
-]
+]  # fmt: skip
 
 
 def _failed(rule, trace, run):
