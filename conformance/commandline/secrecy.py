@@ -16,10 +16,11 @@ import gzip
 import re
 import threading
 import zlib
-from array import array
 from base64 import b64encode
+from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import takewhile
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
@@ -118,30 +119,27 @@ class Secrets:
             variable: what stands in its place, such as ``$ROAAS_TOKEN``.
         """
         with self._lock:
-            self._keep(secret, variable)
-
-    def _keep(self, secret: str, variable: str) -> None:
-        if not secret or secret in self._known:
-            return
-        if len(self._known) >= _MOST_KNOWN:
-            # A device may issue tokens without end, and each is searched for in every text.
-            self._weak[variable] = f"is one of more than {_MOST_KNOWN}"
-            return
-        self._known.add(secret)
-        self._seen.clear()
-        if why := _weakness(secret):
-            self._weak[variable] = why
-            return
-        folded, exact = _forms(secret)
-        self._folded = _with(self._folded, folded, variable)
-        self._exact = _with(self._exact, exact, variable)
-        # A truncated dump would be a few numbers, as any list has them.
-        self._dumps = (*self._dumps, *(_Form(dump, dump, variable) for dump in _dumps(secret)))
-        cuts: dict[str, list[tuple[_Form, int]]] = {}
-        for form in (*self._folded, *self._exact):
-            for length in range(min(len(form.whole), _LONGEST_CUT), _SHORTEST_CUT - 1, -1):
-                cuts.setdefault(form.whole[length - _SHORTEST_CUT : length].lower(), []).append((form, length))
-        self._cuts = cuts
+            if not secret or secret in self._known:
+                return
+            if len(self._known) >= _MOST_KNOWN:
+                # A device may issue tokens without end, and each is searched for in every text.
+                self._weak[variable] = f"is one of more than {_MOST_KNOWN}"
+                return
+            self._known.add(secret)
+            self._seen.clear()
+            if why := _weakness(secret):
+                self._weak[variable] = why
+                return
+            folded, exact = _forms(secret)
+            self._folded = _with(self._folded, folded, variable)
+            self._exact = _with(self._exact, exact, variable)
+            # A truncated dump would be a few numbers, as any list has them.
+            self._dumps = (*self._dumps, *(_Form(dump, dump, variable) for dump in _dumps(secret)))
+            cuts: dict[str, list[tuple[_Form, int]]] = {}
+            for form in (*self._folded, *self._exact):
+                for length in range(min(len(form.whole), _LONGEST_CUT), _SHORTEST_CUT - 1, -1):
+                    cuts.setdefault(form.whole[length - _SHORTEST_CUT : length].lower(), []).append((form, length))
+            self._cuts = cuts
 
     def keep_userinfo(self, text: str) -> None:
         """Mask the passwords of all URLs in a text that have one (``http://user:password@robot``)."""
@@ -198,9 +196,7 @@ class Secrets:
 
     def masked_json(self, value: Any) -> Any:
         """Return JSON, which may have bytes in it, with variables in place of the secrets in texts, names and bytes."""
-        if not self._known:
-            return value
-        return self._walked(value)
+        return self._walked(value) if self._known else value
 
     def _walked(self, value: Any) -> Any:
         if isinstance(value, str):
@@ -220,7 +216,7 @@ class Secrets:
         if len(lowered) != len(text):
             lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
         for forms, where in ((self._folded, lowered), (self._exact, text), (self._dumps, lowered)):
-            for form in forms:
+            for form in (form for form in forms if form.beginning in where):
                 yield from _found(form, where)
         for cut in _ELLIPSIS.finditer(lowered):
             end = cut.start()
@@ -229,9 +225,9 @@ class Secrets:
                     yield end - length, end, form.variable
                     break
         for unit in (_UNITS if depth == 0 else _UNITS[:1]) if depth < _DEPTH else ():
-            plain = unit.sub(_decoded, text)
-            if len(plain) != len(text) and (inner := [*self._spans(plain, depth + 1)]):
-                yield from _outer(inner, unit, text)
+            plain, places = _unescaped(unit, text)
+            for begin, end, variable in self._spans(plain, depth + 1) if places else ():
+                yield _outer(begin, places)[0], _outer(end - 1, places)[1], variable
 
 
 def _weakness(secret: str) -> str:
@@ -302,19 +298,23 @@ def _decoded(unit: re.Match[str]) -> str:
     return chr(int(digits, {"decimal": 10, "octal": 8}.get(kind, 16)))
 
 
-def _outer(inner: list[tuple[int, int, str]], unit: re.Pattern[str], text: str) -> Iterator[tuple[int, int, str]]:
-    """Yield where in the escaped text the spans of the plain one are."""
-    # For each character of the unescaped text: where its escape begins and ends.
-    begins, ends, last = array("Q"), array("Q"), 0
+def _unescaped(unit: re.Pattern[str], text: str) -> tuple[str, list[tuple[int, int, int, int]]]:
+    """Return a text without its escapes, and their places: begin and end in it, begin and end in the escaped text."""
+    parts, places, last, at = list[str](), list[tuple[int, int, int, int]](), 0, 0
     for found in unit.finditer(text):
-        length = len(_decoded(found))
-        begins.extend((*range(last, found.start()), *[found.start()] * length))
-        ends.extend((*range(last + 1, found.start() + 1), *[found.end()] * length))
-        last = found.end()
-    begins.extend(range(last, len(text)))
-    ends.extend(range(last + 1, len(text) + 1))
-    for begin, end, variable in inner:
-        yield begins[begin], ends[end - 1], variable
+        (begin, end), char = found.span(), _decoded(found)
+        at += begin - last
+        parts += (text[last:begin], char)
+        places.append((at, at + len(char), begin, end))
+        last, at = end, at + len(char)
+    return "".join((*parts, text[last:])), places
+
+
+def _outer(position: int, places: list[tuple[int, int, int, int]]) -> tuple[int, int]:
+    """Return where a character of the text without escapes begins and ends in the escaped one."""
+    before = bisect_right(places, position, key=itemgetter(0))
+    _, until, begin, end = places[before - 1] if before else (0, 0, 0, 0)
+    return (begin, end) if position < until else (end + position - until, end + position - until + 1)
 
 
 def _without_cookie(name: Any, value: Any) -> Any:
