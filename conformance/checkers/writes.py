@@ -383,11 +383,13 @@ class Writes:
         """Judge whether a merge patch removes by null, merges objects and replaces lists (RFC 7396)."""
         for name, value in change.sent.items():
             was, now = change.before.get(name), change.now.get(name)
-            if was is None or name in change.moving or (value is not None and name not in change.now):
+            shape, given = (flat(_parts(of).get(name) or {}) for of in (item.shape, change.schema))
+            is_own = shape.get("readOnly") or given.get("readOnly")
+            if was is None or is_own or name in change.moving or (value is not None and name not in change.now):
                 continue
             wrong, expected = "", f"{name} as {change.label} asked for (RFC 7396 2)"
             if value is None:
-                default = flat(_parts(item.shape).get(name) or {}).get("default")
+                default = shape.get("default")
                 expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
                 # An empty value may be how the device shows that there is none.
                 is_kept = same(now, was) and not same(was, default) and was not in ("", [], {})

@@ -269,6 +269,7 @@ RIGHT = {
     ],
     "a patch keeps what has a default": [_get(), _patch("/plain", {"gain": 2.5}), _get(gain=2.5)],
     "null removes": [_get("/merge"), _patch("/merge", {"note": None}), _get("/merge", note=None)],
+    "null for what is readOnly": [_get("/merge"), _patch("/merge", {"built": None}), _get("/merge")],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
     "null in plain JSON": [_get(), _patch("/plain", {"note": None}), _get()],
     "an object merged": [
