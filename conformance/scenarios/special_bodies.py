@@ -23,7 +23,7 @@ from conformance.documents.representation import flat
 
 #: Texts with an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and characters that formats
 #: escape.
-TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
+TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
 # _PARTS: fractions, several for each member. _ALL_DIGITS: needs all digits of a double. Below: an integer that is no
 # double.
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
@@ -236,6 +236,12 @@ def _nulls(
                     yield {name: value}
                 yield {name: {one: value[one]}}
             yield {name: {inner[0]: usable[name].get(inner[0])}}
+            within, held = parts_of(parts[name]), now().get(name) or {}
+            free = {item for item in held.keys() & within.keys() if held[item] is not None and fits(within[item], None)}
+            for gone in sorted(free)[:1]:
+                # One that does not go counts only if another member changes at once.
+                beside = {one: value[one] for one in inner if one != gone and value[one] != held.get(one)}
+                yield from ({name: {gone: None, one: beside[one]}} for one in list(beside)[:1])
             break
 
 

@@ -65,6 +65,10 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
     gets = [one for (method, _), one in operations.items() if method == "GET"]
     reads = [operation for operation in gets if _CSV in operation.formats and any(map(is_json, operation.formats))]
     with _quoted_texts(api, values, operations if reads else {}):
+        for create, read in ((operations.get(("POST", read.template.rstrip("/"))), read) for read in reads):
+            if create is not None and read.parameter("path"):
+                with suppress(NoAnswerError):
+                    created_path(Surveyor(api, values), create, read)
         for read in reads:
             api.run.limit.check()
             with suppress(NoAnswerError):  # the survey reports a broken connection

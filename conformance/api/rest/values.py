@@ -46,13 +46,18 @@ class Values:
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)
         self._ids: dict[str, list[Any]] = defaultdict(list)
+        self._gone: dict[str, set[str]] = defaultdict(set)
 
     def learn(self, operation: Operation, exchange: Exchange) -> None:
         """Remember the scalars of a successful response by name, and the ids in it but that of a deleted thing."""
         response, (above, _, last) = exchange.response, operation.template.rstrip("/").rpartition("/")
-        if response.ok and operation.method == "DELETE" and last.startswith("{"):
-            gone = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
-            self._ids[above] = [one for one in self._ids[above] if text_of(one) != gone]
+        if response.ok and last.startswith("{"):
+            text = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
+            if operation.method == "DELETE":
+                self._ids[above] = [one for one in self._ids[above] if text_of(one) != text]
+                self._gone[above].add(text)
+            else:
+                self._gone[above].discard(text)
         location = (response.header("location") or "").split("?", 1)[0].rstrip("/")
         if response.ok and location:
             self._remember(self._ids[operation.template.rstrip("/")], location.rsplit("/", 1)[-1])
@@ -151,6 +156,9 @@ class Values:
         # Prefer a sample that is not empty: an empty list or object is written as nothing.
         made = sample(parameter.schema) or sample(parameter.schema, whole=True)
         found = [*given, *parameter.examples, *learned, made]
+        if parameter.where == "path":
+            gone = self._gone[operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")]
+            found.sort(key=lambda value: text_of(value) in gone)
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 
     def body(self, schema: Schema, examples: Sequence[Any] = (), operation: Operation | None = None) -> list[Any]:

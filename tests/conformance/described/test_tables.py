@@ -38,3 +38,49 @@ def test_a_filter_holds_for_both_formats(tmp_path, ignoring, is_found):
     with driven(*_device(ignoring), tmp_path) as (api, _, _):
         found = tables.play(api, Values({}, frozenset()))
     assert [bool(one.fault) for one in found if one.fault] == [True] * is_found
+
+
+def _log_below_a_zone(writer):
+    """Return the description and the routes of entries below zones, without an entry; writer: makes a line of CSV."""
+    entries, text = {}, {"type": "string"}
+    parts = {"number": {"type": "integer", "readOnly": True}, "level": text, "note": text}
+    schema = {"type": "object", "properties": parts}
+    listed = answers({"type": "array", "items": schema})
+    listed["content"]["text/csv"] = {"schema": text}
+    posted = {"required": True, "content": {"application/json": {"schema": {**schema, "required": ["level"]}}}}
+
+    async def create(request):
+        of = entries.setdefault(request.match_info["zone"], [])
+        of.append({"note": "", **await request.json(), "number": len(of)})
+        return web.json_response(of[-1], status=201)
+
+    async def read(request):
+        of = entries.get(request.match_info["zone"], [])
+        if "csv" not in request.headers.get("Accept", ""):
+            return web.json_response(of)
+        rows = "".join(writer(one) + "\r\n" for one in of)
+        return web.Response(text=f"number,level,note\r\n{rows}", content_type="text/csv")
+
+    zone = {"in": "path", "name": "zone", "required": True, "schema": text, "example": "north"}
+    paths = {
+        "/zones/{zone}/entries": {
+            "parameters": [zone],
+            "get": {"responses": {"200": listed, "4XX": REFUSED}},
+            "post": {"requestBody": posted, "responses": {"201": answers(schema), "4XX": REFUSED}},
+        }
+    }
+    return described(paths, "3.1.0"), {"/zones/{zone}/entries": {"GET": read, "POST": create}}
+
+
+def _quoted(entry):
+    notes = entry["note"].replace('"', '""')
+    return f'{entry["number"]},"{entry["level"].replace(chr(34), chr(34) * 2)}","{notes}"'
+
+
+@pytest.mark.parametrize(
+    ("writer", "is_found"), [(_quoted, False), (lambda one: f"{one['number']},{one['level']},{one['note']}", True)]
+)
+def test_texts_below_a_thing_are_quoted(tmp_path, writer, is_found):
+    with driven(*_log_below_a_zone(writer), tmp_path) as (api, _, _):
+        found = tables.play(api, Values({}, frozenset()))
+    assert [bool(one.fault) for one in found] == [is_found], found

@@ -107,3 +107,21 @@ def test_the_second_body_takes_the_last_alternative_of_each_union():
     assert Values().body(schema) == [{"physics": {"type": "roaas"}}, {"physics": []}]
     plain = {"type": "object", "required": ["on"], "properties": {"on": {"type": "boolean"}}}
     assert Values().body(plain) == [{"on": True}]
+
+
+def test_an_example_that_was_deleted_is_tried_last_until_it_is_there_again():
+    values, schema = Values(), {"type": "string"}
+    job = Parameter("job_id", "path", required=True, schema=schema, examples=("first",))
+    read, write, delete = (Operation("", method, "/jobs/{job_id}") for method in ("GET", "PUT", "DELETE"))
+
+    def learn(operation, url, body=b""):
+        request = Request(operation.method, f"http://device{url}", (), b"")
+        values.learn(operation, Exchange(request, Response(200, (("content-type", "application/json"),), body, 1.0)))
+
+    learn(_LIST, "/jobs", b'[{"id": "second"}]')
+    assert values.of(read, job)[:2] == ["first", "second"]
+    learn(delete, "/jobs/first")
+    assert values.of(read, job)[0] == "second"
+    assert values.of(read, job)[-1] == "first"
+    learn(write, "/jobs/first")
+    assert values.of(read, job)[0] == "first"
