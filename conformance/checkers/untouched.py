@@ -36,6 +36,8 @@ _SAID: Final = re.compile(
     r"\b(?:refus|reject|4xx)\w*\b[^.:]*\b(?:changes? nothing|nothing (?:is )?changed?|no effect|unchanged)",
     re.IGNORECASE,
 )
+# Paths of lists to which a refused request may add an entry.
+_LOG: Final = re.compile(r"log|event|audit|history|alarm|alert|message|metric|request|trace", re.IGNORECASE)
 _CONDITIONAL: Final = "GET with If-None-Match"
 
 
@@ -96,6 +98,8 @@ class Untouched:
         answer, before = occasion.response, self._seen.pop(path, None)
         is_usable = answer.status == HTTPStatus.OK and is_json(answer.media_type) and len(answer.body) < _OCTETS
         now = read_json(answer.body).value if is_usable and not answer.cut else None
+        if isinstance(now, list) and not _LOG.search(template):
+            now = {"items": now, "total": answer.header("x-total-count")}
         if not isinstance(now, dict):
             return
         if len(self._seen) < _MOST:

@@ -28,8 +28,11 @@ from conformance.documents.writing import text_of
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.reach import is_same, joined, split
 
-# _PAGES: consecutive pages to read. _VALUES: values of one parameter at quick; below, at other efforts.
+# _PAGES: consecutive pages to read, with _LARGE items at most where the limit allows that. _VALUES: values of one
+# parameter at quick; below, at other efforts.
+_LARGE: Final = 50
 _PAGES: Final = 4
 _VALUES: Final = {"quick": 8}
 _MOST_VALUES: Final = 12
@@ -45,8 +48,9 @@ _TWICE: Final = 2
 _STEADY: Final = 3
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
-# Further members by which a list is sorted while its pages are read.
+# Further members by which a list is sorted while its pages are read, and filters by which it is filtered.
 _SORTS: Final = 2
+_FILTERS: Final = 2
 # Fewest items that make pages to compare.
 _FEWEST: Final = 2
 # _BEYOND: offsets beyond the end of a list, as far as the schema allows. _DEPTH: of nested members.
@@ -54,6 +58,8 @@ _BEYOND: Final = (1000, 100, 10, 1)
 _DEPTH: Final = 3
 # Difference from UTC of a distant time zone, h.
 _FAR_H: Final = 11
+# How pages are read whose links the device gives.
+_LINK: Final = "the link to the next page"
 # Phrases in a description which say that the last page has no link to a next one.
 _ENDS: Final = re.compile(
     r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
@@ -118,7 +124,7 @@ def _pages_of(reader: Reader) -> Iterator[Paged]:
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield values of the sort with their members, and a value of a filter that keeps several items."""
+    """Yield values of the sort with their members, and values of filters that keep several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
         ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
@@ -130,14 +136,12 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
             if ranks.get(text, 0) < _FEWEST:
                 continue
             yield {listing.sort.name: text}, listing.sortings[text].member
+    filters = list[dict[str, Any]]()
     for name, parameter in listing.filters.items():
         there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
-        chosen = [
-            choice for choice in _choices(parameter, name, page) if _FEWEST <= there[text_of(choice)] < len(items)
-        ]
-        if chosen:
-            yield {parameter.name: chosen[-1]}, ""
-            break
+        usable = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
+        filters += [{parameter.name: usable[-1]}] if usable else []
+    yield from ((one, "") for one in filters[:_FILTERS])
 
 
 def pages_below(api: RestInterface, values: Values, listing: Listing, path: str) -> Iterator[Paged]:
@@ -225,6 +229,13 @@ class Reader:
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response, or None."""
         exchange = self.read(query)
+        page = page_of(exchange.response, self.listing.operation)
+        return None if page is None else (exchange, replace(page, by=self.by))
+
+    def followed(self, target: str) -> tuple[Exchange, Page] | None:
+        """Return a GET of a link's target and the list in its response, or None."""
+        usual = written(self.listing.operation, self.usual)
+        exchange = self.api.send(replace(usual, target=target))
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
 
@@ -367,6 +378,7 @@ class _Parts:
             self._by_offset,
             self._by_page,
             self._by_cursor,
+            self._by_link,
         ):
             found = self._twice(walk, whole) if time.monotonic() < until else None
             if found is not None:
@@ -483,6 +495,23 @@ class _Parts:
         cursor = self.reader.listing.cursor
         return None if cursor is None else self._walk(whole, cursor.name, lambda read, _: {} if not read else None)
 
+    def _by_link(self, whole: Page) -> Paged | None:
+        """Follow the links to the next page, as they are; None if the first page has no such link."""
+        limit, size = self.reader.listing.limit, self._size(whole)
+        first = self.reader.part({limit.name: size}) if limit is not None and size else None
+        if first is None or next(self._links(*first), None) is None:
+            return None
+        return self._walk(whole, _LINK, lambda read, _: {} if not read else None)
+
+    def _links(self, exchange: Exchange, page: Page) -> Iterator[str]:
+        """Yield the targets of links to the next page on the same server, without the prefix of its address."""
+        prefix = self.reader.api.client.prefix
+        for text in _next_texts(exchange, page):
+            url = joined(exchange.request.url, text)
+            if ("?" in text or "/" in text) and is_same(url, exchange.request.url):
+                target = split(url)[1]
+                yield from [target.removeprefix(prefix)] if target.startswith(prefix) else []
+
     def _size(self, whole: Page) -> int:
         """Return the page size for about three pages; 0 if none is allowed."""
         count = self._count(whole)
@@ -491,12 +520,10 @@ class _Parts:
 
     def _count(self, whole: Page) -> int:
         """Return how many items the pages have together: all of the list, as far as its totals tell."""
-        count = len(whole.items)
-        return (
-            count
-            if self.reader.always
-            else max([count, *(total for total in whole.totals.values() if total <= _PAGES * count)])
-        )
+        count, limit = len(whole.items), self.reader.listing.limit
+        page = max(count, min(flat(limit.schema).get("maximum", 0), _LARGE)) if limit is not None else count
+        known = () if self.reader.always else (total for total in whole.totals.values() if total <= _PAGES * page)
+        return max([count, *known])
 
     def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
         """Read page after page, and compare them with the whole list.
@@ -509,36 +536,38 @@ class _Parts:
         limit, size = self.reader.listing.limit, self._size(whole)
         if limit is None or not size:
             return None
-        joined: list[str] = []
+        ids: list[str] = []
         last: tuple[Exchange, Page] | None = None
         ends = ""
         for number in range(_PAGES):
-            query = where(len(joined), number)
+            query, link = where(len(ids), number), ""
             if query is None and last is not None:
-                following = next(cursors(self.reader.listing, *last), "")
+                links = self._links(*last) if way == _LINK else cursors(self.reader.listing, *last)
+                following = next(links, "")
+                link = following if way == _LINK else ""
                 query = {way: following} if following else None
             if query is None:
                 # Only a device that named a next page before says by its absence that this is the last.
-                ends = f"no further page after {len(joined)} items" if number > 1 and not whole.goes_on else ""
+                ends = f"no further page after {len(ids)} items" if number > 1 and not whole.goes_on else ""
                 break
-            part = self.reader.part({**query, limit.name: size})
+            part = self.reader.followed(link) if link else self.reader.part({**query, limit.name: size})
             if part is None:
                 return None
             last = part
-            joined += part[1].identities
-            if len(joined) >= self._count(whole) and not whole.goes_on:
+            ids += part[1].identities
+            if len(ids) >= self._count(whole) and not whole.goes_on:
                 break
             if not part[1].items:
-                ends = f"an empty page after {len(joined)} items"
+                ends = f"an empty page after {len(ids)} items"
                 break
         if last is None:
             return None
-        expected = whole.identities[: len(joined)]
-        fault = "" if tuple(joined[: len(expected)]) == expected else _difference(expected, tuple(joined))
+        expected = whole.identities[: len(ids)]
+        fault = "" if tuple(ids[: len(expected)]) == expected else _difference(expected, tuple(ids))
         # The list may have become shorter meanwhile.
         count = min([self._count(whole), *last[1].totals.values()])
-        fault = fault or (ends if len(joined) < max(count, len(whole.items)) else "")
-        twice = next((f"the item {text[:60]} twice" for text in joined if joined.count(text) > 1), "")
+        fault = fault or (ends if len(ids) < max(count, len(whole.items)) else "")
+        twice = next((f"the item {text[:60]} twice" for text in ids if ids.count(text) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
         return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
 
@@ -554,9 +583,7 @@ def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:
 def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
     """Yield values in a response that name the beginning of the next page."""
     name = listing.cursor.name if listing.cursor is not None else ""
-    links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
-    texts = [*(link.partition("<")[2].partition(">")[0] for link in links), *_following(page.around, 0, said=False)]
-    for text in texts:
+    for text in _next_texts(exchange, page):
         linked = dict(in_link(text))
         if name in linked:
             yield linked[name]
@@ -564,6 +591,13 @@ def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
             yield text
     if plain_name(name) == "startingafter" and page.goes_on and page.items:
         yield str(members_of(page.items[-1]).get("id", ""))
+
+
+def _next_texts(exchange: Exchange, page: Page) -> Iterator[str]:
+    """Yield the links and cursors in a response that announce a next page."""
+    links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
+    yield from (link.partition("<")[2].partition(">")[0] for link in links)
+    yield from _following(page.around, 0, said=False)
 
 
 def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:

@@ -19,7 +19,7 @@ from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import Kind, Variation
+from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
 from conformance.documents.files import file_of, keeps_octets
 from conformance.documents.json_text import shown
@@ -30,7 +30,6 @@ from conformance.scenarios.creating import created_path, other_texts, with_texts
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
-from conformance.scenarios.refusing import NO_FORMAT
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.special_bodies import is_list_of_changes, special_bodies

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.statuses import refuses
+from conformance.api.rest.variations import NO_FORMAT
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.scenarios.living import ABSENT, Kind, Living, Look, State, Thing
@@ -16,8 +17,6 @@ from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
 
 _TEXT: Final = "text/plain"
-#: A media type that no device has.
-NO_FORMAT: Final = "application/x.roaas-nothing"
 # Distance between the numbers from which a series of requests is made.
 _STEP: Final = 10
 # Texts that only the suite writes, as `another` makes them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
-from itertools import product
+from itertools import islice, product
 from typing import Any, Final
 
 from conformance.api.rest.inputs import Inputs, usual_inputs
@@ -236,13 +236,19 @@ def _nulls(
                     yield {name: value}
                 yield {name: {one: value[one]}}
             yield {name: {inner[0]: usable[name].get(inner[0])}}
-            within, held = parts_of(parts[name]), now().get(name) or {}
-            free = {item for item in held.keys() & within.keys() if held[item] is not None and fits(within[item], None)}
-            for gone in sorted(free)[:1]:
-                # One that does not go counts only if another member changes at once.
-                beside = {one: value[one] for one in inner if one != gone and value[one] != held.get(one)}
-                yield from ({name: {gone: None, one: beside[one]}} for one in list(beside)[:1])
+            yield from _null_within(parts[name], name, now().get(name) or {}, {one: value[one] for one in inner})
             break
+
+
+def _null_within(
+    given: Schema, name: str, held: dict[str, Any], others: dict[str, Any]
+) -> Iterator[dict[str, dict[str, Any]]]:
+    """Yield a merge patch that removes a member of an object and changes another one, by which a device shows that."""
+    within = parts_of(given)
+    free = (one for one in sorted(held.keys() & within.keys()) if held[one] is not None and fits(within[one], None))
+    for gone in islice(free, 1):
+        beside = [one for one in others if one != gone and others[one] != held.get(one)]
+        yield from ({name: {gone: None, one: others[one]}} for one in beside[:1])
 
 
 def _patches(

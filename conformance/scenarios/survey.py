@@ -17,7 +17,7 @@ from conformance.api.rest.statuses import HELD, differ
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
+from conformance.api.rest.variations import ACCEPT, NO_FORMAT, UNKNOWN, Kind, Variation, least_inputs, most_references
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
@@ -241,7 +241,12 @@ class Surveyor:
                 raise PartialTraceError(self.trace) from none
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
-        if doubted and by_inputs and self.reaching.finds_new(operation, self.usual[operation.label]):
+        trials = [self.usual[operation.label]] if doubted and by_inputs else []
+        # A member may have to be new that the usual request does not have.
+        is_extended = exchange.response.status == CONFLICT and variation.kind in _ACCEPTED and by_inputs
+        if is_extended and not doubted and operation.label in self.api.working:
+            trials = [variation.inputs]
+        if any(self.reaching.finds_new(operation, inputs) for inputs in trials):
             return self.send(operation, variation, fresh=fresh)
         self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
         self._note(operation, variation.kind, request, exchange)
@@ -409,6 +414,11 @@ class Surveyor:
         for media_type in types[: 1 if self.api.run.effort.name == "quick" else None]:
             other = Variation(Kind.INVALID, f"{media_type}, which is not declared, with 415 declared", _CHARSET, usual)
             self.send(operation, other, self.reaching.request(operation, other).having_type(media_type))
+        # Formats that the device does not have, and its own ones, which a quality of 0 excludes.
+        own = operation.formats if operation.method == "GET" and "406" in operation.responses and is_usable else ()
+        none = (NO_FORMAT, ", ".join(f"{name};q=0" for name in own))
+        for accept in none if own and not any("*" in name for name in own) else ():
+            self.send(operation, Variation(Kind.MISSING, f"Accept: {accept}", ACCEPT, replace(usual, accept=accept)))
         # Optional inputs then have their defaults, more than once.
         least = least_inputs(operation, usual)
         for inputs in [usual] if least is None else [least] * 2:

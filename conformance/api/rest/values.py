@@ -46,21 +46,18 @@ class Values:
         self._given = {plain_name(name): list(values) for name, values in (given or {}).items()}
         self._seen: dict[str, list[Any]] = defaultdict(list)
         self._ids: dict[str, list[Any]] = defaultdict(list)
+        # By collection: ids of what was deleted, and of what the run has created, the newest first.
         self._gone: dict[str, set[str]] = defaultdict(set)
+        self._made: dict[str, list[Any]] = defaultdict(list)
 
     def learn(self, operation: Operation, exchange: Exchange) -> None:
         """Remember the scalars of a successful response by name, and the ids in it but that of a deleted thing."""
-        response, (above, _, last) = exchange.response, operation.template.rstrip("/").rpartition("/")
-        if response.ok and last.startswith("{"):
-            text = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
-            if operation.method == "DELETE":
-                self._ids[above] = [one for one in self._ids[above] if text_of(one) != text]
-                self._gone[above].add(text)
-            else:
-                self._gone[above].discard(text)
+        response = exchange.response
+        if response.ok:
+            self._note_deletion(operation, exchange)
         location = (response.header("location") or "").split("?", 1)[0].rstrip("/")
         if response.ok and location:
-            self._remember(self._ids[operation.template.rstrip("/")], location.rsplit("/", 1)[-1])
+            self._learn_id(operation, location.rsplit("/", 1)[-1])
         for link in re.findall(r"<([^>]*)>", response.header("link") or ""):
             self._learn_link(link)
         if not response.ok or not is_json(response.media_type):
@@ -72,10 +69,26 @@ class Values:
             if isinstance(item, dict):
                 for name in IDS:
                     if isinstance(item.get(name), str | int):
-                        self._remember(self._ids[operation.template.rstrip("/")], item[name])
+                        self._learn_id(operation, item[name])
                         break
             elif isinstance(item, str | int) and isinstance(value, list):
-                self._remember(self._ids[operation.template.rstrip("/")], item)
+                self._learn_id(operation, item)
+
+    def _note_deletion(self, operation: Operation, exchange: Exchange) -> None:
+        """Remember that a thing is gone, or that it is there."""
+        above, _, last = operation.template.rstrip("/").rpartition("/")
+        text = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
+        if last.startswith("{") and operation.method == "DELETE":
+            for known in (self._ids, self._made):
+                known[above] = [one for one in known[above] if text_of(one) != text]
+            self._gone[above].add(text)
+        elif last.startswith("{"):
+            self._gone[above].discard(text)
+
+    def _learn_id(self, operation: Operation, id_: Any) -> None:
+        """Remember the id of a thing in the collection of an operation."""
+        for known in (self._ids, self._made) if operation.method == "POST" else (self._ids,):
+            self._remember(known[operation.template.rstrip("/")], id_)
 
     def _learn(self, value: Any, depth: int) -> None:
         if depth > _DEPTH:
@@ -157,8 +170,11 @@ class Values:
         made = sample(parameter.schema) or sample(parameter.schema, whole=True)
         found = [*given, *parameter.examples, *learned, made]
         if parameter.where == "path":
-            gone = self._gone[operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")]
-            found.sort(key=lambda value: text_of(value) in gone)
+            above = operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")
+            # A run deletes what it has created, so that other checks still find what was there before.
+            is_deleted = operation.method == "DELETE" and operation.template.rstrip("/").endswith("}")
+            found = [*given, *(self._made[above] if is_deleted else ()), *found]
+            found.sort(key=lambda value: text_of(value) in self._gone[above])
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 
     def body(self, schema: Schema, examples: Sequence[Any] = (), operation: Operation | None = None) -> list[Any]:

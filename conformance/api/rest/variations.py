@@ -29,6 +29,9 @@ _BEYOND: Final = 2**63
 #: Path into a body: names of members and indexes of items.
 Steps = tuple[str | int, ...]
 UNKNOWN: Final = "roaas-unknown"
+#: ACCEPT: the place of a variation that has other formats. NO_FORMAT: a media type that no device has.
+ACCEPT: Final = "header Accept"
+NO_FORMAT: Final = "application/x.roaas-nothing"
 _UNKNOWN_NUMBER: Final = 987_654_321
 # Texts that programs often mishandle; none of them makes a device act.
 _ODD_TEXTS: Final = (
@@ -108,7 +111,7 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
     if whole is not NOTHING and whole != usual.body and media_type == usual.media_type:
         yield Variation(Kind.OPTIONAL, "all members of the body", "body", replace(usual, body=whole))
     for name in operation.formats[:_FEW] if len(operation.formats) > 1 else ():
-        yield Variation(Kind.FORMAT, f"Accept: {name}", "header Accept", replace(usual, accept=name))
+        yield Variation(Kind.FORMAT, f"Accept: {name}", ACCEPT, replace(usual, accept=name))
 
 
 def most_references(operation: Operation, usual: Inputs, values: Values) -> Iterator[tuple[Inputs, Variation]]:

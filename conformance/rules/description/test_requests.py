@@ -13,7 +13,7 @@ from conformance.api.rest.conversions import is_converted
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
-from conformance.api.rest.variations import Kind
+from conformance.api.rest.variations import ACCEPT, Kind
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.writing import json_text
@@ -163,7 +163,9 @@ def _json_type(text: str) -> str:
 @rule("description/required", on=(survey,))
 def required(trace: Survey) -> Iterable[Outcome]:
     """Judge whether the device demands the inputs that the description requires."""
-    missing = [one for one in trace.probes if one.kind is Kind.MISSING and one.validity != VALID]
+    missing = [
+        one for one in trace.probes if one.kind is Kind.MISSING and (one.validity != VALID or one.place == ACCEPT)
+    ]
     probes = [one for one in missing if one.exchange is not None]
 
     def fault(probe: Probe) -> Fault | None:

@@ -22,6 +22,7 @@ def _described(*, if_match=True, error=None):
     read = {"responses": {**_OK, **({"405": {"description": "no", "content": error}} if error else {})}}
     paths = {
         "/config": {"get": read, "put": changes},
+        "/copied": {"get": {"responses": {**_OK, "304": {"description": "as it was"}}}},
         "/jobs/search": {"post": {"responses": _OK}},
         "/jobs/{id}": {**key, "get": read},
         "/tubes": {"get": read, "post": {"responses": _OK}},
@@ -160,6 +161,7 @@ def test_a_device_that_does_not_know_if_match_is_not_blamed(tmp_path):
         ("entity-tag", [_TAG_A, _TAG_B, one(_GET, _B, etag='"a"')]),
         ("entity-tag", [_CURRENT, one(_GET, _A, etag='"a"', if_none_match='"b", "a"')]),
         ("entity-tag", [one(_GET, _A, etag='"a"', if_none_match='W/"a"'), _CURRENT]),
+        ("entity-tag", [one("GET /copied 200", _A, etag='"a"', if_none_match='"a"')]),
         ("entity-tag", [_TAG_A, one("GET /tubes/1 304", if_none_match='"a"')]),
         ("entity-tag", [one("GET /tubes/1 412", if_none_match='"b"')]),
         ("entity-tag", [one("PUT /tubes/1 200", _A, etag='"old"'), _TAG_A]),

@@ -22,6 +22,10 @@ _PATHS = {
         "patch": {"requestBody": {"content": {"application/json": {"schema": _VALVE}}}, "responses": _OK},
     },
     "/events": {"get": {"responses": _OK}},
+    **{
+        path: {"get": {"responses": {"200": answers({"type": "array", "items": _VALVE})}}}
+        for path in ("/valves", "/log")
+    },
 }
 _SAYS = "(R1) A request that is refused (4xx) changes nothing: no resource, and it appends no event."
 _TAG = ("If-None-Match", '"roaas-nothing"')
@@ -62,16 +66,25 @@ def _rounds(between, name="revision", path="/valves/1", idle=0, times=3):
     return found
 
 
+def _listed(path, times=3):
+    """Return rounds of reading a list before and after a refusal that adds an item to it."""
+    rounds = _rounds(_REFUSAL, path=path, times=times)
+    return [(line, [{}] * members["revision"] if "GET" in line else members) for line, members in rounds]
+
+
 _REFUSAL = ("PATCH /valves/1 422", {})
 _ECHOED = ("GET /valves/9 404", {"detail": "last: Bearer roaas-not-this-one"})
 _BROKEN = {
     "a refused patch counts as a revision": (_rounds(_REFUSAL), False, _KEPT),
     "a refused patch appends an event": (_rounds(_REFUSAL, "last", "/events"), True, _KEPT),
+    "a refused patch adds an item": (_listed("/valves"), True, _KEPT),
     "a read by a condition counts": (_rounds(("GET /valves/1 200", {"revision": 1}, _TAG)), False, _SAFE),
     "an error shows credentials of an earlier request": ([_ECHOED], False, _INSIDE),
 }
 _RIGHT = {
     "a count that goes on by itself": (_rounds(_REFUSAL, idle=1), True),
+    "a list of requests": (_listed("/log"), True),
+    "items, where nothing is said": (_listed("/valves"), False),
     "once, by chance": (_rounds(_REFUSAL, times=2), True),
     "a member of which nothing is said": (_rounds(_REFUSAL, "seen"), False),
     "an event, where nothing is said": (_rounds(_REFUSAL, "last", "/events"), False),

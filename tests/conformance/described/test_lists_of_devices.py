@@ -2,6 +2,7 @@
 
 import random
 import time
+from urllib.parse import urlencode
 
 from aiohttp import web
 from small_device import REFUSED, answers, certified, described, error, small_device
@@ -41,6 +42,7 @@ _STYLES = {
     "sliding": {"limit": "limit", "offset": "offset", "in": "items", "around": lambda _, of: {"total": of}},
     "late": {"limit": "limit", "offset": "skip", "in": "items", "around": lambda _, of: {"total": of}},
     "newest": {"limit": "limit", "in": "items", "around": lambda *_: {}},
+    "linked": {"limit": "limit", "offset": "offset", "header": "X-Total-Count"},
     "last": {"limit": "limit", "page": "page", "first": 1, "in": "items", "around": lambda _, of: {"total": of}},
 }  # fmt: skip
 _FAULTS = [
@@ -61,6 +63,7 @@ _FAULTS = [
     ("page-1", "order lost on later pages", PAGES),
     ("offset", "last item lost under a large limit", PAGES),
     ("offset", "total wrong beside a limit", TOTAL),
+    ("linked", "links without the filter", PAGES),
 ]
 
 
@@ -136,6 +139,10 @@ class _Collection:
         part = self._altered(found[begin:end], query, limit)
         total += self.fault == "total wrong beside a limit" and limit > 0
         headers = {self.style["header"]: str(total)} if "header" in self.style else {}
+        if self.manner == "linked" and end < len(found):
+            kept = {} if self.fault == "links without the filter" else query
+            following = f"{self.path}?{urlencode({**kept, 'limit': size, 'offset': end})}"
+            headers["Link"] = f'<{self.path}>; rel="first", <{following}>; rel="next"'
         if "in" not in self.style:
             return web.json_response(part, headers=headers)
         following = self.style.get("next", lambda _, end: {"next": f"c{end}"}) if "cursor" in self.style else None

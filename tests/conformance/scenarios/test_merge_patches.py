@@ -2,12 +2,12 @@
 
 from small_device import answers, described
 
-from conformance.documents.openapi import operations_of
+from conformance.api.rest.patches import merged
 from conformance.api.rest.samples import fits
 from conformance.api.rest.values import Values
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
-from conformance.api.rest.patches import merged
+from conformance.documents.openapi import operations_of
 from conformance.scenarios.special_bodies import special_bodies
 
 _SCENE = {"type": "string", "enum": ["flat", "bloom"]}
@@ -26,13 +26,14 @@ def test_null_removes_a_member_of_an_object_beside_a_change(tmp_path):
     paths = {"/settings": {"get": {"responses": responses}, "patch": {"requestBody": body, "responses": responses}}}
     contract = Contract.load(write_described_pack(tmp_path, document := described(paths, "3.1.0"), document))
     read, change = sorted(operations_of(contract), key=lambda operation: operation.method)
-    first = state = {"name": "north", "lights": {"level": 40, "scene": "flat"}}
-    removed = []
-    for patch in special_bodies(change, read, lambda: state, Values(), lambda _: True):
+    first = {"name": "north", "lights": {"level": 40, "scene": "flat"}}
+    removed, states = [], [first]
+    for patch in special_bodies(change, read, lambda: states[-1], Values(), lambda _: True):
         if not fits(taken, patch):
             continue
-        before, state = state, merged(state, patch)
+        states.append(merged(states[-1], patch))
+        before, state = states[-2:]
         if "scene" in before["lights"] and patch.get("lights", {}).get("scene", "") is None:
             removed.append(before["lights"]["level"] != state["lights"]["level"])
     assert removed == [True]
-    assert state == first
+    assert states[-1] == first

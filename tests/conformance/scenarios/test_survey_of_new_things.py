@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_server import Handler, server_of
 
+from conformance.api.rest.inputs import whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
 from conformance.api.rest.unique import numbered
@@ -76,7 +77,7 @@ class _Tubes:
     def _is_taken(self, body, but=None):
         others = [one for id_, one in self.tubes.items() if id_ != but]
         keys = [name.split("+") for name in self.unique]
-        return any(all(one.get(name) == body.get(name) for name in key) for one in others for key in keys)
+        return any(all(name in body and one.get(name) == body[name] for name in key) for one in others for key in keys)
 
     def answer(self, method, target, tag, content):
         read = read_json(content)
@@ -185,6 +186,17 @@ def test_what_must_be_new_is_new(tmp_path, unique, refusal, there):
     # What another place says may be there already, as the least label of all.
     assert [one.says for one in accepted if not one.ok and one.place.removeprefix("body /") not in unique] == []
     assert again == 201
+
+
+def test_an_optional_member_that_must_be_new_is_found(tmp_path):
+    with _surveyor(tmp_path, _Tubes(("note",))) as (surveyor, operations):
+        put = operations["PUT /tubes/{id}"]
+        for operation in (operations["POST /tubes"], put):
+            for _ in surveyor.explore(operation):
+                pass
+        assert surveyor.values.unique.names(put) == ("note",)
+        new = [Writer(surveyor.api, surveyor.values).send(put, "/tubes/2", whole_body(put, surveyor.values)[1])]
+        assert [one.response.status for one in new] == [200]
 
 
 def test_a_creation_that_is_refused_for_another_reason_is_tried_a_few_times(tmp_path):

@@ -125,3 +125,5 @@ def test_an_example_that_was_deleted_is_tried_last_until_it_is_there_again():
     assert values.of(read, job)[-1] == "first"
     learn(write, "/jobs/first")
     assert values.of(read, job)[0] == "first"
+    learn(Operation("", "POST", "/jobs"), "/jobs", b'{"id": "own"}')
+    assert [values.of(one, job)[0] for one in (read, delete)] == ["first", "own"]
