@@ -114,6 +114,8 @@ class Contents:
         sent = self._sent.pop(request.url, None)
         if answer.media_type == (sent.request.media_type if sent is not None else _OCTETS):
             yield from self._file(occasion, sent)
+        elif sent is not None and sent.request.body == answer.body:
+            yield from _mislabelled(occasion, sent)
 
     def _file(self, occasion: Occasion, sent: Occasion | None) -> Iterator[Case]:
         """Judge a read by the file that was sent just before; the file before that may stay for a moment."""
@@ -140,6 +142,17 @@ class Contents:
         if value.startswith('"') and tag.startswith(('"', "W/")) and value != tag:
             expected = f"status 200 with the whole, because If-Range does not have {tag}"
             yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
+
+
+def _mislabelled(occasion: Occasion, sent: Occasion) -> Iterator[Case]:
+    """Judge a file that is read as it was sent, but under another of the media types that both operations have."""
+    kind, other = sent.request.media_type, occasion.response.media_type
+    if occasion.operation is None or sent.operation is None or not keeps_octets(other):
+        return
+    if {kind, other} <= set(occasion.operation.formats) & sent.operation.bodies.keys():
+        expected = f"Content-Type: {kind}, as {label_of(sent.operation)} has sent these octets"
+        found, cause = f"Content-Type: {other}", f"{label_of(occasion.operation)} media type"
+        yield occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
 
 
 def _may_be(body: bytes, read: Occasion, sent: Occasion) -> bool:

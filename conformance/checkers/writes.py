@@ -11,7 +11,9 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime
+from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
@@ -44,6 +46,8 @@ GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
 )
+# Members with the time of the last change.
+_CHANGED_AT: Final = re.compile(r"(?:last)?(?:updated|modified|changed|edited)(?:at|on|time|date)?")
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
 _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
 
@@ -228,6 +232,7 @@ class Writes:
             if not write.is_valid:
                 return
             yield from _entries(occasion, change)
+            yield from self._stamped(occasion, item, change)
             yield from self._values(occasion, item, change)
             if request.method == "PUT":
                 yield from self._left_out(occasion, item, change)
@@ -293,6 +298,30 @@ class Writes:
                 expected = f"{name}, which is readOnly, as the device gave it"
                 found = f"{shown(now)} as {name}, and {shown(was)} before"
                 yield occasion.case(_OWN, not is_taken, expected, found, cause=f"{item.label} {name}")
+
+    def _stamped(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+        """Judge whether the time of the last change moves, of a thing that has the time of its creation too."""
+        names, parts = {plain_name(name): name for name in change.now}, _parts(item.shape)
+        stamp = next((name for text, name in names.items() if _CHANGED_AT.fullmatch(text)), "")
+        touched = (change.sent.keys() & change.now.keys() & parts.keys()) - change.moving
+        is_changed = any(not same(change.before.get(name), change.now[name]) for name in touched)
+        if not stamp:
+            return
+        then, now = _moment(change.now.get(stamp)), _moment(change.write.response.header("date"))
+        is_record = any(text.startswith("created") for text in names) and same(
+            change.before.get(stamp), change.now[stamp]
+        )
+        if not (is_record and is_changed and then and now) or (now - then).total_seconds() <= _SETTLES_S:
+            return
+        doubts = self._doubts[change.operation.label, f"{stamp} stays"]
+        doubts.add(change.write.request.body)
+        if len(doubts) >= _SEEN:
+            expected = f"the time of {change.label} as {stamp}, {now:%H:%M:%S} by the Date of its response"
+            found, cause = (
+                f"{shown(change.now[stamp])} as {stamp}, as before",
+                f"{change.operation.label} {stamp} stays",
+            )
+            yield occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
 
     def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
@@ -448,6 +477,15 @@ def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
             wrong = f"no {lost[0]} in {name}" if 0 < len(lost) < len(new) else ""
             cause, expected = f"{change.operation.label} {name} entries", f"the entries that {change.label} wrote"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=cause)
+
+
+def _moment(text: Any) -> datetime | None:
+    """Return a time by RFC 3339 or of a Date header; None for anything else."""
+    for read in (datetime.fromisoformat, parsedate_to_datetime):
+        with suppress(TypeError, ValueError):
+            found = read(text)
+            return found if found.tzinfo is not None else None
+    return None
 
 
 def _is_rounded(value: Any, now: Any) -> bool:

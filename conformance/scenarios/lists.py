@@ -504,11 +504,15 @@ class _Parts:
         return self._walk(whole, _LINK, lambda read, _: {} if not read else None)
 
     def _links(self, exchange: Exchange, page: Page) -> Iterator[str]:
-        """Yield the targets of links to the next page on the same server, without the prefix of its address."""
-        prefix = self.reader.api.client.prefix
+        """Yield the targets of links to the next page on the same server, without the prefix of its address.
+
+        A link without the limit of the request may leave it to the client to add the other parameters as well.
+        """
+        prefix, limit = self.reader.api.client.prefix, self.reader.listing.limit
         for text in _next_texts(exchange, page):
             url = joined(exchange.request.url, text)
-            if ("?" in text or "/" in text) and is_same(url, exchange.request.url):
+            is_whole = limit is not None and limit.name in dict(in_link(url))
+            if is_whole and is_same(url, exchange.request.url):
                 target = split(url)[1]
                 yield from [target.removeprefix(prefix)] if target.startswith(prefix) else []
 
@@ -521,9 +525,9 @@ class _Parts:
     def _count(self, whole: Page) -> int:
         """Return how many items the pages have together: all of the list, as far as its totals tell."""
         count, limit = len(whole.items), self.reader.listing.limit
-        page = max(count, min(flat(limit.schema).get("maximum", 0), _LARGE)) if limit is not None else count
+        page = max(count, min(int(flat(limit.schema).get("maximum", 0)), _LARGE)) if limit is not None else count
         known = () if self.reader.always else (total for total in whole.totals.values() if total <= _PAGES * page)
-        return max([count, *known])
+        return int(max([count, *known]))
 
     def _walk(self, whole: Page, way: str, where: Callable[[int, int], dict[str, Any] | None]) -> Paged | None:
         """Read page after page, and compare them with the whole list.

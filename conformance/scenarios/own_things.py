@@ -285,13 +285,21 @@ class _Thing:
             below = template.rstrip("/").removeprefix(own)
             if method != "GET" or put is None or not f"{template}/".startswith(f"{own}/") or "{" in below:
                 continue
-            media_type = next((body for body in put.bodies if keeps_octets(body)), "")
+            media_type, *others = [body for body in put.bodies if keeps_octets(body)] or [""]
             if not (media_type or _TEXT in put.bodies) or not (allowed(self.api, put) and allowed(self.api, read)):
                 continue
             path = self.target.rstrip("/") + below
             whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
             files = [(media_type, file_of(media_type, octets)) for octets in _FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
+            # Another media type comes first: a refused one ends the uploads.
+            for other in others[:1]:
+                inputs = replace(usual_inputs(put, self.surveyor.values)[0], media_type=other)
+                for octets in _FILES[:2]:
+                    sent = replace(inputs, body=file_of(other, octets))
+                    request = replace(written(put, sent), target=path)
+                    self.surveyor.send(put, Variation(Kind.ODD, "", "", sent), request)
+                    self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
             for number, (kept_as, octets) in enumerate(files, 1):
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=kept_as)
                 request = replace(written(put, inputs), target=path)

@@ -31,7 +31,7 @@ CONFLICT: Final = 409
 WANTS_CONDITION: Final = frozenset({412, 428})
 _IF_MATCH: Final = "if-match"
 # _AROUND: refused operations that are tried. _QUIET: exceptions that are ignored.
-_AROUND: Final = 2
+_AROUND: Final = 4
 _QUIET: Final = (NotPossibleError, TimeIsOverError, NoAnswerError)
 
 
@@ -135,13 +135,19 @@ class Reaching:
         if not (is_new and status == CONFLICT and len(held) <= _AROUND and keeps_all(self.api.run.contract)):
             return
         own = [one for (method, _), one in callable_operations(self.api).items() if method == "GET"]
-        reads = [one for one in own if not any(given.required for given in one.parameters)]
+        targets, steps = list[str](), request.target.partition("?")[0].split("/")
+        for read in own:
+            needs_path = all(given.where == "path" for given in read.parameters if given.required)
+            # The list of all things, and the thing that the request is about.
+            if needs_path and ("{" not in read.template or f"{operation.template}/".startswith(f"{read.template}/")):
+                known = steps if "{" in read.template else read.template.split("/")
+                targets.append("/".join(known[: read.template.count("/") + 1]))
         with suppress(NoAnswerError):
             for turn in range(-ALONE if len(held) == 1 else 0, OFTEN + 1):
                 if turn > 0:
                     self.api.send(request)
-                for read in reads:
-                    self.api.send(Outgoing("GET", read.template))
+                for target in targets:
+                    self.api.send(Outgoing("GET", target))
 
 
 def _without(request: Outgoing, name: str) -> tuple[list[str], tuple[tuple[str, str], ...]]:

@@ -23,6 +23,10 @@ _PATHS = {
         "get": {"responses": {"200": _FILE, "206": _FILE}},
         "put": {"requestBody": {"content": {_OCTETS: {"schema": {}}}}, "responses": {"200": _JSON}},
     },
+    "/photo": {
+        "get": {"responses": {"200": {"description": "", "content": {**_PNG, "image/jpeg": {"schema": {}}}}}},
+        "put": {"requestBody": {"content": {**_PNG, "image/jpeg": {"schema": {}}}}, "responses": {"200": _JSON}},
+    },
     "/icon": {
         "get": {"responses": {"200": {"description": "", "content": _PNG}}},
         "put": {"requestBody": {"content": _PNG}, "responses": {"200": _JSON}},
@@ -45,7 +49,7 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, **fields):
     method, target, status = line.split()
     back = [(name[1:].replace("_", "-"), text) for name, text in fields.items() if name.startswith("_")]
     asked = [(name.replace("_", "-"), text) for name, text in fields.items() if not name.startswith("_")]
-    types = {"/label": "text/plain", "/note": "text/plain", "/icon": "image/png"}
+    types = {"/label": "text/plain", "/note": "text/plain", "/icon": "image/png", "/photo": "image/jpeg"}
     asked += [("Content-Type", types.get(target, _OCTETS))] if sent else []
     request = Request(method, _BASE + target, (("Host", "device:80"), *asked), sent)
     return Exchange(request, Response(int(status), tuple([*back, ("Content-Type", kind)] if body else back), body, 1.0))
@@ -78,6 +82,7 @@ def _stored(path, *pairs, kind="text/plain"):
 
 
 _IMAGES = [file_of("image/png", bytes(range(start, 200))) for start in (0, 1)]
+_JPEG = file_of("image/jpeg", bytes(range(200)))
 _WRITTEN_ANEW = [(image, file_of("image/png", b"\7" * 100)) for image in _IMAGES]
 _AS_TEXT = [(image, image.decode("utf-8", "replace").encode()) for image in _IMAGES]
 _HALF = [(image, image[: len(image) // 2]) for image in _IMAGES]
@@ -131,6 +136,8 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
         _stored("/note", *_CHANGED_ENDS),
         # An image may be written anew.
         _stored("/icon", *_WRITTEN_ANEW, kind="image/png"),
+        _stored("/photo", (_JPEG, _JPEG), kind="image/jpeg"),
+        _stored("/photo", (_JPEG, _IMAGES[0]), kind="image/png"),
         # A problem need not state a status.
         [_one("GET /state 404", b"{}", kind="application/problem+json")],
         [_one("GET /state 404", b'{"status": 404}', kind="application/problem+json")],
@@ -153,6 +160,7 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
         ("description/entity-tag", [_one("GET /map 206", b"2", if_range='"z"', **{**_IF_RANGE, "_etag": 'W/"a"'})]),
         ("description/written-is-read", _stored("/label", *_CHANGED_ENDS)),
         ("description/written-is-read", _stored("/note", *_CUT)),
+        ("description/written-is-read", _stored("/photo", (_JPEG, _JPEG), kind="image/png")),
         *(
             ("description/written-is-read", _stored("/icon", *pairs, kind="image/png"))
             for pairs in (_AS_TEXT, _HALF, _OTHER_PIXEL)

@@ -26,6 +26,7 @@ _PARTS = {
     "built": {"type": "string", "readOnly": True},
     "level": {"type": "integer", "readOnly": True},
     "uptime": {"type": "integer"},
+    **{key: {"type": "string", "format": "date-time", "readOnly": True} for key in ("createdAt", "updatedAt")},
 }
 _SCHEMA = {"type": "object", "properties": _PARTS}
 _STEPS = {"type": "array", "items": {"type": "object"}}
@@ -81,6 +82,16 @@ def _op(kind, path, value=None, **more):
     return {"op": kind, "path": path, **({"value": value} if kind in {"add", "replace", "test"} else {}), **more}
 
 
+def _two_changes(**stamps):
+    """Return two merge patches between reads, with stamps that a list has for each read."""
+    at = [{name: values[number] for name, values in stamps.items()} for number in range(3)]
+    steps = [_get("/merge", **at[0])]
+    for number, gain in enumerate((2.5, 3.5), 1):
+        steps += [_patch("/merge", {"gain": gain}, gain=gain, **at[number]), _get("/merge", gain=gain, **at[number])]
+    return steps
+
+
+_OLD, _NEW = ["2026-03-01T00:00:00Z"] * 3, [f"2026-03-01T00:16:4{second}Z" for second in (0, 2, 4)]
 _LONG, _ZONE = 2**53 + 1, {"a": 5, "b": 6}
 _EAST = "2026-02-01T12:34:56+02:00"
 _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
@@ -134,6 +145,7 @@ BROKEN = {
     "an offset is lost": (
         [_get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56Z"})], READ,
     ),
+    "the time of the last change stays": (_two_changes(createdAt=_OLD, updatedAt=_OLD), READ),
     "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}), _get("/merge")], PATCH),
     "null keeps, seen by another change": (
         [_get("/merge"), ("PATCH", "/merge", {"note": None, "gain": 2.5}, 204, None), _get("/merge", gain=2.5)], PATCH,
@@ -269,6 +281,9 @@ RIGHT = {
     ],
     "a patch keeps what has a default": [_get(), _patch("/plain", {"gain": 2.5}), _get(gain=2.5)],
     "null removes": [_get("/merge"), _patch("/merge", {"note": None}), _get("/merge", note=None)],
+    "the time of the last change moves": _two_changes(createdAt=_OLD, updatedAt=_NEW),
+    "another time stays": _two_changes(updatedAt=_OLD),
+    "it has only just changed": _two_changes(createdAt=_OLD, updatedAt=[_NEW[0]] * 3),
     "null for what is readOnly": [_get("/merge"), _patch("/merge", {"built": None}), _get("/merge")],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],
     "null in plain JSON": [_get(), _patch("/plain", {"note": None}), _get()],
@@ -335,7 +350,8 @@ def _broken(contract, steps):
         fields = [("Host", "device:8000"), *([("Content-Type", kinds.get(path, "application/json"))] if sent else [])]
         body = json.dumps(sent).encode() if sent else b""
         answer = json.dumps(seen).encode() if seen is not None and status < 300 else b""
-        kind = (("Content-Type", "application/json"),) if answer else ()
+        kind = (("Date", f"Sun, 01 Mar 2026 00:{now // 60:02.0f}:{now % 60:02.0f} GMT"),)
+        kind += (("Content-Type", "application/json"),) if answer else ()
         request = Request(method, BASE + path, tuple(fields), body)
         exchange = Exchange(request, Response(status, kind, answer, 10.0, received_s=now))
         broken |= {one.requirement for one in checkers(exchange) if not one.holds}
