@@ -16,7 +16,17 @@ from conformance.api.rest.applicable import allowed
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
-from conformance.api.rest.listing import Listing, Page, fitting, listing_of, members_of, page_of
+from conformance.api.rest.listing import (
+    NEXT,
+    Listing,
+    Page,
+    cursors,
+    fitting,
+    listing_of,
+    members_of,
+    next_texts,
+    page_of,
+)
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
 from conformance.checkers.totals import SETTLES_S, says_filtered
@@ -53,9 +63,8 @@ _SORTS: Final = 2
 _FILTERS: Final = 2
 # Fewest items that make pages to compare.
 _FEWEST: Final = 2
-# _BEYOND: offsets beyond the end of a list, as far as the schema allows. _DEPTH: of nested members.
+# Offsets beyond the end of a list, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
-_DEPTH: Final = 3
 # Difference from UTC of a distant time zone, h.
 _FAR_H: Final = 11
 # How pages are read whose links the device gives.
@@ -64,10 +73,6 @@ _LINK: Final = "the link to the next page"
 _ENDS: Final = re.compile(
     r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
     re.IGNORECASE,
-)
-# Normalised names of members with the link to the next page, or its cursor.
-_NEXT: Final = re.compile(
-    r"next(?:page)?(?:cursor|token|marker|link|url|href|key|after|id)?|end(?:cursor|token)|continuationtoken"
 )
 
 
@@ -419,7 +424,7 @@ class _Parts:
         """Read with a limit equal to the list's length: no page may follow, if the description says how that shows."""
         listing, count = self.reader.listing, self._count(whole)
         limit, cursor = listing.limit, listing.cursor
-        is_said = any(_NEXT.fullmatch(plain_name(name)) and _ENDS.search(text) for name, text in listing.says.items())
+        is_said = any(NEXT.fullmatch(plain_name(name)) and _ENDS.search(text) for name, text in listing.says.items())
         if limit is None or cursor is None or not is_said or not fitting(limit, count):
             return None
         part = self.reader.part({limit.name: count})
@@ -509,7 +514,7 @@ class _Parts:
         A link without the limit of the request may leave it to the client to add the other parameters as well.
         """
         prefix, limit = self.reader.api.client.prefix, self.reader.listing.limit
-        for text in _next_texts(exchange, page):
+        for text in next_texts(exchange, page):
             url = joined(exchange.request.url, text)
             is_whole = limit is not None and limit.name in dict(in_link(url))
             if is_whole and is_same(url, exchange.request.url):
@@ -582,35 +587,3 @@ def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:
         if one != other:
             return f"{other[:60]} in place of {one[:60]} as item {number}"
     return f"{len(found)} items instead of {len(expected)}"
-
-
-def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
-    """Yield values in a response that name the beginning of the next page."""
-    name = listing.cursor.name if listing.cursor is not None else ""
-    for text in _next_texts(exchange, page):
-        linked = dict(in_link(text))
-        if name in linked:
-            yield linked[name]
-        elif "?" not in text and "/" not in text:
-            yield text
-    if plain_name(name) == "startingafter" and page.goes_on and page.items:
-        yield str(members_of(page.items[-1]).get("id", ""))
-
-
-def _next_texts(exchange: Exchange, page: Page) -> Iterator[str]:
-    """Yield the links and cursors in a response that announce a next page."""
-    links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
-    yield from (link.partition("<")[2].partition(">")[0] for link in links)
-    yield from _following(page.around, 0, said=False)
-
-
-def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:
-    """Yield the texts and numbers in members whose names announce a next page."""
-    if isinstance(value, dict) and depth <= _DEPTH:
-        for name, one in value.items():
-            yield from _following(one, depth + 1, said=said or bool(_NEXT.fullmatch(plain_name(name))))
-    elif isinstance(value, tuple):
-        for one in value:
-            yield from _following(one, depth, said=said)
-    elif said and isinstance(value, str | int) and not isinstance(value, bool) and value != "":
-        yield str(value)

@@ -13,11 +13,12 @@ from conformance.api.rest.applicable import allowed
 from conformance.api.rest.calls import Call, value_text
 from conformance.api.rest.inputs import Inputs, usual_inputs, written
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.invalid_variations import unacceptable, undeclared_types
 from conformance.api.rest.statuses import HELD, differ
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
-from conformance.api.rest.variations import ACCEPT, NO_FORMAT, UNKNOWN, Kind, Variation, least_inputs, most_references
+from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
@@ -59,8 +60,6 @@ _NOT_FOUND: Final = 404
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # A charset means nothing for JSON (RFC 8259 11), so no device should refuse it (RFC 2045 5).
 _CHARSET: Final = "header Content-Type"
-# Media types that hardly any API accepts; at quick the first.
-_OTHER_TYPES: Final = ("text/plain", "application/xml")
 #: Statuses that refuse a request for its content, or for the thing's state.
 REFUSALS: Final = frozenset({400, 404, 405, 409, 411, 412, 413, 415, 422})
 # _DOUBTED: statuses that may refuse a second thing with the same name. _ACCEPTED: requests that must be accepted.
@@ -241,12 +240,9 @@ class Surveyor:
                 raise PartialTraceError(self.trace) from none
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
-        trials = [self.usual[operation.label]] if doubted and by_inputs else []
-        # A member may have to be new that the usual request does not have.
-        is_extended = exchange.response.status == CONFLICT and variation.kind in _ACCEPTED and by_inputs
-        if is_extended and not doubted and operation.label in self.api.working:
-            trials = [variation.inputs]
-        if any(self.reaching.finds_new(operation, inputs) for inputs in trials):
+        is_doubted = doubted or (exchange.response.status == CONFLICT and variation.kind in _ACCEPTED)
+        trial = self.usual[operation.label] if doubted else variation.inputs
+        if is_doubted and by_inputs and self.reaching.finds_new(operation, trial):
             return self.send(operation, variation, fresh=fresh)
         self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
         self._note(operation, variation.kind, request, exchange)
@@ -408,17 +404,11 @@ class Surveyor:
             shown = Variation(Kind.OPTIONAL, "with a charset", _CHARSET, usual)
             request = self.reaching.request(operation, shown).having_type(f"{usual.media_type}; charset=utf-8")
             self.send(operation, shown, request)
-        # An optional body may be ignored.
-        is_judged = is_usable and operation.body_required and "415" in operation.responses
-        types = [one for one in _OTHER_TYPES if is_judged and not {one, "text/*", "*/*"} & operation.bodies.keys()]
-        for media_type in types[: 1 if self.api.run.effort.name == "quick" else None]:
+        for media_type in undeclared_types(operation, self.api.run.effort.name) if is_usable else ():
             other = Variation(Kind.INVALID, f"{media_type}, which is not declared, with 415 declared", _CHARSET, usual)
             self.send(operation, other, self.reaching.request(operation, other).having_type(media_type))
-        # Formats that the device does not have, and its own ones, which a quality of 0 excludes.
-        own = operation.formats if operation.method == "GET" and "406" in operation.responses and is_usable else ()
-        none = (NO_FORMAT, ", ".join(f"{name};q=0" for name in own))
-        for accept in none if own and not any("*" in name for name in own) else ():
-            self.send(operation, Variation(Kind.MISSING, f"Accept: {accept}", ACCEPT, replace(usual, accept=accept)))
+        for refused in unacceptable(operation, usual) if is_usable else ():
+            self.send(operation, refused)
         # Optional inputs then have their defaults, more than once.
         least = least_inputs(operation, usual)
         for inputs in [usual] if least is None else [least] * 2:

@@ -11,13 +11,12 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.listing import Page, listing_of, page_of
+from conformance.api.rest.listing import Page, cursors, listing_of, page_of
 from conformance.api.rest.things import collection_of, identified, identifier_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
-from conformance.scenarios.lists import cursors
 from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 

@@ -11,11 +11,25 @@ from typing import Any, Final
 from conformance.api.rest.inputs import FORM, MULTIPART, NOTHING, Inputs, body_verdict, parameter_verdict
 from conformance.api.rest.samples import alike_and_apart, fits, sample
 from conformance.api.rest.validity import INVALID
-from conformance.api.rest.variations import DEPTH, LONG, UNKNOWN, Kind, Steps, Variation, place_of, shown, with_member
+from conformance.api.rest.variations import (
+    ACCEPT,
+    DEPTH,
+    LONG,
+    NO_FORMAT,
+    UNKNOWN,
+    Kind,
+    Steps,
+    Variation,
+    place_of,
+    shown,
+    with_member,
+)
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 
+# Media types that hardly any API accepts.
+_OTHER_TYPES: Final = ("text/plain", "application/xml")
 # Longest array that is sent: a longer one would test load.
 _MOST_ITEMS: Final = 100
 # Response formats that are requested together with a wrong value, at most.
@@ -234,3 +248,18 @@ def _wrong_scalars(schema: Schema) -> Iterator[tuple[Any, str]]:
                 break
     if "string" not in kinds and "enum" not in merged:
         yield UNKNOWN, _OTHER_TYPE
+
+
+def undeclared_types(operation: Operation, effort: str) -> list[str]:
+    """Return media types that few APIs accept, at quick one, if an operation declares 415 and requires a body."""
+    is_judged = operation.body_required and "415" in operation.responses
+    types = [one for one in _OTHER_TYPES if is_judged and not {one, "text/*", "*/*"} & operation.bodies.keys()]
+    return types[:1] if effort == "quick" else types
+
+
+def unacceptable(operation: Operation, usual: Inputs) -> Iterator[Variation]:
+    """Yield reads in a format that the device does not have, and in none of its own, if the operation declares 406."""
+    own = operation.formats if operation.method == "GET" and "406" in operation.responses else ()
+    for accept in (NO_FORMAT, ", ".join(f"{name};q=0" for name in own)):
+        if own and not any("*" in name for name in own):
+            yield Variation(Kind.MISSING, f"Accept: {accept}", ACCEPT, replace(usual, accept=accept))

@@ -10,6 +10,7 @@ from datetime import datetime
 from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
+from conformance.api.rest.references import in_link
 from conformance.api.rest.samples import fits
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
@@ -17,7 +18,7 @@ from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.documents.parameter_reading import VALID, decoded_query, judged, pairs_of
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import UnreadableError, flat, read
-from conformance.transport.exchange import Response
+from conformance.transport.exchange import Exchange, Response
 
 # Normalised names of limit parameters, and of members beside a list that repeat the limit. The second group also names
 # item counts: it counts as a limit only without a parameter of the first group, and if no item has such a member.
@@ -53,6 +54,12 @@ _SUFFIX: Final = re.compile(r"(.+?)[:._ \-]?(asc|desc)(?:ending)?", re.IGNORECAS
 _IDENTIFYING: Final = ("id", "uuid", "guid", "pk", "key", "slug", "name", "serial", "serialnumber", "number")
 _NEXT: Final = re.compile(r"next", re.IGNORECASE)
 _DEPTH: Final = 3
+#: Normalised names of members with the link to the next page, or its cursor.
+NEXT: Final = re.compile(
+    r"next(?:page)?(?:cursor|token|marker|link|url|href|key|after|id)?|end(?:cursor|token)|continuationtoken"
+)
+# How deep such members are looked for.
+_LINKS_DEPTH: Final = 3
 
 
 @dataclass(frozen=True)
@@ -455,3 +462,35 @@ def _rank(value: Any) -> tuple[str, float, float] | None:
     if _DAY.fullmatch(text):
         return "date", float(found.toordinal()), 0.0
     return ("time", found.timestamp(), 1.0) if found.tzinfo else None
+
+
+def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
+    """Yield values in a response that name the beginning of the next page."""
+    name = listing.cursor.name if listing.cursor is not None else ""
+    for text in next_texts(exchange, page):
+        linked = dict(in_link(text))
+        if name in linked:
+            yield linked[name]
+        elif "?" not in text and "/" not in text:
+            yield text
+    if plain_name(name) == "startingafter" and page.goes_on and page.items:
+        yield str(members_of(page.items[-1]).get("id", ""))
+
+
+def next_texts(exchange: Exchange, page: Page) -> Iterator[str]:
+    """Yield the links and cursors in a response that announce a next page."""
+    links = [one for one in (exchange.response.header("link") or "").split(",") if "next" in one]
+    yield from (link.partition("<")[2].partition(">")[0] for link in links)
+    yield from _following(page.around, 0, said=False)
+
+
+def _following(value: Any, depth: int, *, said: bool) -> Iterator[str]:
+    """Yield the texts and numbers in members whose names announce a next page."""
+    if isinstance(value, dict) and depth <= _LINKS_DEPTH:
+        for name, one in value.items():
+            yield from _following(one, depth + 1, said=said or bool(NEXT.fullmatch(plain_name(name))))
+    elif isinstance(value, tuple):
+        for one in value:
+            yield from _following(one, depth, said=said)
+    elif said and isinstance(value, str | int) and not isinstance(value, bool) and value != "":
+        yield str(value)
