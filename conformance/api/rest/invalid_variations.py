@@ -36,6 +36,7 @@ _MOST_ITEMS: Final = 100
 _FORMATS: Final = 3
 # Why a value is wrong, for the two faults that frameworks refuse for every parameter.
 _OTHER_TYPE: Final = "which has another type"
+NO_WHOLE_NUMBER: Final = "which is no whole number"
 _NOT_ASCII: Final = "which is none of its values, and beyond ASCII"
 _BOUNDS: Final = ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum")
 _BEYOND: Final = frozenset({"beyond its maximum", "at its exclusiveMaximum"})
@@ -159,7 +160,7 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
     bounds = {key: merged[key] for key in _BOUNDS if isinstance(merged.get(key), int | float)}
     fraction = math.floor(sample({**bounds, "type": "integer"})) + 0.5
     if "integer" in kinds and "string" not in kinds and not fits(schema, fraction):
-        yield fraction, "which is no whole number"
+        yield fraction, NO_WHOLE_NUMBER
     # Every framework refuses an object in place of a scalar, and a word in place of a number; many take 1 for "1".
     for value in ({"roaas": 1}, UNKNOWN, 17):
         is_plain = isinstance(value, str) or (isinstance(value, int) and kinds <= {"object", "array", "boolean"})

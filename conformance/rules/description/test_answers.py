@@ -39,6 +39,8 @@ _NO_SUCH_THING = frozenset({400, 404, 409, 422})
 _ASKED_FOR = frozenset({206, 304})
 _ASKING = frozenset({"range", "if-range", "if-match", "if-none-match", "if-modified-since", "if-unmodified-since"})
 _BAD_REQUEST, _FORBIDDEN, _NOT_FOUND = 400, 403, 404
+# Statuses by which frameworks refuse input, and say that a thing is not there.
+_OF_INPUT, _ABSENT = frozenset({400, 422}), frozenset({404, 410})
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 
 
@@ -103,11 +105,28 @@ def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, st
 @rule("description/status-declared", on=_ON)
 def status_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each status is declared for its operation; a crash is another requirement's affair."""
+    yield from _declared(trace, run, _is_no_refusal)
+
+
+@rule("description/errors-declared", on=_ON)
+def errors_declared(trace: Survey, run: Run) -> Iterable[Outcome]:
+    """Judge whether the statuses are declared that refuse wrong input, or name a thing that is not there."""
+    yield from _declared(trace, run, lambda *given: not _is_no_refusal(*given))
+
+
+def _is_no_refusal(probe: Probe, operation: Operation, status: int) -> bool:
+    """Return whether a status is another one than those by which frameworks refuse input without saying so."""
+    may_be_absent = probe.kind not in _PLAIN or any(operation.parameter("path"))
+    return status not in _OF_INPUT and not (status in _ABSENT and may_be_absent)
+
+
+def _declared(trace: Survey, run: Run, asked: Callable[[Probe, Operation, int], bool]) -> Iterator[Outcome]:
     lacking = {item.label for item in operations_of(run.contract) if trace.lacks(item)}
     judged = {
         id(probe): (operation, answer)
         for probe, operation, answer in _answered(trace, run)
         if _in_question(probe, answer.status) and answer.status not in CRASHES and probe.operation not in lacking
+        if asked(probe, operation, answer.status)
     }
 
     def fault(probe: Probe) -> Fault | None:

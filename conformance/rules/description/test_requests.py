@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.conversions import is_converted
+from conformance.api.rest.invalid_variations import NO_WHOLE_NUMBER
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
@@ -76,6 +77,8 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         given = _json_type((converted[1] or converted[3]).lower()) if converted else ""
         if given == "boolean":
             cause = "a boolean converted"
+        elif probe.says.endswith(NO_WHOLE_NUMBER) and probe.place.startswith("body"):
+            cause = "a fraction converted"
         elif converted and converted[2] and not probe.says:
             cause = f"{given} {converted[2]}"
         else:

@@ -117,7 +117,8 @@ _RIGHT = [
     _silent(NoAnswer.TIMEOUT, operation="GET /events"),
 ]
 _ALL = [
-    answers.status_declared, answers.media_type, answers.body_schema, answers.formats, answers.headers,
+    answers.status_declared, answers.errors_declared, answers.media_type, answers.body_schema, answers.formats,
+    answers.headers,
     requests.operations, requests.invalid_refused, requests.types, requests.required, requests.optional, requests.enums,
     requests.examples, requests.defaults, requests.valid_accepted, robustness.no_crash, robustness.no_hang,
     robustness.recovers,
@@ -139,12 +140,14 @@ def test_a_right_device_is_not_blamed(rule, run):
         (answers.status_declared, [_probe(409)]),
         (answers.status_declared, [_probe(403)]),
         (answers.status_declared, [_probe(403, kind=Kind.GENERATED)]),
-        (answers.status_declared, [_multipart(b"--b\r\nContent-Disposition: form-data; name=a\r\n\r\nx\r\n--b--")]),
+        (answers.errors_declared, [_multipart(b"--b\r\nContent-Disposition: form-data; name=a\r\n\r\nx\r\n--b--")]),
         (answers.status_declared, [_probe(428)]),
-        (answers.status_declared, [_probe(422, kind=Kind.GENERATED)]),
+        (answers.errors_declared, [_probe(422, kind=Kind.GENERATED)]),
         (answers.status_declared, [_probe(503, kind=Kind.ODD)]),
-        (answers.status_declared, [_probe(400, kind=Kind.ODD)]),
-        (answers.status_declared, [_page(400, kind=Kind.INVALID)]),
+        (answers.errors_declared, [_probe(400, kind=Kind.ODD)]),
+        (answers.errors_declared, [_page(400, kind=Kind.INVALID)]),
+        (answers.errors_declared, [_probe(400)]),
+        (answers.errors_declared, [_probe(410)]),
         (answers.media_type, [_page(200)]),
         (answers.media_type, [_page(404, kind=Kind.UNKNOWN)]),
         (answers.body_schema, [_probe(body={})]),
@@ -183,6 +186,8 @@ def test_a_fault_is_one_finding(rule, probes, run):
     [
         (answers.status_declared, [_page(404, operation=_PLAIN)]),
         (answers.status_declared, [_probe(500)]),
+        (answers.status_declared, [_probe(410)]),
+        (answers.status_declared, [_probe(422)]),
         (answers.media_type, [_page(500)]),
         (requests.operations, [_page(404)]),
         (requests.operations, [_probe(404, {"detail": "no"}, operation=_OTHER, **_PROBLEM)]),
@@ -311,6 +316,13 @@ def test_a_device_that_converts_types_without_loss_is_warned_once(text, run):
     ]
     failed = [len(_failed(rule, Survey(tuple(two)), run)) for rule in (requests.types, requests.invalid_refused)]
     assert failed == ([1, 0] if text == "5" else [0, 1])
+
+
+def test_fractions_that_a_framework_cuts_are_told_once(run):
+    says = {"says": "1.5 as body /n, which is no whole number", "place": "body /n", "kind": Kind.INVALID}
+    probes = [_probe(operation=one, **says) for one in (_LABEL, _OTHER)]
+    (finding,) = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
+    assert {one.operation for one in finding.operations} == {_LABEL, _OTHER}
 
 
 def test_what_an_operation_does_not_check_in_one_place_is_told_once(run):
