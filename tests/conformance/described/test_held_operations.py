@@ -129,9 +129,9 @@ def _kiln(fault=""):
     return described(paths, "3.1.0"), routes
 
 
-def _certified(fault, tmp_path):
+def _certified(fault, tmp_path, *more):
     with small_device(*_kiln(fault)) as url:
-        return certified(f"{url}/openapi.json", tmp_path / "out", "--call=*")
+        return certified(f"{url}/openapi.json", tmp_path / "out", "--call=*", *more)
 
 
 def test_a_right_kiln_is_reached_and_not_blamed(tmp_path):
@@ -150,5 +150,5 @@ def test_a_right_kiln_is_reached_and_not_blamed(tmp_path):
     ],
 )
 def test_what_the_state_forbade_is_judged(fault, requirement, tmp_path):
-    done = _certified(fault, tmp_path)
+    done = _certified(fault, tmp_path, "--class", "description")
     assert done.blamed.keys() == {requirement}, done.text

@@ -210,9 +210,9 @@ _BROKEN = {
 }
 
 
-def _blamed(make, style, fault, tmp_path):
+def _blamed(make, style, fault, tmp_path, *more):
     with small_device(*make(style, fault)) as url:
-        done = certified(f"{url}/openapi.json", tmp_path / "out", "--call=*")
+        done = certified(f"{url}/openapi.json", tmp_path / "out", "--call=*", *more)
     return done.blamed, done.text
 
 
@@ -226,5 +226,5 @@ def test_a_right_device_of_things_that_end_is_not_blamed(name, tmp_path):
 @pytest.mark.parametrize("name", _BROKEN)
 def test_a_fault_of_things_that_end_is_found(name, tmp_path):
     make, style, requirement = _BROKEN[name]
-    blamed, text = _blamed(make, style, name, tmp_path)
+    blamed, text = _blamed(make, style, name, tmp_path, "--class", "description")
     assert requirement in blamed, text

@@ -128,6 +128,6 @@ def test_words_of_another_version_are_one_finding_and_judged_as_they_are_meant(v
     assert all(word in done.text for word in words), done.text
     wrong = {path: constant({"a": 0, "note": 0}) for path in paths}
     with small_device(described(paths, version), wrong) as url:
-        done = certified(f"{url}/openapi.json", tmp_path / "wrong")
+        done = certified(f"{url}/openapi.json", tmp_path / "wrong", "--class", "description")
     named = {one["operation"] for one in done.result["api"]["operations"] if one["findings"]}
     assert named == {f"GET {path}" for path in paths if path != "/old"}, done.text
