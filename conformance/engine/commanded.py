@@ -22,6 +22,8 @@ NO_AXIS: Final = re.compile(
     r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$|uuid$|number$|index$",
     re.IGNORECASE,
 )
+HOLDS: Final = re.compile(r"^(?:timeout|ttl|hold|valid_for)(?:_(?:m?s|sec|seconds))?$", re.IGNORECASE)
+_MILLI: Final = re.compile(r"_ms$", re.IGNORECASE)
 _ID: Final = re.compile(r"[a-z0-9]I[dD]$")
 # Operations that command velocities; numbers that are velocities; numbers that only say how a move is made.
 _DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
@@ -30,6 +32,7 @@ _HOW: Final = re.compile(r"accel|decel|jerk|torque|force|effort|ramp", re.IGNORE
 _TWIST: Final = re.compile(r"(?:linear|angular)[/_]?[xyz]$", re.IGNORECASE)
 # Greatest values of what is a share.
 _SHARES: Final = frozenset({1.0, 100.0})
+_MOVES_BY: Final = re.compile(r"relative|move_?by|nudge", re.IGNORECASE)
 _RELATIVE: Final = re.compile(r"relative|distance|delta|offset|step", re.IGNORECASE)
 _UNITS: Final = {
     "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
@@ -62,6 +65,7 @@ class Commanded:
         turns: whether its names say that it is an angle, or turns the device.
         direction: where the body says its sign, and what it says there if it is positive or negative; None: the number
             has a sign.
+        operation: path and id of the operation that takes it.
     """
 
     name: str
@@ -69,6 +73,7 @@ class Commanded:
     schema: Schema
     turns: bool
     direction: tuple[str, str, str] | None = None
+    operation: str = ""
 
     @property
     def declared(self) -> tuple[float, float] | None:
@@ -87,8 +92,8 @@ class Commanded:
 
     @property
     def is_relative(self) -> bool:
-        """Whether its name says that it is a way, and no position."""
-        return bool(_RELATIVE.search(self.place))
+        """Whether its name, or that of its operation, says that it is a way, and no position."""
+        return bool(_RELATIVE.search(self.place) or _MOVES_BY.search(self.operation))
 
     @property
     def templates(self) -> dict[str, Any]:
@@ -166,8 +171,11 @@ def commanded_by(operation: Operation) -> list[Commanded]:
     found = [one for one in found if not (_HOW.search(one[1]) or (not velocities and FAST.search(one[1])))] or found
     names = unique_names([at for at, _, _ in found])
     signs = _signs(schema) if len(found) == 1 else None
+    called = f"{operation.template} {operation.id}"
     return [
-        Commanded(names[at], at, part, bool(_TURNS.search(f"{said} {operation.template if not at else ''}")), signs)
+        Commanded(
+            names[at], at, part, bool(_TURNS.search(f"{said} {operation.template if not at else ''}")), signs, called
+        )
         for at, said, part in found
     ]
 
@@ -232,6 +240,16 @@ def parts_of(schema: Any) -> Iterator[Schema]:
     for key in ("allOf", "anyOf", "oneOf"):
         for part in schema.get(key, ()):
             yield from parts_of(part)
+
+
+def lasting(schema: Schema | None) -> dict[str, float]:
+    """Return a second for each member of a body that says for how long a velocity holds, by JSON pointer."""
+    found = {}
+    for at, part in numbers_in(schema or {}):
+        if HOLDS.search(at.rpartition("/")[2]):
+            least, most = bounds_of(part) or (0.0, 1e6)
+            found[at] = min(max(1000.0 if _MILLI.search(at) else 1.0, least), most)
+    return found
 
 
 def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:

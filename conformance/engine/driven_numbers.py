@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -14,8 +15,14 @@ from conformance.statement.motion_map import Angle
 _DEEP, _MANY, _LISTED = 8, 400, 24
 # Greatest difference of a quaternion's length from 1.
 _UNIT: Final = 0.02
+# No angle of one turn is greater in rad, however it is counted.
+_RAD: Final = 7.0
 #: ANGLE: separates the pointer of a quaternion from the name of an angle.
 ANGLE: Final = "#"
+# A number that is written as a text.
+_NUMBER: Final = re.compile(r"-?\d{1,12}\.\d{1,12}")
+#: Names of what turns without end, in rad or, if any of its values is greater than a turn in rad, in degrees.
+HEADING: Final = re.compile(r"yaw|heading|theta|orientation|bearing", re.IGNORECASE)
 _ANGLES: Final[tuple[Angle, ...]] = ("roll", "pitch", "yaw")
 
 Numbers = dict[str, float]
@@ -35,6 +42,8 @@ def numbers_of(document: Any) -> Numbers:
 def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
     if isinstance(value, bool) or not deep:
         return
+    if isinstance(value, str) and _NUMBER.fullmatch(value):
+        value = float(value)
     if isinstance(value, int | float):
         # A number with thousands of digits is no measurement.
         if abs(value) < 1e300:  # noqa: PLR2004
@@ -78,13 +87,25 @@ class Looks:
         seen = self._seen.get(operation, [])
         return [place for place in seen[0][1] if all(place in one for _, one in seen)] if seen else []
 
+    def _turn(self, operation: str, place: str) -> float:
+        """Return what a whole turn is at a place; 0: it is no angle that begins anew."""
+        if ANGLE in place:
+            return math.tau
+        if not HEADING.search(place.rpartition("/")[2]):
+            return 0.0
+        return 360.0 if self.is_in_degrees(operation, place) else math.tau
+
+    def is_in_degrees(self, operation: str, place: str) -> bool:
+        """Return whether an angle has values that are beyond a turn in rad."""
+        return any(abs(numbers.get(place, 0.0)) > _RAD for _, numbers in self._seen.get(operation, ()))
+
     def samples(self, operation: str, place: str, begin: float, end: float = math.inf) -> list[Sample]:
         """Return the samples of a place between two moments; angles go on beyond a whole turn."""
         found: list[Sample] = []
         for moment, numbers in self._seen.get(operation, []):
             if begin <= moment <= end and place in numbers:
                 value = numbers[place]
-                if found and ANGLE in place:
-                    value = found[-1][1] + math.remainder(value - found[-1][1], math.tau)
+                if found and (turn := self._turn(operation, place)):
+                    value = found[-1][1] + math.remainder(value - found[-1][1], turn)
                 found.append((moment, value))
         return found

@@ -33,7 +33,7 @@ from conformance.engine.found_preparation import (
     wants_lease,
     wants_more,
 )
-from conformance.measures.samples import SEVERAL
+from conformance.measures.samples import SEVERAL, Sample
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.preparing import Preparation
@@ -55,6 +55,8 @@ ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|
 _STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
 #: The robot is kept within ROOM_M of its start, m; a fast robot as near as it can get in ROOM_S, s.
 ROOM_M, ROOM_S = 0.5, 1.5
+#: How fast a device may seem to move at rest, as a share of its fastest. _REST_S: how long it is watched at first, s.
+AT_REST, _REST_S = 0.005, 1.0
 #: Statuses with which an operation declares that it refuses invalid requests.
 REFUSED: Final = frozenset({"400", "422", "4XX", "4xx"})
 
@@ -94,7 +96,7 @@ class Plan:
             )
             yield f"  {command.name:<16} {declared}; tried at {command.little:g}"
         yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
-        yield from self.preparing.told()
+        yield from self.preparing.told(at_once=self.is_prepared)
         far = max(abs(end) for command in self.numbers for end in command.limits)
         room = max(ROOM_M, ROOM_S * far)
         driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
@@ -351,9 +353,9 @@ class Finder(ABC):
         return template_of(schema, {**names, at: "{lease}"} if at else names)
 
     @property
+    @abstractmethod
     def _body(self) -> dict[str, Any] | None:
         """The body of a command."""
-        return self._template({at: value for number in self._plan.numbers for at, value in number.templates.items()})
 
     def _look(self) -> None:
         """Read one operation; an operation without numbers is not read again."""
@@ -377,6 +379,16 @@ class Finder(ABC):
         while self._clock.now() < until or least > 0:
             self._look()
             least -= 1
+
+    def _watch_at_rest(self) -> None:
+        """Read what the device shows at rest, before it is driven."""
+        begun = self._clock.now()
+        self._watch(_REST_S)
+        self._rested = begun, self._clock.now()
+
+    def _at_rest(self, operation: str, place: str) -> list[Sample]:
+        """Return the samples of a place before the device was driven."""
+        return self._looks.samples(operation, place, *self._rested)
 
     def _send(self, call: str, body: Any) -> Exchange:
         self._ready.keep()

@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from conformance.engine.commanded import FAST, Commanded, axis_of, body_schema, bounds_of, numbers_in, parts_of, unit_of
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import ECHO, REFUSED, Finder
+from conformance.engine.finding import AT_REST, ECHO, REFUSED, Finder
 from conformance.engine.map_text import inline, key, string
-from conformance.measures.samples import SEVERAL, Noise
+from conformance.measures.samples import SEVERAL, Noise, slope
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
@@ -54,7 +54,7 @@ class PositionFinder(Finder):
 
     def _find(self) -> None:
         self._refused: list[str] = []
-        self._watch(_BEFORE_S)
+        self._watch_at_rest()
         counts = {operation.label: self._named_places(operation.label) for operation in self._reads}
         read = max(counts, key=lambda label: (len(counts[label]), self._is_called_alike(label)))
         if not counts[read]:
@@ -221,6 +221,8 @@ class PositionFinder(Finder):
             widest = max(widest, (limits[1] - limits[0]) / found.way)
             pointer, _, angle = found.place.partition(ANGLE)
             given: dict[str, Any] = {"at": pointer, "unit": self._unit(number, found), "limits": limits}
+            drift = slope(self._at_rest(read, found.place)) or 0.0
+            given["rest"] = float(f"{max(AT_REST * found.way / found.took_s, 3 * abs(drift)):.3g}")
             given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
             source = "as declared" if declared else "none are declared; so far it was seen to go"

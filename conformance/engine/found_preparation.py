@@ -86,13 +86,14 @@ class Preparing:
         found = (*held, *(step.send for step in (*self.before, *self.after)))
         return tuple(filter(None, found))
 
-    def told(self) -> Iterator[str]:
-        """Yield what may be sent before the device moves, as lines for the user."""
+    def told(self, *, at_once: bool) -> Iterator[str]:
+        """Yield what may be sent before the device moves, or is sent ``at_once``, as lines for the user."""
         first = [*([self.lease.acquire] if self.lease else []), *(step.send for step in self.before)]
         last = [step.send for step in self.after]
         last += [self.lease.release] if self.lease and self.lease.release else []
         if first:
-            yield f"If it refuses that, or stays where it is, the suite first sends {', '.join(first)},"
+            when = "Before that" if at_once else "If it refuses that, or stays where it is,"
+            yield f"{when} the suite first sends {', '.join(first)},"
             yield f"and at the end {', '.join(last) or 'nothing, as no operation is known that ends it'}."
 
     def lines(self) -> Iterator[str]:

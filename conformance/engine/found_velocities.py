@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from statistics import median
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema
 from conformance.engine.commanded import (
     Commanded,
+    axis_of,
+    body_schema,
     bounds_of,
     direction_line,
     is_axis,
+    lasting,
     numbers_in,
     unique_names,
     unit_of,
 )
-from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import ECHO, REFUSED, ROOM_M, ROOM_S, Finder
+from conformance.engine.driven_numbers import ANGLE, HEADING
+from conformance.engine.finding import AT_REST, ECHO, REFUSED, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.responses import Response, agreed, response_to, rests_from
-from conformance.measures.samples import Sample
+from conformance.measures.samples import SEVERAL, Sample, slope
 from conformance.scenarios.motion.templates import filled
 from conformance.scenarios.scenario import NotPossibleError
 
@@ -35,10 +38,14 @@ _DEMANDED_S: Final = 2.0
 # _UNITS: by units in one m or one rad, their names.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
+# _FULL: share of its velocity with which a device has not begun to stop. _LATE_S: how much later than it began to move
+# it may begin to stop, s.
+_FULL, _LATE_S = 0.8, 0.15
+# How long a device that was stopped is awaited, s.
+_STOPS_S: Final = 4.0
 # _OTHER: rates that differ by more than this factor have different units. _ROOM_RAD: greatest turn.
 _OTHER: Final = 4.0
 _ROOM_RAD: Final = 3.0
-_HEADING: Final = re.compile(r"yaw|heading|theta|orientation", re.IGNORECASE)
 # How far a velocity may be off, as a share of the fastest.
 _OFF, _OFF_WITHOUT_UNIT = 0.15, 0.25
 _COORDINATES: Final = frozenset("xyz")
@@ -89,8 +96,10 @@ class VelocityFinder(Finder):
         Raises:
             NotPossibleError: all of what can be commanded was refused.
         """
+        self._watch_at_rest()
         found: dict[str, dict[tuple[str, str], Response]] = {}
         refused: dict[str, NotPossibleError] = {}
+        self._late = dict[str, str]()
         self._settle_s, self._first = 0.3, dict[str, float]()
         self._other_way = dict[str, None]()
         for number in self._plan.numbers:
@@ -107,17 +116,66 @@ class VelocityFinder(Finder):
             if number.direction and positions and all(one.ratio < 0 for one in positions):
                 # Which of two words is the positive one, only the position says.
                 self._turn_words(number)
+                drives = [(-speed, *moments) for speed, *moments in drives]
                 found[number.name] = {at: one._replace(ratio=-one.ratio) for at, one in found[number.name].items()}
+            late_s = max(
+                (self._late_s(*at, drives[-1], one.ratio) for at, one in found[number.name].items() if one.is_position),
+                default=0.0,
+            )
             for (operation, place), response in found[number.name].items():
                 speed, _, _, ended, done = drives[-1]
                 after = self._looks.samples(operation, place, ended, done)
                 since = rests_from(after, response.sigma, response.ratio * speed)
-                self._settle_s = max(self._settle_s, 1.5 * (since - ended) + 0.15 if since else 1.0)
+                took_s = max(0.0, since - ended - late_s) if since else 0.0 if late_s else None
+                self._settle_s = max(self._settle_s, 1.0 if took_s is None else 1.5 * took_s + 0.15)
         if len(refused) == len(self._plan.numbers):
             raise next(iter(refused.values()))
         self._found.notes += [f"{name} stays 0: {problem}" for name, problem in refused.items()]
+        self._found.notes += self._late.values()
         self._refused = frozenset(refused)
         return found
+
+    def _late_s(self, operation: str, place: str, drive: Sequence[float], ratio: float) -> float:
+        """Return for how long a device drove on at its velocity when it was stopped, longer than it took to begin, s.
+
+        Which delay a link or a control loop has, both commands have.
+        """
+        speed, _, begun, ended, done = drive
+        moving, during = ratio * speed, self._looks.samples(operation, place, begun, ended)
+        begins_s = ended - begun - (during[-1][1] - during[0][1]) / moving
+        after = self._looks.samples(operation, place, ended, done)
+        windows = (after[index : index + 2 * SEVERAL] for index in range(len(after) - 2 * SEVERAL + 1))
+        full = [one[-1][0] for one in windows if (slope(one) or 0.0) / moving >= _FULL]
+        late_s = max(full, default=ended) - ended - max(0.0, begins_s) - _LATE_S
+        if late_s <= _LATE_S:
+            return 0.0
+        self._late[place] = (
+            f"Told to stop, {place} went on as fast for {late_s + _LATE_S:.1f} s longer than it took to begin."
+        )
+        return late_s
+
+    def _drives_on(self, rested: float, begun: float, ended: float) -> bool:
+        """Return whether a number that did not change before a drive still changes as in that."""
+        now = self._clock.now()
+        for operation in (one.label for one in self._reads):
+            for place in self._looks.places(operation):
+                spans = ((rested, begun), ((begun + ended) / 2, ended), (now - _LATE_S, now))
+                seen = [self._looks.samples(operation, place, *span) for span in spans]
+                before, during, last = (abs(slope(one) or 0.0) for one in seen)
+                if (
+                    is_axis(place.rpartition("/")[2])
+                    and before < during / 4
+                    and last > during / 2
+                    and len(seen[2]) > SEVERAL
+                ):
+                    return True
+        return False
+
+    @property
+    def _body(self) -> dict[str, Any] | None:
+        """The body of a command, which says for how long it holds, if it can."""
+        numbers = {at: value for number in self._plan.numbers for at, value in number.templates.items()}
+        return self._template({**lasting(body_schema(self._plan.drive)), **numbers})
 
     def _turn_words(self, number: Commanded) -> None:
         """Exchange the words for both directions of a number."""
@@ -143,6 +201,8 @@ class VelocityFinder(Finder):
             begun, _ = self._drive(number, speed)
             ended = self._clock.now()
             self._watch(_AFTER_S)
+            while self._clock.now() < ended + _STOPS_S and self._drives_on(rested, begun, ended):
+                self._look()
             drives.append((speed, rested, begun, ended, self._clock.now()))
             if len(drives) == 1 and not self._alike(drives):
                 if speed == speeds[-1]:
@@ -236,11 +296,22 @@ class VelocityFinder(Finder):
         is_joint = position and called not in _COORDINATES and position[0].rpartition("/")[2].lower() == called
         if position and (number.turns or not turning or is_joint):
             return position
+        if not position and not velocities:
+            # A tilt that lowers the tilt: judged as a velocity of the wrong sign.
+            called = axis_of(number.place)
+            alike = ((at, one) for at, one in own.items() if called and one.is_position and axis_of(at) == called)
+            return next(((at, one._replace(ratio=abs(one.ratio))) for at, one in alike), None)
         return min(velocities.items(), key=lambda item: abs(math.log(item[1].ratio)), default=None)
 
     def _shown_as_position(self, own: Mapping[str, Response]) -> tuple[str, Response] | None:
         """Return the place of the position that alone shows a velocity."""
         positions = {place: one for place, one in own.items() if one.is_position and one.ratio > 0}
+        # One wheel alone turns a device: then a coordinate changes otherwise the farther it drives.
+        turning = {at: one for at, one in own.items() if one.is_position and HEADING.search(at.rpartition("/")[2])}
+        if turning and max(abs(one.ratio) for one in turning.values()) > max(
+            (abs(one.ratio) for at, one in positions.items() if at not in turning), default=0.0
+        ):
+            positions = {at: one for at, one in positions.items() if at in turning}
         best = min(positions.items(), key=lambda item: _off(item[1].ratio), default=None)
         alone = best and not any(
             1 / _OTHER < abs(one.ratio / best[1].ratio) < _OTHER
@@ -307,6 +378,10 @@ class VelocityFinder(Finder):
             for (operation, place), one in responses[name].items()
             if operation == read and one.is_position and 1 / _OTHER < one.ratio / _unit(one.ratio)[0] < _OTHER
         }
+        places |= {place: one for place, one in shown.values() if one.is_position}
+        if all(HEADING.search(place.rpartition("/")[2]) for place, _ in shown.values()):
+            # What can only turn stays near: it drives in circles.
+            places = {place: one for place, one in places.items() if HEADING.search(place.rpartition("/")[2])}
         # How fast each place changes at most.
         fastest = {
             place: max(
@@ -357,24 +432,35 @@ class VelocityFinder(Finder):
             scale = _unit(response.ratio)[0] if number.has_unit else float(f"{response.ratio:.3g}")
             if response.is_position and scale != 1:
                 given["scale"] = scale
+            if not response.is_position:
+                given |= {"noise": float(f"{response.sigma:.2g}"), "rest": self._rest(place, response, widest[name])}
             given["tolerance"] = round(
                 max(off[name] * widest[name], 8 * (0 if response.is_position else response.sigma)), 4
             )
             source = "limits as declared" if number.declared else "limits: the suite's, as none are declared"
             yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
 
+    def _rest(self, place: str, response: Response, fastest: float) -> float:
+        """Return how fast a number may seem to move at rest: a share of the fastest, or as before any drive."""
+        seen = self._at_rest(self._reads[0].label, place)
+        drift = slope(seen) if response.is_position else median(value for _, value in seen)
+        return float(f"{max(AT_REST * fastest, 3 * abs(drift or 0.0)):.3g}")
+
     def _axis(self, place: str, response: Response, number: Commanded | None, fastest: float) -> str:
         """Return an axis of the state, within some room around where it is."""
         samples = self._looks.samples(self._reads[0].label, place, 0.0)
         here = samples[-1][1]
         scale, (way, turn) = _unit(response.ratio)
-        turns = number.turns if number else ANGLE in place
+        is_heading = ANGLE in place or bool(HEADING.search(place.rpartition("/")[2]))
+        turns = is_heading or (number is not None and number.turns)
         pointer, _, angle = place.partition(ANGLE)
         schema = self._schema_at(place)
         unit = unit_of(pointer, schema) or (turn if turns else way)
+        if is_heading and not angle:
+            unit = "deg" if self._looks.is_in_degrees(self._reads[0].label, place) else unit
         # One that was seen to turn in degrees is known by the same factor of a radian.
         scale = next((factor for factor, units in _UNITS.items() if unit and unit in units), scale)
-        if turns and unit in {"rad", "deg"} and not angle and _HEADING.search(place):
+        if turns and unit in {"rad", "deg"} and not angle and HEADING.search(place):
             angle = "yaw"
         room = _ROOM_RAD * scale if turns else max(ROOM_M * scale, ROOM_S * fastest)
         all_around = [round(end * scale, 1) for end in (-3.0, 3.0)]
@@ -383,6 +469,7 @@ class VelocityFinder(Finder):
             limits = [max(limits[0], declared[0]), min(limits[1], declared[1])]
         given: dict[str, Any] = {"at": pointer, "unit": unit, "limits": limits}
         given["tolerance"] = round(max(6 * response.sigma, 0.06 * fastest, 0.002 * scale), 4)
+        given["rest"] = self._rest(place, response, fastest)
         given |= {"angle": angle} if angle else {} if declared else {"bound": False}
         return f"{inline(given)}  # limits: {'all around' if angle else f'{room:.3g} {unit} around where it was'}"
 

@@ -119,8 +119,11 @@ def incomplete_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
 def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move without credentials is refused, and moves nothing."""
     tried = [attempt for attempt in trace.tried if attempt.kind == "unauthorised"]
-    # 423 and 428 refuse a client without the lease (RFC 4918 11.3, RFC 6585 3).
-    yield from refused(tried, 401, 403, 423, 428)
+    # 409, 423 and 428 refuse a client without the lease (RFC 9110 15.5.10, RFC 4918 11.3, RFC 6585 3), as others do
+    # whose description has its header or member.
+    leased = [attempt for attempt in tried if attempt.what.endswith("the lease")]
+    yield from refused([attempt for attempt in tried if attempt not in leased], 401, 403, 423, 428)
+    yield from refused(leased)
     yield from nothing_moved(trace, motion, "unauthorised")
 
 

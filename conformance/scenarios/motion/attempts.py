@@ -175,6 +175,9 @@ def _tries_of(sender: _Sender) -> Iterator[Attempts]:
     away = {first: axis.limits[1]}
     if sender.mapped.binding.has_credentials:
         yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
+    lease = sender.mapped.motion.lease
+    if lease and (lease.header or "{lease}" in str(sender.given.body)):
+        yield partial(sender.send_without_lease, away)
     if sender.given.body is not None:
         if not sender.is_form(away):  # almost any text is a valid form
             yield partial(sender.send_broken, away)
@@ -210,6 +213,14 @@ class _Sender:
         made = self.mapped.request_of(self.given, values, authorized=authorized)
         exchange = self.mapped.send(made, authorized=authorized)
         yield Tried(kind, what, exchange, self.mapped.has_failed(exchange))
+
+    def send_without_lease(self, values: dict[str, Any]) -> Iterator[Tried]:
+        """Send a command of a client that has no lease."""
+        made, ready = self.mapped.request_of(self.given, values), self.mapped.ready
+        body = made.body.replace(ready.lease.encode(), b"")
+        made = replace(made, headers=ready.without_lease(made.headers), body=body)
+        exchange = self.mapped.api.client.send(made.method, made.target, headers=made.headers, body=made.body)
+        yield Tried("unauthorised", f"{self.what} without the lease", exchange, self.mapped.has_failed(exchange))
 
     def send_broken(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send a command whose body is not in its syntax."""

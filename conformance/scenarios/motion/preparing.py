@@ -10,7 +10,7 @@ from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.templates import NoValueError, at, filled
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import Lease, Step
-from conformance.transport.client import is_drafting
+from conformance.transport.client import Headers, is_drafting
 from conformance.transport.exchange import Exchange, Outgoing
 
 # Share of the time between two renewals after which a lease is renewed.
@@ -106,8 +106,12 @@ class Preparation:
         lease = self.motion.lease
         if not (lease and self.lease and lease.header):
             return made
-        others = tuple(pair for pair in made.headers if pair[0] != lease.header)
-        return Outgoing(made.method, made.target, (*others, (lease.header, self.lease)), made.body)
+        headers = (*self.without_lease(made.headers), (lease.header, self.lease))
+        return Outgoing(made.method, made.target, headers, made.body)
+
+    def without_lease(self, headers: Headers) -> Headers:
+        """Return header fields without that of the lease."""
+        return tuple(pair for pair in headers if not self.motion.lease or pair[0] != self.motion.lease.header)
 
     def end(self) -> None:
         """Send the last commands, and release the lease.

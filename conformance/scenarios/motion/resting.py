@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from statistics import median
 from typing import Final
 
@@ -15,20 +15,27 @@ CREEPS_S: Final = 1.0
 # By default, how fast a device may seem to move at rest: these shares of its tolerance of speed, and of position.
 _OF_SPEED: Final = 0.1
 _OF_POSITION: Final = 0.2
+_Rate = Callable[[Sequence[Sample]], float | None]
 
 
 def at_rest(readings: Sequence[Reading], motion: MotionMap) -> Resting:
-    """Return the noise of a device at rest, measured or at least as its map declares."""
-    axes = {
-        name: Noise.of([reading.values[name] for reading in readings if reading.values], axis.noise)
-        for name, axis in motion.state.axes.items()
-    }
+    """Return the noise of a device at rest, measured or at least as its map declares.
+
+    How fast it seems to move counts as noise, unless the map declares that: the device may creep already.
+    """
+    axes = {}
+    for name, axis in motion.state.axes.items():
+        seen = [(reading.sent, reading.values[name]) for reading in readings if reading.values]
+        rate = (slope(seen) or 0.0) if axis.rest is not None else 0.0
+        axes[name] = Noise.of([value - rate * (moment - seen[0][0]) for moment, value in seen], axis.noise)
     declared = motion.velocity.axes if motion.velocity else {}
     speeds = {
         name: Noise.of([reading.speeds[name] for reading in readings if reading.speeds], declared[name].noise)
         for name in motion.speeds
     }
-    return Resting(axes, speeds)
+    # Of a velocity that is measured, its offset.
+    still = {name: noise if declared[name].rest is None else noise._replace(off=0.0) for name, noise in speeds.items()}
+    return Resting(axes, still)
 
 
 def fastest(readings: Sequence[Reading], motion: MotionMap, *, rested: bool = False) -> str:
@@ -52,18 +59,33 @@ def fastest(readings: Sequence[Reading], motion: MotionMap, *, rested: bool = Fa
 
 def creeping(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
     """Return the axes that keep moving, however slowly, as text; empty if none, or if it cannot be told."""
+    for said, seen, rate, most in _seen_of(readings, motion, resting):
+        if speed := goes_on(seen, rate, most):
+            return f"{said} {speed:.3g} per second, on and on"
+    return ""
+
+
+def may_creep(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> bool:
+    """Return whether all readings together show an axis that moves: too few of them to tell whether it goes on."""
+    return any(
+        len(seen) >= 2 * SEVERAL and abs(rate(seen) or 0.0) > most(seen)
+        for _, seen, rate, most in _seen_of(readings, motion, resting)
+    )
+
+
+def _seen_of(
+    readings: Sequence[Reading], motion: MotionMap, resting: Resting
+) -> Iterator[tuple[str, list[Sample], _Rate, Callable[[Sequence[Sample]], float]]]:
+    """Yield for each axis its name, its samples, and functions for the rate of some and for the most of it at rest."""
     declared = motion.velocity.axes if motion.velocity else {}
     for name, noise in resting.speeds.items():
         most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)
         seen = [(reading.sent, reading.speeds[name]) for reading in readings if reading.speeds]
-        if speed := goes_on(seen, _middle, _beside(most, noise.room)):
-            return f"{name} at {speed:.3g} per second, on and on"
+        yield f"{name} at", seen, _middle, _beside(most, noise.room)
     for name, noise in resting.axes.items():
         most = motion.state.axes[name].rest or _OF_POSITION * motion.tolerance(name)
         seen = [((reading.sent + reading.received) / 2, reading.values[name]) for reading in readings if reading.values]
-        if speed := goes_on(seen, slope, _beside(most, noise.slope_room)):
-            return f"{name} by {speed:.3g} per second, on and on"
-    return ""
+        yield f"{name} by", seen, slope, _beside(most, noise.slope_room)
 
 
 def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:

@@ -16,7 +16,7 @@ from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.measuring import STEADY_S, steady_since
 from conformance.scenarios.motion.moves import TRIES, beyond, recorded
-from conformance.scenarios.motion.resting import creeping, fastest
+from conformance.scenarios.motion.resting import creeping, fastest, may_creep
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Need, Stage
@@ -517,7 +517,7 @@ def _watched(
             break
         after.append(mapped.read())
     still = [reading for reading in after if reading.sent >= (rests_at if since is None else since)]
-    if creeping(still, mapped.motion, mapped.resting):
+    if creeping(still, mapped.motion, mapped.resting) or may_creep(still, mapped.motion, mapped.resting):
         # The device may still come to rest.
         after += mapped.watch(after[-1].sent + _SLOWS_S, drives_on)
         since = None

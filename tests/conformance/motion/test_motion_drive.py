@@ -2,22 +2,40 @@
 
 import copy
 import json
+import math
 import sys
 import tomllib
+from unittest.mock import patch
 
 import pytest
 import rover
 import winch
-from arm import Arm
+from arm import LIMITS, Arm
 from body import Body
-from judged_devices import RUNS
+from driven_device import SimulatedClock
+from judged_devices import MOVES, RUNS
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
+from simulated import Api, Binding, cases_of, map_of
 from starlette.responses import JSONResponse
 from winch import Winch
 
+from conformance.api.call_rules import CallRules
+from conformance.documents.openapi import read_operations
+from conformance.engine.commanded import commanded_by, lasting
+from conformance.engine.driven_numbers import Looks, numbers_of
+from conformance.engine.finding import plan_of
+from conformance.engine.found_velocities import VelocityFinder
+from conformance.rules.motion.test_motion_attempts import unauthorised_still
+from conformance.rules.motion.test_velocities import stopped
+from conformance.scenarios.motion import attempts
+from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.scenarios.motion.velocities import velocities
 from conformance.statement.statement import motion_map_of
+from conformance.transport.exchange import Exchange, Request, Response
+from conformance.verdict.effort import Effort
+from conformance.verdict.run import Run
 from reports.rendering import render
 
 
@@ -184,3 +202,95 @@ def test_a_rover_that_never_moves_is_told_so_at_once(tmp_path):
         done, _, given = _driven(url, tmp_path)
     assert (done.returncode, given) == (4, [])
     assert "was accepted (ahead at 0.05, left at 0.05), and no number" in done.stderr
+
+
+class Creeping(Body):
+    """A rover that goes on at a fiftieth of its greatest speed when it is stopped."""
+
+    def drive(self, speeds, hold_s, now):
+        before = self.velocity(now)
+        slow = {name: math.copysign(rover.FASTEST / 50, speed) for name, speed in before.items()}
+        super().drive(
+            *((slow, math.inf) if any(before.values()) and not any(speeds.values()) else (speeds, hold_s)), now
+        )
+
+
+class Late(Body):
+    """A rover that drives on for a while when it is stopped."""
+
+    def drive(self, speeds, hold_s, now):
+        if any(speeds.values()) or not any(self.velocity(now).values()):
+            super().drive(speeds, hold_s, now)
+        else:
+            self.held_until = now + 0.6
+
+
+def _simulated(body_type, noise=0.0):
+    """Return the map that is found of a simulated rover, and the failures of its stops."""
+    clock = SimulatedClock()
+    body = body_type(rover.LIMITS, clock.now, clock.sleep, noise)
+    api = Api(Rover(body), clock, lambda: 0.002)
+    plan = plan_of(read_operations(rover.DESCRIPTION), "PUT /velocity", None, CallRules())
+    motion = map_of("\n".join(VelocityFinder(api, Binding(api), plan, clock).found().lines))
+    mapped = MappedDevice(api, motion, clock, Binding(api))
+    given = {"mapped": mapped, "effort": Effort("quick"), "run": Run(), "motion": motion}
+    trace = velocities.play(**{name: given[name] for name in velocities.fixtures})
+    return motion, [case.observed for case in cases_of(stopped, trace, given) if not case.holds]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0005])
+def test_what_stops_late_or_creeps_is_found_by_the_time_and_the_rest_of_a_right_rover(noise):
+    assert _simulated(Body, noise)[1] == []
+    assert any("on and on" in said for said in _simulated(Creeping, noise)[1])
+    motion, failures = _simulated(Late, noise)
+    assert failures
+    assert motion.velocity is not None
+    assert motion.velocity.settle_s < 0.5, "how late it stopped is no time that it needs"
+
+
+_NUMBER = {"type": "number"}
+_BODY = {"type": "object", "properties": {"pan": _NUMBER, "timeout_ms": _NUMBER}}
+
+
+def test_what_an_operation_is_called_says_whether_it_takes_ways():
+    body = {"requestBody": {"content": {"application/json": {"schema": _BODY}}}, "responses": {}}
+    document = {"openapi": "3.1.0", "info": {}, "paths": {f"/{name}": {"post": body} for name in ("relative", "goto")}}
+    by, to = read_operations(document)
+    assert [number.is_relative for one in (by, to) for number in commanded_by(one)] == [True, False]
+    assert lasting(_BODY) == {"/timeout_ms": 1000.0}
+
+
+def test_numbers_in_texts_are_read_and_a_heading_in_degrees_begins_anew():
+    looks = Looks()
+    for moment, heading in enumerate(("358.5", "359.75", "1.00")):
+        looks.add("GET /state", moment, numbers_of({"heading": heading, "serial": "1234", "version": "1.2.3"}))
+    assert looks.places("GET /state") == ["/heading"]
+    assert looks.samples("GET /state", "/heading", 0) == [(0, 358.5), (1, 359.75), (2, 361.0)]
+
+
+class Leasing(Api):
+    """An arm with a lease; ``wants``: whether it moves only for a client that has it."""
+
+    wants = True
+
+    def send(self, method, path, *, headers=(), body=b"", **how):
+        if path == "/lease":
+            said = Response(200, (), b'{"token": "mine"}', 2.0)
+        elif self.wants and path == "/move" and dict(headers).get("X-Lease") != "mine":
+            said = Response(423, (), b"{}", 2.0)
+        else:
+            return super().send(method, path, headers=headers, body=body, **how)
+        return Exchange(Request(method, f"http://device{path}", headers, body), said)
+
+
+@pytest.mark.parametrize("wants", [True, False])
+def test_an_arm_that_moves_for_a_client_without_its_lease_is_blamed(wants):
+    clock = SimulatedClock()
+    api = Leasing(Arm(Body(LIMITS, clock.now, clock.sleep)), clock, lambda: 0.002)
+    api.wants = wants
+    motion = map_of(f'{MOVES}[motion.lease]\nacquire = "POST /lease"\ntoken = "/token"\nheader = "X-Lease"\n')
+    with patch.object(attempts, "vanished", lambda *_: iter(())):
+        trace = attempts.attempts_at_rest.play(mapped=MappedDevice(api, motion, clock, Binding(api)))
+    cases = cases_of(unauthorised_still, trace, {"motion": motion})
+    assert cases
+    assert all(case.holds for case in cases) == wants
