@@ -109,8 +109,7 @@ class Reaching:
     def finds_new(self, operation: Operation, inputs: Inputs) -> bool:
         """Find out which members must be new in each creation; return whether new ones are accepted."""
         label, unique, found = operation.label, self.values.unique, False
-        is_askable = is_json(inputs.media_type) and not operation.safe and label in self.api.working
-        if label in self._asked or not is_askable:
+        if label in self._asked or not is_json(inputs.media_type) or operation.safe:
             return False
         self._asked.add(label)
         with suppress(*_QUIET):

@@ -240,9 +240,10 @@ class Surveyor:
                 raise PartialTraceError(self.trace) from none
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
-        is_doubted = doubted or (exchange.response.status == CONFLICT and variation.kind in _ACCEPTED)
+        is_held = exchange.response.status == CONFLICT and operation.label in self.api.working
         trial = self.usual[operation.label] if doubted else variation.inputs
-        if is_doubted and by_inputs and self.reaching.finds_new(operation, trial):
+        is_tried = by_inputs and (doubted or (is_held and variation.kind in _ACCEPTED))
+        if is_tried and self.reaching.finds_new(operation, trial):
             return self.send(operation, variation, fresh=fresh)
         self.probes.append(replace(probe, exchange=exchange, invents=probe.invents or doubted))
         self._note(operation, variation.kind, request, exchange)
@@ -271,8 +272,7 @@ class Surveyor:
         succeeds = operation.method == "POST" and label in self.api.working
         if succeeds and usual is not None and label not in self.api.single:
             with suppress(NotPossibleError, TimeIsOverError, NoAnswerError):
-                again = self.api.send(written(operation, usual))
-                self.api.single[label] = again.response.status in _DOUBTED
+                self.api.single[label] = self.api.send(written(operation, usual)).response.status in _DOUBTED
         return self.api.single.get(label, False)
 
     def _described(self, operation: Operation, variation: Variation, request: Outgoing) -> Probe:
