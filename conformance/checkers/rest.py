@@ -5,7 +5,7 @@ from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.checkers import declared, fields, problem
-from conformance.checkers.changes import Changes
+from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import Conditional, EntityTags
@@ -15,7 +15,6 @@ from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
-from conformance.checkers.transitions import Transitions
 from conformance.checkers.untouched import Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract

@@ -20,8 +20,7 @@ from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, identified, represented
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ENDING, FINAL, state_of
-from conformance.checkers.transitions import state_member
+from conformance.checkers.changes import ENDING, FINAL, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json

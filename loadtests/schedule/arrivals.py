@@ -116,13 +116,11 @@ class Schedule:
         return [made[place] for place in self._mine(segment)]
 
 
-def arrivals_due(plan: Plan, elapsed_s: float, *, phase: str, interface: str | None = None) -> int:
+def arrivals_due(plan: Plan, elapsed_s: float, *, phase: str) -> int:
     """Return how many arrivals of a phase were due in the segments that had ended by then."""
     schedule = Schedule(plan, 0, 1)
     return sum(
         schedule.total(index)
         for index, segment in enumerate(plan.segments)
-        if segment.phase == phase
-        and (interface is None or segment.interface == interface)
-        and segment.end_ns <= elapsed_s * _NS + 1
+        if segment.phase == phase and segment.end_ns <= elapsed_s * _NS + 1
     )

@@ -127,23 +127,16 @@ def one_turn(
     }, last
 
 
-def judge_same_values(
-    api: RestInterface,
-    call: Call,
-    media_types: list[str],
-    renew: Callable[[], object] = _nothing,
-    reader: Reader = in_turn,
-) -> Exchange:
+def judge_same_values(api: RestInterface, call: Call, media_types: list[str], reader: Reader = in_turn) -> Exchange:
     """Judge whether the formats of a resource agree; return the last JSON exchange.
 
     Args:
         api: the robot's REST interface.
         call: reads the resource.
         media_types: the formats to compare with JSON.
-        renew: called before each comparison to keep the state constant.
         reader: reads the resource in these formats.
     """
-    found, exchange = disagreements(api, call, media_types, renew, reader)
+    found, exchange = disagreements(api, call, media_types, reader=reader)
     if exchange.response.ok:
         expect(api.run.judge, "rest-formats/same-values", found[0].exchange if found else exchange).that(
             not found,

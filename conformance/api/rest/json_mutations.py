@@ -7,6 +7,7 @@ from typing import Any
 
 from conformance.api.mutations import STRANGE_NAME, STRANGE_TEXT, Member, Mutation, broken_members
 from conformance.api.rest.samples import sample
+from conformance.api.rest.variations import with_member
 from conformance.documents.json_schema import Schema, kind_of, types_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
@@ -86,12 +87,7 @@ def places(value: Any, schema: Schema, path: Path = ()) -> Iterator[Place]:
 
 def replaced(value: Any, path: Path, new: Any) -> Any:
     """Return a copy of a value with another value at a place."""
-    if not path:
-        return new
-    first, *rest = path
-    if isinstance(value, dict):
-        return {name: replaced(item, tuple(rest), new) if name == first else item for name, item in value.items()}
-    return [replaced(item, tuple(rest), new) if index == first else item for index, item in enumerate(value)]
+    return with_member(value, path, new) if path else new
 
 
 def with_options(value: Any, schema: Schema) -> Iterator[tuple[Any, Place]]:

@@ -147,10 +147,6 @@ class Drive:
         self.aside(len(self.trace.turns))
         return velocity, exchange
 
-    def glance(self) -> None:
-        """GET the velocity alone, which is faster than a whole look."""
-        self.trace = self.trace.looked(Turn(None, self.clock.now(), *self.robot.velocity()))
-
     def stop(self, moving: Velocity, by: By = "velocity") -> bool:
         """Renew a velocity, then command zero; return whether the command stops the robot, and not its watchdog.
 
@@ -231,7 +227,7 @@ class Drive:
         return bool(there)
 
     def sees(
-        self, wanted: Velocity, factor: float = 1.0, *, part: slice = ALL, until: float = math.inf, alone: bool = False
+        self, wanted: Velocity, factor: float = 1.0, *, part: slice = ALL, until: float = math.inf
     ) -> tuple[bool | None, str]:
         """Look whether the robot has the wanted velocity: once where it has, else until several samples agree.
 
@@ -240,7 +236,6 @@ class Drive:
             factor: how many times the tolerance is allowed.
             part: the components that count.
             until: after this time a different velocity proves nothing, s of the run's clock.
-            alone: read the velocity alone, which on a slow robot takes a third of the time.
 
         Returns:
             Whether the robot has it (None: the readings came too late), and the velocity read.
@@ -248,7 +243,7 @@ class Drive:
         first = len(self.trace.turns)
         last = self.clock.now() + _LONGER_S
         while True:
-            self.glance() if alone else self.look()
+            self.look()
             turns, now = self.trace.turns[first:], self.clock.now()
             holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
             if not holds and now > until:

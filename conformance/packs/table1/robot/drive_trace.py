@@ -20,9 +20,9 @@ _COUNTED_ON: Final = 0.9
 _LATE_S: Final = 0.02
 
 
-def certain_s(hold_s: float | None, share: float = _COUNTED_ON) -> float:
-    """Return how long after its command a velocity certainly holds, s; ``share``: counted share of the hold time."""
-    return COUNTED_ON_S if hold_s is None else share * hold_s - _LATE_S
+def certain_s(hold_s: float | None) -> float:
+    """Return how long after its command a velocity certainly holds, s."""
+    return COUNTED_ON_S if hold_s is None else _COUNTED_ON * hold_s - _LATE_S
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
     trace: list[ConcurrentGoal] = []
     for turn in range(effort.cases(20)):
         body = goal_body(pose, robot.statement.motion.frame, f"clients {turn}")
-        attempts = _put_together(robot, GOAL_PATH, [body] * _CLIENTS)
+        attempts = _put_goals(robot, [body] * _CLIENTS)
         puts = tuple(exchange for exchange in attempts if isinstance(exchange, Exchange) and not is_busy(exchange))
         if all(
             HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR for exchange in puts
@@ -84,7 +84,7 @@ def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
             goal_body(pose, robot.statement.motion.frame, f"client {number} of {turn}")
             for number, pose in enumerate(poses)
         ]
-        attempts = zip(bodies, _put_together(robot, GOAL_PATH, bodies), strict=True)
+        attempts = zip(bodies, _put_goals(robot, bodies), strict=True)
         accepted = [body for body, one in attempts if isinstance(one, Exchange) and one.response.ok]
         if not accepted:
             continue
@@ -119,9 +119,9 @@ def _driven(mapped: MappedDevice, several: list[Position]) -> Drive:
     return drive
 
 
-def _put_together(robot: Robot, path: str, values: Sequence[dict[str, Any]]) -> list[Attempt]:
-    """PUT each value from its own client, all at the same moment."""
-    return send_together([[(robot.rest, Outgoing("PUT", path, JSON_BODY, body_of(value))) for value in values]])[0]
+def _put_goals(robot: Robot, goals: Sequence[dict[str, Any]]) -> list[Attempt]:
+    """PUT each goal from its own client, all at the same moment."""
+    return send_together([[(robot.rest, Outgoing("PUT", GOAL_PATH, JSON_BODY, body_of(goal))) for goal in goals]])[0]
 
 
 _TURNS: Final = 12

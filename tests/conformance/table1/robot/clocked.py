@@ -92,13 +92,6 @@ class Drive(drive.Drive):
     def _renew(self) -> None:
         self.tell(renewal=True)
 
-    def glance(self) -> None:
-        clock = self.body.clock
-        at = clock.time_s
-        clock.time_s += max(_LOOK_S, self.robot.usual_s)
-        # No stamp tells whether it is another sample than the one before.
-        self.trace = self.trace.looked(Turn(None, at, self.body.velocity, _EXCHANGE, None, _EXCHANGE))
-
     def look(self) -> tuple[Velocity | None, Exchange]:
         """Take a sample, after a while."""
         clock = self.body.clock
