@@ -1,4 +1,7 @@
-"""The styles in which the sprinklers are right, and their faults with the requirement that must notice each."""
+"""The styles in which the sprinklers are right, and their faults with the requirement that must notice each.
+
+Where several faults of a run break one requirement, words of what it expects tell which one was noticed.
+"""
 
 _READ = "description/written-is-read"
 
@@ -67,7 +70,11 @@ FAULTS = [
     ),
     (
         "without conditions",
-        {"a forecast deletes zones": "description/safe", "CSV has other values": "description/same-values"},
+        {
+            "a forecast deletes zones": "description/safe",
+            "CSV has other values": "description/same-values",
+            "a creation tells the default minutes": _READ,
+        },
     ),
     (
         "weak tags",
@@ -79,7 +86,7 @@ FAULTS = [
     ),
     ("no tags", {"a cached list is old": "description/same-values", "numbers are single floats": _READ}),
     ("without conditions", {"what is refused with 412 is written": "description/if-match"}),
-    ("as described", {"several other tags are taken": "description/if-match"}),
+    ("as described", {"several other tags are taken": "description/if-match", "CR LF becomes LF": _READ}),
     (
         "as described",
         {
@@ -87,6 +94,8 @@ FAULTS = [
             "the filter goes by the first area": "description/list-filter",
             "minutes are sorted as texts": "description/list-order",
             "the next key ends one": "description/idempotency-key",
+            "leading zeros are lost": (_READ, "007"),
+            "a creation resets the settings": (_READ, "before things of collections were created"),
         },
     ),
     (
@@ -103,6 +112,7 @@ FAULTS = [
             "two at once write by one tag": "description/if-match",
             "a file in chunks is empty": "description/digest",
             "a retry gets the thing as it is now": "description/idempotency-key",
+            "a change tells the old minutes": (_READ, "as it was sent and as the next GET shows it"),
         },
     ),
     (

@@ -9,14 +9,15 @@ from datetime import datetime
 from itertools import combinations
 from typing import Any, Final
 
-from conformance.api.rest.listing import Listing, Page, listing_of, members_of, page_of
+from conformance.api.rest.listing import CASELESS, Listing, Page, listing_of, members_of, number_of, page_of
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.totals import Totals
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.openapi import SAFE
-from conformance.documents.parameters import Parameter
+from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
+from conformance.transport.exchange import Response
 from conformance.verdict.evidence import Case
 
 # _REMEMBERED: values of items that are remembered. _ASKED: values of filters. Below: items of a list that are compared.
@@ -30,6 +31,10 @@ _KINDS: Final = 2
 LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "criticality", "rank"})
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
+
+# A link in the field Link with its relation. Below: relations of pages.
+_LINK: Final = re.compile(r"""<([^>]*)>[^,<]*?;\s*rel\s*=\s*"?([^";,]+)""", re.IGNORECASE)
+_RELATIONS: Final = {"next": "next", "prev": "prev", "previous": "prev", "first": "first", "last": "last"}
 
 
 class Lists:
@@ -49,6 +54,9 @@ class Lists:
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
         # Lists that had fewer items than the default page size although more exist: number of items, total, case.
         self._short: dict[object, tuple[int, int, Case]] = {}
+        # By operation: the items of the whole list, and cases of searches without one of them, until the list shows it.
+        self._whole: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
+        self._missed: dict[str, list[tuple[str, str, Case]]] = defaultdict(list)
         # How many items a list had, by each value of a parameter that bounds a member.
         self._counts: dict[tuple[str, str], dict[float, int]] = defaultdict(dict)
 
@@ -58,7 +66,7 @@ class Lists:
             self._totals.changed(occasion.response.received_s)
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
-        if listing is None or occasion.request.method != "GET" or not occasion.context.usual:
+        if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
             return
         page, sent = page_of(occasion.response, operation), listing.sent(occasion.context.target)
         if page is None or sent is None or not (listing.operation.parameters or page.totals):
@@ -68,6 +76,8 @@ class Lists:
         yield from self._bounds(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
+        yield from self._search(occasion, listing, page, sent)
+        yield from _links(occasion, listing, page, sent)
         self._learn(listing, page)
 
     def _learn(self, listing: Listing, page: Page) -> None:
@@ -161,6 +171,27 @@ class Lists:
                 cause = f"{listing.operation.label} {name}"
                 yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
 
+    def _search(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge a search in members that the description names: items that contain the text, and no others."""
+        search, label = listing.search, listing.operation.label
+        if search is None:
+            return
+        items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
+        text, cause = sent.get(search.name, ""), f"{label} {search.name}"
+        if not sent and not page.goes_on:
+            waiting = self._missed.pop(label, ())
+            yield from (case for one, term, case in waiting if _contains(listing, items.get(one), term))
+            self._whole[label] = items
+        elif text and sent.keys() == {search.name}:
+            names, id_ = " or ".join(listing.searched), "description/list-filter"
+            other = [one for one, item in items.items() if not _contains(listing, item, text, str.casefold)]
+            expected = f"items with {text} in {names}, by the description of {search.name}"
+            yield occasion.case(id_, not other, expected, f"the item {''.join(other[:1])}", cause=cause)
+            there = self._whole[label] if not page.goes_on and len(self._missed[label]) < _COMPARED else {}
+            for one in [one for one in there if one not in items and _contains(listing, there[one], text)][:1]:
+                case = occasion.case(id_, False, f"the item {one}, which has {text}", cause=cause)  # noqa: FBT003
+                self._missed[label].append((one, text, case))
+
     def _wrong(self, listing: Listing, name: str, asked: list[str], values: list[Any]) -> list[str] | None:
         """Return an item's value that the filter excludes; empty if there is none; None if unknown."""
         parameter, member = listing.filters[name], flat(listing.members[name])
@@ -218,6 +249,66 @@ class Lists:
             f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
             cause=f"{listing.operation.label} {sorting.member}",
         )
+
+
+def _contains(listing: Listing, item: Mapping[str, Any] | None, term: str, fold: Callable[[str], str] = str) -> bool:
+    """Return whether an item has a term in one of the members that a search looks at."""
+    values = [(item or {}).get(name) for name in listing.searched]
+    folds = str.casefold if listing.search is not None and CASELESS.search(listing.search.says) else fold
+    return any(isinstance(value, str) and folds(term) in folds(value) for value in values)
+
+
+def _links(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+    """Judge whether links lead to the pages that their relations name, with the same filters (RFC 8288 3.3)."""
+    here, begins = _place(listing, sent), {0} if listing.page is None else {0, 1}
+    chosen = {one.name for one in (*listing.filters.values(), listing.sort) if one is not None}
+    for relation, text in _linked(occasion.response, page):
+        target = listing.sent(text)
+        if target is None or not page.items:
+            continue
+        there, wrong = _place(listing, target), ""
+        if relation == "next" and target == sent:
+            wrong = "the same page"
+        elif listing.cursor is not None and listing.cursor.name in target:
+            continue  # a cursor may contain all of it
+        elif relation in {"next", "prev"} and (
+            lost := sorted(name for name in chosen & sent.keys() if sent[name] != target.get(name))
+        ):
+            wrong = f"a page without the {lost[0]} of this one"
+        elif here is not None and there is not None:
+            steps = {1} if listing.page is not None else {len(page.items), listing.most(sent)}
+            # Without a limit, a page's size is the device's own, and it may leave out some items.
+            is_far = listing.page is None and not listing.most(sent) and there - here > max(steps)
+            holds = {
+                "next": there - here in steps or is_far,
+                "prev": there < here or there in begins,
+                "first": there in begins,
+                "last": there > here or not page.goes_on,
+            }
+            wrong = "" if holds[relation] else f"{there} from {here}"
+        expected, cause = f"a link to the {relation} page", f"{listing.operation.label} {relation}"
+        yield occasion.case("description/list-pages", not wrong, expected, f"{text}, {wrong}", cause=cause)
+
+
+def _place(listing: Listing, sent: Mapping[str, str]) -> int | None:
+    """Return the number of a page, or of its first item; None if the description does not tell it."""
+    where = listing.page or listing.offset
+    if where is None or where.name in sent:
+        return None if where is None else number_of(sent[where.name])
+    default = flat(where.schema).get("default", 0 if where is listing.offset else None)
+    return default if isinstance(default, int) else None
+
+
+def _linked(response: Response, page: Page) -> Iterator[tuple[str, str]]:
+    """Yield relations and targets of links to pages: in the field Link (RFC 8288), and in members around a list."""
+    for link in _LINK.finditer(response.header("link") or ""):
+        yield from ((_RELATIONS[name], link[1]) for name in link[2].lower().split() if name in _RELATIONS)
+    for around in page.around:
+        inner = [item for item in around.values() if isinstance(item, dict)]
+        for name, one in [pair for part in (around, *inner) for pair in part.items()]:
+            target = one.get("href") if isinstance(one, dict) else one
+            if plain_name(name) in _RELATIONS and isinstance(target, str) and "?" in target:
+                yield _RELATIONS[plain_name(name)], target
 
 
 def _comes_first(page: Page, member: str, descending: bool | None) -> bool:  # noqa: FBT001 - None: either

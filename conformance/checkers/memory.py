@@ -26,6 +26,7 @@ from conformance.api.rest.things import (
     identifier_of,
     is_marked_deleted,
     is_shared,
+    parts_of,
     represented,
 )
 from conformance.checkers.occasion import Occasion
@@ -54,6 +55,9 @@ _SHOWN: Final = 200
 # share by chance.
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
+_READ: Final = "written-is-read"
+# Phrases in a description which say that a response shows what was there before the request.
+_EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
 # Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
 # another.
 _NEVER_AGAIN: Final = re.compile(
@@ -83,6 +87,7 @@ class _Thing:
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
         written: what it has to read, by member, with the operation that wrote it.
+        told: the last write, until a read has shown what it did.
         shown: the members that were read as written, with how much had been sent by then that may change something.
         differs: how often a member was read in another way.
     """
@@ -99,6 +104,7 @@ class _Thing:
     body: int = 0
     replaced: bool = False
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
+    told: Occasion | None = None
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
 
@@ -150,6 +156,10 @@ class Memory:
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         # By operation and member: values in responses to creations that differ from the declared default.
         self._undefaulted: dict[tuple[str, str], Any] = {}
+        # By operation and member: writes whose response shows another value than the next read. Below: members that a
+        # read shows late.
+        self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
+        self._late: set[tuple[str, str]] = set()
         # Paths that the run created. Below: collections in which another thing was deleted, and cases that wait for
         # that.
         self._made: set[str] = set()
@@ -241,6 +251,7 @@ class Memory:
             for name, value in body.items():
                 thing.written[name] = value, operation
                 thing.shown.pop(name, None)
+            thing.told = occasion
         self._things[path.casefold()] = thing
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
@@ -281,7 +292,7 @@ class Memory:
             written = {name: (value, operation) for name, value in body.items()}
             self._made.add(target)
             thing = _Thing.of(target, occasion.exchange, made=True)
-            thing.written, thing.body = written, hash(occasion.request.body)
+            thing.written, thing.body, thing.told = written, hash(occasion.request.body), occasion if body else None
             for one in self._things.values():
                 one.replaced |= one.body == thing.body and one.path.rpartition("/")[0] == path
             self._things[target.casefold()] = thing
@@ -368,6 +379,9 @@ class Memory:
         elif response.ok:
             thing.made = False
             yield from self._lasts(kept, age_s, "there")
+            if thing.told is not None:
+                yield from self._told(occasion, item, thing.told)
+                thing.told = None
             yield from self._compared(occasion, item, thing, age_s)
 
     def _deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
@@ -447,8 +461,32 @@ class Memory:
                 if thing.differs[name] >= _SEEN:
                     when = "as it was read before" if was_lost else f"{age_s:.0f} s before"
                     expected, cause = f"what {operation.label} wrote, {when}", f"{operation.label} {name}"
-                    case = self._case("written-is-read", occasion, expected, other, cause=cause)
+                    case = self._case(_READ, occasion, expected, other, cause=cause)
                     yield from self._differs(kept, age_s, str(now.get(name))[:_SHOWN], case)
+
+    def _told(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
+        """Judge whether the response to a write shows what was sent, as the next read does; once may be chance."""
+        operation, answer = write.operation, write.response
+        if operation is None or not is_json(answer.media_type) or _EARLIER.search(operation.text):
+            return
+        own, shape, sent = parts_of(operation.shape), parts_of(item.shape), _sent_of(write)
+        schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
+        told = represented(read_json(answer.body).value, names)
+        now = represented(read_json(occasion.response.body).value, names)
+        for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
+            seen, key = {name: now[name]}, (operation.label, name)
+            if flat(own[name]) != flat(shape[name]) or is_shared(name):
+                continue
+            if any(differences({name: sent[name]}, seen, schema, item.shape, self._collections)):
+                self._late.add(key)
+            if key in self._late:
+                continue
+            other = next(differences(seen, told, schema, item.shape, self._collections), "")
+            self._untrue[key] |= {write.request.body} if other else set()
+            if not other or len(self._untrue[key]) >= _SEEN:
+                expected = f"{shown(now[name])} as {name}, as it was sent and as the next GET shows it"
+                cause = f"{operation.label} {name} told"
+                yield write.case(f"description/{_READ}", not other, expected, other, cause=cause)
 
     @staticmethod
     def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str) -> Case:

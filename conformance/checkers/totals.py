@@ -66,7 +66,7 @@ class _Count:
         wrong_since_s: by the names of the parameters, when it was wrong first since such a list agreed with it.
         times: how often it was wrong while nothing changed.
         sizes: the totals that were the number of items on a page, and not of the list.
-        other: the parts of the list, since it agreed last, that tell another total.
+        other: the parts of the list, since it agreed last, that tell another total, and that.
     """
 
     agrees: bool | None = None
@@ -77,7 +77,7 @@ class _Count:
     wrong_since_s: dict[frozenset[str], float] = field(default_factory=dict)
     times: int = 0
     sizes: set[int] = field(default_factory=set)
-    other: list[tuple[Occasion, int]] = field(default_factory=list)
+    other: list[tuple[_Part, int]] = field(default_factory=list)
 
     def learn(self, total: int, part: _Part) -> None:
         """Record what a total counts, at the end of a list; if the list may be cut, only if both are equal."""
@@ -96,14 +96,19 @@ class _Count:
         self.times += is_same and is_quiet
         return is_quiet and (self.times >= _OFTEN or now_s - since_s >= SETTLES_S)
 
-    def agreed(self, page: Page, changed_s: float) -> Iterator[tuple[Occasion, int]]:
-        """Record the list that a total agrees with; yield earlier parts that had another total meanwhile."""
+    def agreed(self, page: Page, changed_s: float) -> list[tuple[Occasion, int]]:
+        """Record the list that a total agrees with; return earlier parts that had another total meanwhile.
+
+        One that is late after a change is not the number of items that a part shows.
+        """
         before, self.last = self.last, frozenset(page.identities)
-        if self.last == before:
-            told = [pair for pair in self.other if pair[0].response.received_s - changed_s >= SETTLES_S]
-            self.times += len(told)
-            yield from told if self.times >= _OFTEN else ()
-        self.other.clear()
+        other, self.other = self.other if self.last == before else [], []
+        quiet_s = changed_s + SETTLES_S
+        return [
+            (part.occasion, total)
+            for part, total in other
+            if total == len(part.page.items) or part.occasion.response.received_s >= quiet_s
+        ]
 
 
 class Totals:
@@ -153,15 +158,17 @@ class Totals:
             if whole and shown and (not chosen or part.least < every.all):
                 count.learn(total, part)
             if count.agrees and (count is not every or not chosen):
-                yield from self._judged(count, part, name, total)
+                yield from self._judged(count, every, part, name, total)
 
-    def _judged(self, count: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
-        """Yield the cases of a total whose meaning is known."""
+    def _judged(self, count: _Count, every: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
+        """Yield the cases of a total whose meaning is known; every: that of the list without filters."""
         shown, least = len(part.page.items), part.least
         is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
         if part.whole and total == least:
             count.wrong_since_s.pop(part.names, None)
-            for one, told in count.agreed(part.page, self._changed_s) if not part.offset else ():
+            other = count.agreed(part.page, self._changed_s) if not part.offset else []
+            every.times += len(other)
+            for one, told in other if every.times >= _OFTEN else ():
                 expected = f"{total} as {name}, as the whole list tells before and after"
                 yield _case(one, name, f"{told} as {name}", expected, holds=False)
             yield _case(part.occasion, name, "", "the number of items that are shown", holds=True)
@@ -174,7 +181,7 @@ class Totals:
                 yield _case(part.occasion, name, f"{total} as {name}", expected, holds=False)
         elif not part.whole and shown and total != count.all:
             if count.is_of_all:
-                count.other.append((part.occasion, total))
+                count.other.append((part, total))
             # Nothing changed since the whole list was read, but a list that shrinks by itself may once have had that
             # size.
             elif plain_name(name) in TOTALS and total == shown < count.all and count.all_s > self._changed_s:

@@ -18,9 +18,9 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
-from conformance.api.rest.references import collections_of
+from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, represented
+from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, parts_of, represented
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -41,6 +41,7 @@ _SEEN: Final = 2
 _EXACT: Final = 2**53
 # Relative differences of doubles. _EQUAL: smaller ones do not count. _CLOSE: larger ones are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
+_ZEROS: Final = re.compile(r"\b0+(?=\d)")
 #: Phrases in a description on members that a PUT leaves out.
 GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
@@ -189,7 +190,7 @@ class Writes:
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         response = occasion.response
         value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
-        now = represented(value, {plain_name(name) for name in _parts(item.shape)})
+        now = represented(value, {plain_name(name) for name in parts_of(item.shape)})
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
         sent_s, late = occasion.sent_s, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
@@ -277,7 +278,7 @@ class Writes:
         for name in touched:
             kept, is_same = change.now.get(name), same(change.now.get(name), change.before.get(name))
             # A removed member may return to its default.
-            is_free = name not in made and "default" in flat(_parts(item.shape).get(name) or {})
+            is_free = name not in made and "default" in flat(parts_of(item.shape).get(name) or {})
             far = not same(kept, made.get(name)) and (is_same or (name in made and isinstance(kept, list)))
             if name not in change.moving and name in change.now and not is_free:
                 wrong = f"{shown(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
@@ -288,7 +289,7 @@ class Writes:
     def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a request has changed members that only the device may set."""
         for name, value in change.sent.items():
-            parts = (_parts(change.schema).get(name), _parts(item.shape).get(name))
+            parts = (parts_of(change.schema).get(name), parts_of(item.shape).get(name))
             if name in change.now and any(isinstance(part, dict) and flat(part).get("readOnly") for part in parts):
                 was, now = change.before.get(name), change.now[name]
                 is_taken = same(now, value) and not same(was, value) and name not in change.moving
@@ -301,7 +302,7 @@ class Writes:
 
     def _stamped(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether the time of the last change moves, of a thing that has the time of its creation too."""
-        names, parts = {plain_name(name): name for name in change.now}, _parts(item.shape)
+        names, parts = {plain_name(name): name for name in change.now}, parts_of(item.shape)
         stamp = next((name for text, name in names.items() if _CHANGED_AT.fullmatch(text)), "")
         touched = (change.sent.keys() & change.now.keys() & parts.keys()) - change.moving
         is_changed = any(not same(change.before.get(name), change.now[name]) for name in touched)
@@ -325,9 +326,9 @@ class Writes:
 
     def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
-        shape = _parts(item.shape)
+        shape = parts_of(item.shape)
         there = {name: one for name, one in change.now.items() if name not in change.moving}
-        for leaf in _leaves(_parts(change.schema), change.sent, change.before, there):
+        for leaf in _leaves(parts_of(change.schema), change.sent, change.before, there):
             name, part, value, was, now = leaf
             if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
@@ -352,6 +353,8 @@ class Writes:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
             elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
                 wrong = f"{now} as {name}"
+            elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
+                wrong = f"{shown(now)} as {name}" if _is_altered(value, now) else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
             else:
@@ -395,7 +398,7 @@ class Writes:
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether members that a PUT leaves out get their default, or disappear if the description says so."""
         is_said, bodies = GONE.search(change.operation.text), (change.sent, change.before, change.now)
-        for leaf, is_needed in _missing(_parts(change.schema), flat(item.shape or {}), bodies):
+        for leaf, is_needed in _missing(parts_of(change.schema), flat(item.shape or {}), bodies):
             name, given, default, was, now = leaf
             is_open = "default" not in given and (not is_said or is_needed)
             if is_open or given.get("readOnly") or same(was, default):
@@ -412,7 +415,7 @@ class Writes:
         """Judge whether a merge patch removes by null, merges objects and replaces lists (RFC 7396)."""
         for name, value in change.sent.items():
             was, now = change.before.get(name), change.now.get(name)
-            shape, given = (flat(_parts(of).get(name) or {}) for of in (item.shape, change.schema))
+            shape, given = (flat(parts_of(of).get(name) or {}) for of in (item.shape, change.schema))
             is_own = shape.get("readOnly") or given.get("readOnly")
             if was is None or is_own or name in change.moving or (value is not None and name not in change.now):
                 continue
@@ -452,12 +455,12 @@ class Writes:
 
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps the members that it does not name; it takes two bodies to rule out chance."""
-        parts, label = _parts(change.schema), change.operation.label
+        parts, label = parts_of(change.schema), change.operation.label
         for name in change.before.keys() & parts.keys() - change.sent.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])
             if was is None or is_devices(name, given, self._collections) or is_shared(name):
                 continue
-            default = flat(_parts(item.shape).get(name) or {}).get("default", given.get("default"))
+            default = flat(parts_of(item.shape).get(name) or {}).get("default", given.get("default"))
             is_reset = not same(was, now) and (now is None or same(now, default) or now in ("", [], {}, 0, False))
             if is_reset:
                 self._doubts[label, f"{name} reset"].add(change.write.request.body)
@@ -469,7 +472,7 @@ class Writes:
 
 def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
     """Judge whether a map has all new entries of a body, if it has one of them."""
-    for name, part in _parts(change.schema).items():
+    for name, part in parts_of(change.schema).items():
         value, was, now = (item.get(name) for item in (change.sent, change.before, change.now))
         if isinstance(value, dict) and isinstance(now, dict) and "properties" not in flat(part):
             new = [item for item in value if item not in (was or {}) and value[item] is not None]
@@ -493,6 +496,11 @@ def _is_rounded(value: Any, now: Any) -> bool:
     if isinstance(value, bool) or isinstance(now, bool) or not (is_number(value) and is_number(now)):
         return False
     return not math.isclose(value, now, rel_tol=_EQUAL) and math.isclose(value, now, rel_tol=_CLOSE)
+
+
+def _is_altered(value: str, now: str) -> bool:
+    """Return whether a text reads without its leading zeros, or with other ends of lines."""
+    return value != now and (_ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines())
 
 
 def _is_moved(value: Any, now: Any) -> bool:
@@ -547,10 +555,3 @@ def _missing(
         elif all(isinstance(item, dict) for item in inner):
             within = flat(shape.get("properties", {}).get(name, {}))
             yield from _missing(given.get("properties", {}), within, inner, f"{above}{name}.")
-
-
-def _parts(schema: Schema | None) -> Mapping[str, Any]:
-    """Return the members of a schema, or of the object in its envelope that has the most."""
-    outer = flat(schema or {}).get("properties", {})
-    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
-    return max(inner, key=len) if len(outer) == 1 and inner and inner[0] else outer

@@ -17,14 +17,13 @@ from conformance.api.rest.listing import Listing, fitting, listing_of, members_o
 from conformance.api.rest.patches import JSON_PATCH
 from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import collection_of
+from conformance.api.rest.things import collection_of, parts_of
 from conformance.checkers.lists import LEVELS
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.living import Kind, Living, State, Thing, is_stored
-from conformance.scenarios.special_bodies import parts_of
 from conformance.scenarios.whole_list import WholeList, read_whole
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange

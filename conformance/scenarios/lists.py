@@ -26,6 +26,7 @@ from conformance.api.rest.listing import (
     members_of,
     next_texts,
     page_of,
+    searches,
 )
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
@@ -320,12 +321,15 @@ def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]
     part = {listing.limit.name: few} if listing.limit is not None and few is not None else {}
     later = {listing.offset.name: 1} if listing.offset is not None and fitting(listing.offset, 1) else {}
     sorts = {listing.sort.name: rows[-1][listing.sort.name]} if listing.sort is not None and listing.sortings else {}
-    for number, row in enumerate(rows or [{}]):
+    yield from [part] if part and listing.filters else []
+    for number, row in enumerate([*rows, *searches(listing, page)] or [{}]):
         yield row
         if number >= _WITH_PART:
             continue
         if part and number % 2 == 0:
-            yield {**row, **part}
+            # The whole list again shows whether the total is that of the part.
+            single = {name: 1 for name in part if number and fitting(listing.limit, 1)}
+            yield from ({**row, **part, **single}, row)
         elif later or part:
             yield {**sorts, **row, **part, **later}
 

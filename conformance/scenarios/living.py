@@ -13,13 +13,12 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from conformance.api.rest.listing import fitting, listing_of
-from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, represented
+from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, parts_of, represented
 from conformance.documents.json_schema import Schema, is_number
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.scenarios.special_bodies import parts_of
 from conformance.scenarios.whole_list import WholeList, chooses, read_whole
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange

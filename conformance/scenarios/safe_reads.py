@@ -1,5 +1,7 @@
 """Read everything by GET, HEAD and OPTIONS, and check before and after whether a client's values have changed.
 
+Settings are read before and after other things are created, changed and deleted too.
+
 Only what clients write counts, and what they create: counters, times and measured values change by themselves, and so
 may states. What has changed counts if it stays as it is for as long without these requests, and changes with them, in
 each of several rounds.
@@ -45,19 +47,21 @@ _SINGLE: Final = 150
 
 @dataclass(frozen=True)
 class Watched:
-    """The effect of safe requests on one resource.
+    """The effect of safe requests, or of requests to other things, on one resource.
 
     Attributes:
         operation: label of the operation that reads it.
-        shown: the safe request that has changed it, or the read that shows it.
+        shown: the request that has changed it, or the read that shows it.
         expected: what should have been read, as a noun phrase.
         fault: what was read; empty: that.
+        is_safe: whether the requests were safe.
     """
 
     operation: str
     shown: Exchange
     expected: str
     fault: str = ""
+    is_safe: bool = True
 
 
 @dataclass
@@ -144,15 +148,16 @@ class _Watch:
             # An earlier safe request may already have undone a change, so write something just before them.
             for resource in self.resources:
                 self._changed(resource)
-            found = dict[str, Watched]()
-            # HEAD may undo what GET changed, so each method is tried apart.
-            for methods in (("GET",), ("HEAD", "OPTIONS")):
+            found = dict[tuple[str, bool], Watched]()
+            # HEAD may undo what GET changed, so each method is tried apart. None: requests to other things.
+            for methods in (("GET",), ("HEAD", "OPTIONS"), ()):
                 began = time.monotonic()
-                self._send(self._safe(methods))
+                self._act(methods)
                 took = min(_MOST_S, max(_LEAST_S, time.monotonic() - began))
-                for resource in self.resources:
-                    if not (resource.read.label in found and found[resource.read.label].fault):
-                        found[resource.read.label] = self._judged(resource, methods, took)
+                for resource in self.resources if methods else [one for one in self.resources if not one.path]:
+                    key = resource.read.label, bool(methods)
+                    if not (key in found and found[key].fault):
+                        found[key] = self._judged(resource, methods, took)
             return list(found.values())
         finally:
             for resource in self.resources:
@@ -208,6 +213,17 @@ class _Watch:
             for media_type in [name for name in read.formats if not is_json(name)][:1] if "GET" in methods else ():
                 yield replace(request, headers=(*request.headers, ("Accept", media_type)))
 
+    def _act(self, methods: Sequence[str]) -> None:
+        """Send safe requests by these methods; without any, create, change and delete a thing of each collection."""
+        self._send(self._safe(methods))
+        for one in [resource for resource in self.resources if resource.delete is not None and not methods]:
+            create = self._operations["POST", collection_of(one.read.template.rstrip("/"))]
+            path = created_path(Surveyor(self.writer.api, self.writer.values), create, one.read)
+            if path and one.delete is not None:
+                if one.write is not None:
+                    self.writer.change(one.write, one.read, path, _TURN)
+                self.writer.conditional(one.delete, one.read, path)
+
     def _send(self, requests: Iterable[Outgoing]) -> Exchange | None:
         """Send safe requests; return the last exchange."""
         last = None
@@ -226,25 +242,26 @@ class _Watch:
         return "; ".join(f"{shown(now[name])} as {name} in place of {shown(one.was[name])}" for name in other)
 
     def _judged(self, one: _Resource, methods: Sequence[str], took: float) -> Watched:
-        """Judge one resource after safe requests, and if it has changed by rounds with and without them."""
-        expected = f"what was written before {' and '.join(methods)} of everything"
+        """Judge one resource after some requests, and if it has changed by rounds with and without them."""
+        what = f"{' and '.join(methods)} of everything" if methods else "things of collections were created and deleted"
+        expected, label = f"what was written before {what}", one.read.label
         wrong, last = self._wrong(one), one.last
         if last is None or not wrong:
-            return Watched(one.read.label, last or self._read(one), expected)
+            return Watched(label, last or self._read(one), expected, is_safe=bool(methods))
         for _ in range(_ROUNDS):
             if not self._restored(one):
                 break
             time.sleep(took)
             if self._wrong(one):
                 break  # the resource changes without any request too
-            self._send(self._safe(methods))
+            self._act(methods)
             if not (wrong := self._wrong(one)):
                 break
         else:
-            guilty = self._guilty(one, methods)
-            return Watched(one.read.label, guilty or one.last or last, expected, wrong)
+            guilty = self._guilty(one, methods) if methods else None
+            return Watched(label, guilty or one.last or last, expected, wrong, is_safe=bool(methods))
         self._restored(one)
-        return Watched(one.read.label, last, expected)
+        return Watched(label, last, expected, is_safe=bool(methods))
 
     def _guilty(self, one: _Resource, methods: Sequence[str]) -> Exchange | None:
         """Return the safe request after which a resource changed; None if only several together change it."""

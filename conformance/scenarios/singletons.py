@@ -165,8 +165,12 @@ def _write(writer: Writer, read: Operation, write: Operation, body: Any, before:
 
 def is_changeable(name: str, schema: Schema, collections: frozenset[str]) -> bool:
     """Return whether a client may write other values of a member, and still reaches the device."""
-    words = {*words_of(name), plain_name(name)}
-    return not (words & (_CONNECTING | HARMFUL) or is_devices(name, schema, collections))
+    return is_harmless(name) and not is_devices(name, schema, collections)
+
+
+def is_harmless(name: str) -> bool:
+    """Return whether a member of this name does not make the device unreachable, by the words in it."""
+    return not {*words_of(name), plain_name(name)} & (_CONNECTING | HARMFUL)
 
 
 def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterator[Any]:

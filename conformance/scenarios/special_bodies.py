@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from itertools import islice, product
@@ -12,7 +13,7 @@ from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import alike_and_apart, fits, sample
-from conformance.api.rest.things import another, entry_of, is_devices
+from conformance.api.rest.things import another, entry_of, is_devices, parts_of
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.checkers.writes import GONE
@@ -20,10 +21,14 @@ from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
+from conformance.scenarios.singletons import is_harmless
 
-#: Texts with an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and characters that formats
-#: escape.
-TEXTS: Final = ('Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "Zo\u00eb e\u0301 \U0001f916")
+#: Texts with leading zeros, an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and
+#: characters that formats escape.
+TEXTS: Final = ('007 Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "007 Zo\u00eb e\u0301 \U0001f916")
+# Lines with two kinds of ends. Below: names of members that have several lines.
+_LINES: Final = "roaas\r\n\r\n two\nend"
+_LONG: Final = re.compile(r"note|description|comment|text|remark|message|memo|instruction|detail|body|content|reason")
 # _PARTS: fractions, several for each member. _ALL_DIGITS: needs all digits of a double. Below: an integer that is no
 # double.
 _PARTS: Final = (0.375, 0.5, 0.25, 0.1)
@@ -84,6 +89,7 @@ def special_bodies(
         for name, one in changed.items()
         if flat(parts[name]).get("format") == "date-time"
     ]
+    zoned += _in_lines(changed, parts)
     rich = {name: one for name, one in _rich(parts, there, values.collections).items() if may(name)}
     empty: dict[str, Any] = {name: [] for name in rich.keys() | changed.keys() if isinstance(there[name], list)}
     yield from (item for item in (changed, *zoned, rich, empty) if item and fits(schema, item))
@@ -109,6 +115,13 @@ def _rich(parts: dict[str, Any], there: dict[str, Any], collections: frozenset[s
         if not owned and made[_KEYS[0]] != made[_KEYS[1]] and fits(given, value):
             found[name] = value
     return found
+
+
+def _in_lines(changed: dict[str, Any], parts: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a text of several lines for the member that probably has some, else for the last text."""
+    texts = [name for name, one in changed.items() if isinstance(one, str) and is_free_text(parts[name])]
+    longer = [name for name in texts if _LONG.search(plain_name(name))]
+    return [{name: _LINES} for name in (longer or texts)[-1:]]
 
 
 def _emptied(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]:
@@ -137,10 +150,9 @@ def _replacing(
         parts = parts_of(schema)
         whole = {**base, **changed}
         rich = {**whole, **_rich(parts, whole, values.collections)}
+        lines = [{**whole, **one} for one in _in_lines(changed, parts)]
         less = {**rich, **{name: one for name, one in _emptied(parts, rich).items() if may(name)}}
-        yield from (
-            one for place, one in enumerate((whole, rich, less)) if not place or (one != whole and fits(schema, one))
-        )
+        yield from (whole, *(one for one in (rich, less, *lines) if one != whole and fits(schema, one)))
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
         other = telling(schema, least, 2, values.collections)
         least |= {name: one for name, one in other.items() if may(name)}
@@ -204,9 +216,15 @@ def _nulls(
     parts: Schema, read: Operation, now: Callable[[], dict[str, Any]], values: Values, may: Callable[[str], bool]
 ) -> Iterator[dict[str, Any]]:
     """Yield merge patches that remove members beside another change, and one that changes a part of an object."""
-    needed, there = flat(read.shape or {}).get("required", ()), now()
-    usable = {name: one for name, one in there.items() if name in parts and one is not None and may(name)}
-    own = {name for name in usable if is_devices(name, parts[name], frozenset())}
+    needed, removable = flat(read.shape or {}).get("required", ()), _removable(parts, read)
+    own = {name for name, part in parts.items() if is_devices(name, part, frozenset())} - removable
+    absent = [name for name in parts if now().get(name) is None and name not in own]
+    filled = {name: sample(parts[name], 1) for name in absent if may(name) or name in removable}
+    filled = {name: one for name, one in filled.items() if one and fits(parts[name], one)}
+    yield from [filled] if filled else []
+    there = now()
+    usable = {name: one for name, one in there.items() if name in parts and one is not None}
+    usable = {name: one for name, one in usable.items() if may(name) or name in removable}
     nulls = [name for name in usable if name not in own and (name not in needed or fits(parts[name], None))]
     together = [name for name in nulls if fits(parts[name], None)]
     for turn, names in enumerate([together, *([name] for name in nulls[:_NULLS])]):
@@ -249,6 +267,19 @@ def _null_within(
     for gone in islice(free, 1):
         beside = [one for one in others if one != gone and others[one] != held.get(one)]
         yield from ({name: {gone: None, one: others[one]}} for one in beside[:1])
+
+
+def _removable(parts: Schema, read: Operation) -> frozenset[str]:
+    """Return members that clients may remove although their names sound like the device's.
+
+    A schema for patches alone says so if it allows null for them.
+    """
+    if parts == parts_of(read.shape) or "id" in parts:
+        return frozenset()
+    marks = {"readOnly", "writeOnly", "const"}
+    return frozenset(
+        name for name, one in parts.items() if is_harmless(name) and fits(one, None) and not marks & flat(one).keys()
+    )
 
 
 def _patches(
@@ -374,10 +405,3 @@ def _own_value(schema: Schema) -> Any:
     given = flat(schema)
     candidates: tuple[Any, ...] = ("2001-02-03T04:05:06Z", "2001-02-03", "roaas-own", 987_653, 98_765.25)
     return None if "enum" in given else next((candidate for candidate in candidates if fits(schema, candidate)), None)
-
-
-def parts_of(schema: Schema) -> dict[str, Any]:
-    """Return the members of a schema, or of the object in its envelope."""
-    outer: dict[str, Any] = flat(schema).get("properties", {})
-    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
-    return inner[0] if len(outer) == 1 and inner[0] else outer

@@ -49,6 +49,21 @@ _NO_FILTERS: Final = frozenset(
      "expand", "embed", "version", "precision", "resolution", "interval", "search", "q", "query", "text", "name",
      "title", "label", "description", "message", "comment", "note", "depth"}
 )  # fmt: skip
+# Parameters that search texts, and phrases in a description on what they find.
+_SEARCHES: Final = ("q", "search", "query", "text")
+_CONTAINS: Final = re.compile(
+    r"^(?!.*\b(?:words?|prefix|starts?|begins?|fuzzy|similar|tokens?|pattern|response|order\w*|sort\w*)\b)"
+    r".*\b(?:contain(?:s|ing)?|substring|occurs|occurring|appears|somewhere in|part of)\b",
+    re.IGNORECASE | re.DOTALL,
+)
+#: Phrases in a description which say that upper and lower case are the same.
+CASELESS: Final = re.compile(
+    r"\bcase.?insensitive|\b(?:ignor\w+|regardless of|whatever|without regard to|in any) (?:the |its )?case\b"
+    r"|\bcase (?:is|does) (?:ignored|not)",
+    re.IGNORECASE,
+)
+# A search text that no item contains.
+_NOWHERE: Final = "roaas7nowhere"
 _SIGN: Final = re.compile(r"([+-]?)(.*)", re.DOTALL)
 _SUFFIX: Final = re.compile(r"(.+?)[:._ \-]?(asc|desc)(?:ending)?", re.IGNORECASE)
 _IDENTIFYING: Final = ("id", "uuid", "guid", "pk", "key", "slug", "name", "serial", "serialnumber", "number")
@@ -87,6 +102,7 @@ class Listing:
         reverses: whether a further parameter may turn the order around.
         filters: the parameters that choose items by a member, by the plain name of both.
         bounds: those that choose items by the least or greatest value of a member.
+        search: the parameter whose text chosen items contain, in members that its description names.
     """
 
     operation: Operation
@@ -100,6 +116,14 @@ class Listing:
     reverses: bool = False
     filters: Mapping[str, Parameter] = field(default_factory=dict)
     bounds: tuple[Bound, ...] = ()
+    search: Parameter | None = None
+
+    @cached_property
+    def searched(self) -> tuple[str, ...]:
+        """The plain names of the members that a search looks at, by its description."""
+        said = re.split(r"[.;]\s", self.search.says) if self.search is not None else []
+        words = {plain_name(word) for text in said if _CONTAINS.search(text) for word in re.findall(r"\w+", text)}
+        return tuple(name for name, part in self.members.items() if name in words and "string" in kinds_of(part))
 
     @cached_property
     def members(self) -> dict[str, Schema]:
@@ -201,6 +225,22 @@ class Page:
         return tuple(json.dumps(members_of(item).get(self.by)) if self.by else identity_of(item) for item in self.items)
 
 
+def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
+    """Yield a text that no item has, and ends of words in what a search looks at, in other case if that is the same."""
+    search = listing.search
+    if search is None:
+        return
+    yield from [{search.name: _NOWHERE}] if listing.searched and fitting(search, _NOWHERE) else []
+    for name in listing.searched:
+        texts = [value for item in page.items if isinstance(value := members_of(item).get(name), str)]
+        words = [word[1:] for text in reversed(texts) for word in text.split() if word.isascii() and word.isalnum()]
+        # A word that begins no text, and that some items do not have, shows more.
+        words.sort(key=lambda word: (any(text.startswith(word) for text in texts), all(word in text for text in texts)))
+        for word in [one for one in words if len(one) > 1][:1]:
+            term = word.swapcase() if CASELESS.search(search.says) else word
+            yield from [{search.name: term}] if fitting(search, term) else []
+
+
 def number_of(text: str) -> int:
     """Return a whole number in a text, or 0."""
     return int(text) if re.fullmatch(r"\+?\d{1,9}", text, re.ASCII) else 0
@@ -269,7 +309,7 @@ def page_of(response: Response, operation: Operation | None = None) -> Page | No
             totals[name] = int(told[1])
     if within := _RANGE.fullmatch(response.header("content-range") or ""):
         totals["content-range"] = int(within[1])
-    links = [response.header("link") or ""]
+    links = [re.sub(r"<[^>]*>", "", response.header("link") or "")]
     names = [name for part in beside for name, one in part.items() if one not in (None, "", False)]
     goes_on = any(_NEXT.search(item) for item in (*links, *names))
     goes_on |= any(one is True and "more" in name.lower() for part in beside for name, one in part.items())
@@ -327,6 +367,7 @@ def listing_of(operation: Operation) -> Listing | None:
         len(directions) > 1 or not _REVERSING.isdisjoint(query),
         filters,
         tuple(bound for parameter in rest if (bound := bound_of(parameter, plain.members))),
+        next((one for name, one in query.items() if name in _SEARCHES and _CONTAINS.search(one.says)), None),
     )
 
 

@@ -21,6 +21,8 @@ from conformance.transport.exchange import Outgoing
 _ENDS: Final = ("id", "ids", "uuid", "guid", "cursor", "token", "reference", "href", "parent", "etag")
 # Names that refer to something only as whole words, because other words end in them too.
 _WHOLE: Final = frozenset({"ref", "slug", "key", "after", "before", "since", "next", "previous", "startafter"})
+# Names of texts, which are no references even where an API has a collection of the same name.
+_TEXTS: Final = frozenset({"note", "comment", "description", "message", "remark", "text"})
 # Words that end like a reference and are none.
 _NO_REFERENCES: Final = frozenset(
     [
@@ -98,7 +100,7 @@ def refers(name: str, schema: Schema, collections: frozenset[str]) -> bool:
     ends = last.endswith(_ENDS) and last not in _NO_REFERENCES
     items = flat(given["items"]) if isinstance(given.get("items"), dict) else given
     own = "format" in items and "string" in kinds_of(items) and is_free_text(items)
-    return ends or own or plain in _WHOLE or thing_of(name) in collections
+    return ends or own or plain in _WHOLE or (thing_of(name) in collections and plain not in _TEXTS)
 
 
 def is_free_text(schema: Schema) -> bool:

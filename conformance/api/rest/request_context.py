@@ -70,6 +70,11 @@ class RequestContext:
         return self._has_only(_USUAL_FIELDS)
 
     @cached_property
+    def is_usual_in_any_coding(self) -> bool:
+        """Whether it is usual but for the content codings that it accepts."""
+        return self._has_only(_USUAL_FIELDS | {"accept-encoding"})
+
+    @cached_property
     def is_simple(self) -> bool:
         """Whether it is usual but for a condition, which held if the response is a success."""
         return self._has_only(_USUAL_FIELDS | _CONDITIONS)

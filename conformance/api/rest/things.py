@@ -239,6 +239,13 @@ def _is_told(sent: Any, told: Any, before: Any, schema: Schema) -> bool:
     return isinstance(told, str | int | float) and told not in (sent, before) and "enum" not in schema
 
 
+def parts_of(schema: Schema | None) -> dict[str, Any]:
+    """Return the members of a schema, or of the object in its envelope."""
+    outer: dict[str, Any] = flat(schema or {}).get("properties", {})
+    inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
+    return inner[0] if len(outer) == 1 and inner and inner[0] else outer
+
+
 def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     """Return the properties of the part of a response's schema that has the most of these names."""
     outer = flat(schema).get("properties", {})

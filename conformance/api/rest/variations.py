@@ -300,7 +300,7 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
     if is_json(usual.media_type) and isinstance(usual.body, dict):
         for name, part in flat(operation.bodies[usual.media_type].schema).get("properties", {}).items():
             kinds = kinds_of(part) or {"string"}
-            texts = _ODD_TEXTS[2:4] if "string" in kinds else ()
+            texts = (_ODD_TEXTS[2] + _ODD_TEXTS[5], _ODD_TEXTS[3]) if "string" in kinds else ()
             for value in (None, *texts, *(_ODD_NUMBERS[2:5] if kinds & {"number", "integer"} else ())):
                 place = place_of((name,))
                 body = with_member(usual.body, (name,), value)

@@ -117,8 +117,15 @@ def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
 @rule("description/safe", on=(safe_reads,))
 def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
     """Judge whether safe requests leave values unchanged that clients write."""
-    for watch in trace:
+    for watch in (one for one in trace if one.is_safe):
         yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=watch.operation)
+
+
+@rule("description/written-is-read", on=(safe_reads,))
+def settings_stay(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
+    """Judge whether settings stay as they were written while other things are created, changed and deleted."""
+    for watch in (one for one in trace if not one.is_safe):
+        yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=f"{watch.operation} kept")
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,9 @@ from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 BASE = "http://device:8000"
-LIMIT, FILTER, ORDER, TOTAL = (f"description/list-{name}" for name in ("limit", "filter", "order", "total"))
+LIMIT, FILTER, ORDER, TOTAL, PAGES = (
+    f"description/list-{name}" for name in ("limit", "filter", "order", "total", "pages")
+)
 _STATES, _LEVELS, _WAYS = ["open", "closed", "moving"], ["info", "warning", "error"], ["asc", "desc"]
 _MEMBERS = {
     "id": {"type": "integer"},
@@ -365,6 +367,62 @@ def test_two_values_are_compared_only_where_every_order_agrees(one, other, said)
 
 def _totalled(name, of=len):
     return lambda items: {"items": items, name: of(items)}
+
+
+@pytest.mark.parametrize(
+    ("query", "links", "blamed"),
+    [
+        ({"page": 2}, {"next": "page=3", "prev": "page=1", "first": "page=1", "last": "page=9"}, False),
+        ({"page": 2}, {"first": "page=0", "prev": "page=1", "last": "page=1"}, False),
+        ({"page": 2}, {"next": "page=2"}, True),
+        ({"page": 2}, {"next": "page=4"}, True),
+        ({"page": 2}, {"prev": "page=2"}, True),
+        ({"page": 2}, {"first": "page=2"}, True),
+        ({"page": 2}, {"next": "page=3", "last": "page=1"}, True),
+        ({"state": "open", "page": 2}, {"next": "state=open&page=3"}, False),
+        ({"state": "open", "page": 2}, {"next": "page=3"}, True),
+        ({}, {"next": "page=2", "last": "page=4"}, False),
+    ],
+)
+def test_links_to_pages(query, links, blamed, tmp_path):
+    field = ", ".join(f'<{BASE}/valves?limit=2&{text}>; rel="{name}"' for name, text in links.items())
+    seen = Seen(tmp_path, [_whole("limit"), _whole("page"), _text("state", enum=_STATES)])
+    assert (PAGES in seen.read(VALVES[:2], [("Link", field)], limit=2, **query).broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("query", "links", "blamed"),
+    [
+        ({"limit": 2, "offset": 1}, {"next": "limit=2&offset=3", "prev": "limit=2&offset=0"}, False),
+        ({"limit": 2, "offset": 1}, {"first": "limit=2", "last": "limit=2&offset=0"}, False),
+        ({"limit": 2}, {"next": "limit=2&offset=4"}, True),
+        ({"limit": 2}, {"next": "limit=2&offset=1"}, True),
+        ({"limit": 100}, {"next": "limit=100&offset=2"}, False),
+        ({"offset": 2}, {"next": "offset=50"}, False),
+        ({"offset": 2}, {"next": "offset=2"}, True),
+    ],
+)
+def test_links_by_offset(query, links, blamed, tmp_path):
+    around = {name: f"{BASE}/valves?{text}" for name, text in links.items()}
+    seen = Seen(tmp_path, [_whole("limit"), _whole("offset")], lambda items: {"items": items, "links": around})
+    assert (PAGES in seen.read(VALVES[:2], **query).broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("says", "text", "found", "blamed"),
+    [
+        ("A text that the name contains.", "lph", VALVES[:1], False),
+        ("A text that the name contains.", "lph", VALVES[:2], True),
+        ("A text that the name contains.", "lph", [], True),
+        ("A text that the name contains.", "LPH", [], False),
+        ("A text that the name contains, in any case.", "LPH", [], True),
+        ("Words that the name contains.", "lph", [], False),
+        ("Searches the names.", "lph", VALVES[1:], False),
+    ],
+)
+def test_searches(says, text, found, blamed, tmp_path):
+    seen = Seen(tmp_path, [{**_text("q"), "description": says}])
+    assert (FILTER in seen.read(VALVES).read(found, q=text).read(VALVES).broken) == blamed
 
 
 def test_a_total_that_counts_what_was_deleted_is_noticed(tmp_path):

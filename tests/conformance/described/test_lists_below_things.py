@@ -138,14 +138,21 @@ def test_what_is_created_below_a_thing_is_read_in_its_list(fault, blamed, tmp_pa
 
 @pytest.mark.parametrize("fault", [False, True])
 def test_what_nobody_can_create_is_written_as_well(fault, tmp_path):
-    tray = {"label": "left", "note": "a"}
+    tray = {"label": "left", "note": "a", "serviced_on": "2026-01-31"}
+    known = set(tray)
     schema = {
         "type": "object",
         "required": ["label", "note"],
-        "properties": {"label": {"type": "string"}, "note": {"type": ["string", "null"]}},
+        "properties": {
+            "label": {"type": "string"},
+            "note": {"type": ["string", "null"]},
+            "serviced_on": {"type": "string", "format": "date"},
+        },
         "additionalProperties": False,
     }
-    patch = {"content": {"application/merge-patch+json": {"schema": {**schema, "required": []}}}, "required": True}
+    free = {**schema["properties"], "serviced_on": {"type": ["string", "null"], "format": "date"}}
+    taken = {**schema, "properties": free, "required": []}
+    patch = {"content": {"application/merge-patch+json": {"schema": taken}}, "required": True}
 
     async def read(request):
         return web.json_response(tray) if request.match_info["trayId"] == "1" else error(404, "no such tray")
@@ -156,19 +163,37 @@ def test_what_nobody_can_create_is_written_as_well(fault, tmp_path):
             json.dumps(value, ensure_ascii=False).encode()
         except (ValueError, RecursionError):
             return error(400, "JSON, please")
-        texts = (
-            [one for name, one in value.items() if (name, one) != ("note", None)] if isinstance(value, dict) else [1]
-        )
+        texts = [1]
+        if isinstance(value, dict):
+            texts = [one for name, one in value.items() if name == "label" or one is not None]
         if request.content_type != next(iter(patch["content"])):
             return error(415, "a merge patch, please")
-        if not all(isinstance(one, str) for one in texts) or not value.keys() <= tray.keys():
-            return error(400, "texts, please")
+        day = value.get("serviced_on") if isinstance(value, dict) else None
+        is_day = day is None or (
+            isinstance(day, str) and re.fullmatch(r"20[0-9][0-9]-0[1-9]-[0-2][1-8]|2026-01-31", day)
+        )
+        if not all(isinstance(one, str) for one in texts) or not value.keys() <= known or not is_day:
+            return error(400, "texts and a day, please")
         tray.update({name: one for name, one in value.items() if one is not None or not fault})
+        if tray.get("serviced_on", "") is None:
+            del tray["serviced_on"]
         return await read(request)
+
+    async def find(request):
+        is_there = request.match_info["trayId"] == "1"
+        return web.json_response({"id": 1, "text": "a", "at": "2026-11-01T10:00:00Z"}) if is_there else error(404, "no")
 
     item = {**reading(schema), "patch": {"requestBody": patch, "responses": {"200": answers(schema), "4XX": REFUSED}}}
     number = {"in": "path", "name": "trayId", "required": True, "schema": {"type": "integer"}, "example": 1}
-    paths = {"/trays/{trayId}": {"parameters": [number], **item}}
-    with small_device(described(paths, "3.1.0"), {"/trays/{trayId}": {"GET": read, "PATCH": change}}) as url:
+    # A collection with the name of a member that is a text.
+    paths = {
+        "/trays/{trayId}": {"parameters": [number], **item},
+        "/notes/{trayId}": {"parameters": [number], **reading(_NOTE)},
+    }
+    routes = {"/trays/{trayId}": {"GET": read, "PATCH": change}, "/notes/{trayId}": {"GET": find}}
+    with small_device(described(paths, "3.1.0"), routes) as url:
         done = certified(f"{url}/openapi.json", tmp_path, "--call", "PATCH *", "--class", "description")
     assert set(done.blamed) == ({"description/patch"} if fault else set()), done.text
+    failures = done.requirement("description/patch")["failures"]
+    said = [failure["expected"].partition(",")[0] for failure in failures]
+    assert set(said) >= ({"no note", "no serviced_on"} if fault else set()), said

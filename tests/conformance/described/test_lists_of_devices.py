@@ -21,6 +21,8 @@ _VALVE = {
         "flow": {"type": "number"},
     },
 }
+_SEARCH = {"in": "query", "name": "q", "description": "A text that the label contains, whatever the case."}
+_SEARCH["schema"] = {"type": "string", "minLength": 1}
 _WHOLE, _ANY = {"type": "integer", "minimum": 0, "maximum": 100}, {"type": "object"}
 _TOTALS = {"total": {"type": "integer"}, "count": {"type": "integer"}}
 _VALVES = {"type": "array", "items": _VALVE}
@@ -64,6 +66,10 @@ _FAULTS = [
     ("offset", "last item lost under a large limit", PAGES),
     ("offset", "total wrong beside a limit", TOTAL),
     ("linked", "links without the filter", PAGES),
+    ("page-1", "total of the page beside a filter, next names the same page", TOTAL),
+    ("page-1", "total of the page beside a filter, next names the same page", PAGES),
+    ("offset", "search finds all, first is the second", FILTER),
+    ("offset", "search finds all, first is the second", PAGES),
 ]
 
 
@@ -83,6 +89,7 @@ class _Collection:
         """Return its paths."""
         given = [(self.style[role], _WHOLE) for role in ("limit", "offset", "page") if role in self.style]
         given += [("state", {"type": "string", "enum": _STATES}), ("sort", {"type": "string", "enum": _SORTED})]
+        search = [_SEARCH] if self.manner == "offset" else []
         given += [(self.style["cursor"], {"type": "string"})] if "cursor" in self.style else []
         shown = (
             {"type": "object", "properties": {self.style["in"]: _VALVES, **_TOTALS}} if "in" in self.style else _VALVES
@@ -92,7 +99,7 @@ class _Collection:
         return {
             self.path: {
                 "get": {
-                    "parameters": [{"in": "query", "name": name, "schema": schema} for name, schema in given],
+                    "parameters": [{"in": "query", "name": name, "schema": schema} for name, schema in given] + search,
                     "responses": {"200": answers(shown), **bad},
                 },
                 "post": {"requestBody": body, "responses": {"201": answers(_VALVE), **bad}},
@@ -119,6 +126,7 @@ class _Collection:
         self.reads += 1
         query, first = request.query, self.style.get("first", 0)
         known = {*(one for one in self.style.values() if isinstance(one, str)), "state", "sort"}
+        known |= {"q"} if self.manner == "offset" and query.get("q") != "" else set()
         limit, *where = (self._number(request, role, 0) for role in ("limit", "offset", "cursor"))
         page = self._number(request, "page", first)
         is_right = query.get("state", "open") in _STATES and query.get("sort", "label") in _SORTED
@@ -138,16 +146,39 @@ class _Collection:
         total += self.fault == "total counts the refused" and self.refused > 9
         part = self._altered(found[begin:end], query, limit)
         total += self.fault == "total wrong beside a limit" and limit > 0
+        if "total of the page" in self.fault and "state" in query:
+            total = len(part)
         headers = {self.style["header"]: str(total)} if "header" in self.style else {}
         if self.manner == "linked" and end < len(found):
             kept = {} if self.fault == "links without the filter" else query
             following = f"{self.path}?{urlencode({**kept, 'limit': size, 'offset': end})}"
             headers["Link"] = f'<{self.path}>; rel="first", <{following}>; rel="next"'
+        headers |= self._links(query, end - size, end, len(found))
         if "in" not in self.style:
             return web.json_response(part, headers=headers)
         following = self.style.get("next", lambda _, end: {"next": f"c{end}"}) if "cursor" in self.style else None
         following = following(self.path, end) if following is not None and end < len(found) else {}
-        return web.json_response({self.style["in"]: part, **self.style["around"](part, total), **following})
+        shown = {self.style["in"]: part, **self.style["around"](part, total), **following}
+        return web.json_response(shown, headers=headers)
+
+    def _links(self, query, begin, end, total):
+        """Return the field Link, of the styles with a number of the page or of the first item."""
+        if self.manner not in {"offset", "page-1"}:
+            return {}
+        size, first = end - begin, self.style.get("first", 0)
+        role, step = ("page", size) if "page" in self.style else ("offset", 1)
+        places = {"first": 0, "last": (total - 1) // size * size}
+        places |= {"next": end} if end < total else {}
+        places |= {"prev": max(0, begin - size)} if begin else {}
+        if "next names" in self.fault and begin and "next" in places:
+            places["next"] = begin
+        if "first is" in self.fault:
+            places["first"] = size
+        links = (
+            f'<{self.path}?{urlencode({**query, self.style[role]: place // step + first})}>; rel="{name}"'
+            for name, place in places.items()
+        )
+        return {"Link": ", ".join(links)}
 
     def _counted(self, total):
         """Return the total, which one device counts anew each second only."""
@@ -173,6 +204,8 @@ class _Collection:
         }.get(self.fault, False)
         if state and not (ignores and self.fault.startswith("filter")):
             found = [one for one in found if one["state"] == state]
+        if (term := query.get("q", "").casefold()) and "search finds" not in self.fault:
+            found = [one for one in found if term in one["label"].casefold()]
         if sort and not (ignores and "order" in self.fault):
             found.sort(key=lambda one: one[sort.strip("-")], reverse=sort[0] == "-")
         return found
@@ -239,15 +272,15 @@ def test_right_lists_of_every_style_are_not_blamed(tmp_path):
 
 
 def test_each_fault_is_found(tmp_path):
-    faulty = {f"/{fault.replace(' ', '-')}/{style}": (style, fault, id_) for style, fault, id_ in _FAULTS}
-    done = _certified([_Collection(path, style, fault) for path, (style, fault, _) in faulty.items()], tmp_path / "out")
+    faulty = [(f"/{fault.replace(' ', '-')}/{style}", style, fault) for style, fault, _ in _FAULTS]
+    done = _certified([_Collection(*one) for one in dict.fromkeys(faulty)], tmp_path / "out")
     blamed = {
         (shown["operation"].removeprefix("GET "), id_)
         for id_ in (LIMIT, FILTER, ORDER, TOTAL, PAGES)
         for failure in done.requirement(id_)["failures"]
         for shown in failure["operations"]
     }
-    expected = {(path, id_) for path, (_, _, id_) in faulty.items()}
+    expected = {(path, id_) for (path, *_), (*_, id_) in zip(faulty, _FAULTS, strict=True)}
     assert expected <= blamed, expected - blamed
     # What is lost or out of order on a page is so in its total and order too; no limit or filter is blamed for it.
     assert {id_ for _, id_ in blamed - expected} <= {PAGES, ORDER, TOTAL}, blamed - expected

@@ -303,6 +303,8 @@ def test_odd_values_can_be_sent():
         request = written(_MANY, one.inputs)
         assert "/../" not in request.target
         assert all("\r" not in value and "\n" not in value and "\x00" not in value for _, value in request.headers)
+    bodies = [written(_MANY, one.inputs).body for one in found]
+    assert any(rb"\u0000" in body or b"\0" in body for body in bodies), "a NUL in a text"
 
 
 def test_inputs_are_replaced_and_left_out():
