@@ -83,7 +83,7 @@ class _Past:
 
     ``kept`` are texts that were read as written, with for how long, s; ``lost`` is what was read of others.
     ``pending`` are failures if another value was kept as long, each with its age, s, and what was read.
-    ``prompt`` and ``late`` are how many writes were read at once, and later.
+    ``prompt`` and ``late`` are how many writes were read at once, and later; ``items`` are the single texts of all.
     """
 
     kept: dict[str, float] = field(default_factory=dict)
@@ -92,6 +92,7 @@ class _Past:
     misses: int = 0
     prompt: int = 0
     late: int = 0
+    items: set[str] = field(default_factory=set)
 
     @property
     def moves(self) -> bool:
@@ -207,10 +208,13 @@ class SoapMemory:
         if act.role is Role.WRITES or act.role in MAKERS:
             named = sent if act.role is Role.WRITES else told
             key = {name: texts[0] for name, texts in named.items() if name in keys and len(texts) == 1}
+            before = [write for write in self._written[act.label] if write.key == key and act.keeps]
             names = sent.keys() & act.sent.keys() - keys - unsaid
             if act.role is Role.OTHER:
                 names = {name for name in names if REFERS.search(name)}  # what it does may change all else
             values = {name: _joined(told.get(name, sent[name])) for name in names}
+            earlier = {name: text for write in before for name, text in write.values.items() if name not in unsaid}
+            values = {**earlier, **values}
             others = [write for write in self._written[act.label] if write.key != key][-_MOST:]
             others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
         self._written.clear()
@@ -293,6 +297,11 @@ class SoapMemory:
             return
         past.lost = [*past.lost, got][-_LOST:]
         others = [other for other in past.kept if other != text]
+        items, extra = set(text.split(_BETWEEN)), set(got.split(_BETWEEN)) - set(text.split(_BETWEEN))
+        # A list that was written is added to what was written before.
+        is_merged = act.noun == writer.noun and len(items) > 1 and items < set(got.split(_BETWEEN))
+        is_merged = is_merged and not extra.isdisjoint(past.items)
+        past.items |= items if len(past.items) < _MOST else set()
         has_to = (
             not past.moves
             and len(others) + is_shown >= _KEPT
@@ -301,13 +310,13 @@ class SoapMemory:
         if is_begun:  # what was begun for one thing is not about another one
             has_to = not is_shown and got in others
         is_ignored = self._is_ignored(act, writer, past, name)
-        if has_to or is_ignored:
+        if has_to or is_ignored or is_merged:
             requirement = "soap/refused-keeps" if is_refused else "soap/written-is-read"
             expected += ": what was written later was refused" if is_refused else ""
             cause = f"{writer.label} {name}"
             found = case(requirement, False, exchange, expected, f"{name} {got!r}", cause)  # noqa: FBT003 - see Case
-            past.pending = [*past.pending, (0.0 if is_ignored or is_begun else age_s, got, found)][-_MOST:]
-            yield from past.lasted(past.longest(got), "")
+            past.pending = [*past.pending, (0.0 if is_ignored or is_begun or is_merged else age_s, got, found)][-_MOST:]
+            yield from past.lasted(past.longest(got), _BETWEEN)
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past, name: str) -> bool:
         """Return whether a device stores the values beside one, and never that value."""
@@ -315,7 +324,7 @@ class SoapMemory:
             self._past[writer.noun, act.label, name] for name in writer.sent.keys() & act.told.keys() - act.sent.keys()
         ]
         return (
-            len(past.lost) == _LOST
+            len(past.lost) >= (_LOST if any(past.lost) else _KEPT)
             and not any(_BETWEEN in text for text in past.lost)
             and len({*past.lost, *past.kept}) == 1
             and act.noun == writer.noun
@@ -325,16 +334,23 @@ class SoapMemory:
 
     def _named(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
         """Judge whether a response is about the thing whose id, as the device gave it, was sent."""
-        for name in sent.keys() & told.keys() if len(sent) == 1 else ():
-            stem = REFERS.sub("", name)
-            is_its = bool(stem) and (
-                stem == act.noun or any(name in self._keys[one.label] for one in self._writers[act.label])
-            )
-            if not is_its or len(told[name]) != 1 or (name, sent[name][0]) not in self._given:
+        for name in sent.keys() & told.keys() & act.sent.keys():
+            if len(sent[name]) != 1 or len(told[name]) != 1:
                 continue
             past, expected = self._past[act.label, "", name], f"{name} {sent[name][0]!r}, which was asked for"
             holds = is_alike(act.sent[name], sent[name][0], told[name][0])
             got = "" if holds else f"{name} {told[name][0]!r}"
+            # It was told before, for the same message, and so was what is told now, for another one.
+            is_another = all(past.kept.get(texts[name][0]) == self._changes for texts in (sent, told))
+            stem = REFERS.sub("", name)
+            is_its = bool(stem) and (
+                stem == act.noun or any(name in self._keys[one.label] for one in self._writers[act.label])
+            )
+            is_its = is_its and len(sent) == 1 and (name, sent[name][0]) in self._given
+            if holds:
+                past.kept[sent[name][0]] = float(self._changes)
+            if not is_its and not is_another:
+                continue
             yield from past.twice("written-is-read", exchange, expected, got, f"{act.label} {name}")
 
     def _gone(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:

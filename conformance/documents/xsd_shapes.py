@@ -34,6 +34,7 @@ class Simple:
         patterns: regular expressions (XML Schema) that a value must match.
         many: whether it is a list of such values.
         others: the further members of a union, whose first member this is.
+        digits: of its fraction, at most (fractionDigits).
         default: the value that the declaration gives if none is there, or empty.
     """
 
@@ -46,6 +47,7 @@ class Simple:
     patterns: tuple[str, ...] = ()
     many: bool = False
     others: tuple[Simple, ...] = ()
+    digits: int | None = None
     default: str = ""
 
 
@@ -243,7 +245,11 @@ def _simple(declared: Any) -> Simple:
         getattr(declared, "min_length", None),
         getattr(declared, "max_length", None),
         tuple(str(pattern) for pattern in getattr(patterns, "regexps", ()) or ()),
+        digits=getattr(declared.get_facet(_FRACTION), "value", None),
     )
+
+
+_FRACTION: Final = clark(XSD, "fractionDigits")
 
 
 def _written(value: object) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from itertools import islice
+from itertools import islice, starmap
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
@@ -51,7 +51,7 @@ _REFUSALS: Final = 3
 _LASTING: Final = 2
 _THINGS: Final = 3
 # _READS: successive reads of each operation. _ROUNDS: rounds of simultaneous reads. Both at quick and at other efforts.
-_READS: Final = (20, 60)
+_READS: Final = (18, 60)
 _ROUNDS: Final = (6, 30)
 # Number of the change whose text is beyond ASCII.
 _BEYOND_ASCII: Final = 3
@@ -138,6 +138,9 @@ class _Changes:
             if sent and 0 < turn <= _LASTING:
                 # If the value is back at the second read, it had not ended: the first read failed.
                 time.sleep(_LASTS_S)
+                # What reads something else must not change it.
+                others = [one for one in self.acts if one[0].role is Role.READS and one[0].port is act.port]
+                self._read([one for one in others if one not in readers and turn == _LASTING], made)
                 self._read(readers, made, times=2)
             elif sent and turn and refusals < _REFUSALS:
                 # An effect of a refusal shows soon; other values have stayed for longer by now.
@@ -156,7 +159,8 @@ class _Changes:
                 self.caller.send(act, kind, says, octets, charset)
                 self._wait(readers, other, free)
         self._others(act, node, free, readers)
-        self._ends(act, declared, node, free, readers)
+        self._ends(act, node, free, readers)
+        self._parts(act, declared, node, free, readers)
         self.caller.ask(act, _as_it_was(node, leaves, began), "the values that were there before")
 
     def _forms(self, act: Act, node: Node, free: _Leaves) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
@@ -182,8 +186,8 @@ class _Changes:
             octets = self.caller.messages.message(act.port, act.operation, other)
             yield "values in another form of their types", Kind.VARIED, made, octets, "utf-8"
 
-    def _ends(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
-        """Write the longest and the shortest values, and none, and read what comes of it."""
+    def _ends(self, act: Act, node: Node, free: _Leaves, readers: list[_Message]) -> None:
+        """Write the longest and the shortest values, INF and NaN, and read what comes of it."""
         until = time.monotonic() + _BUDGET_S
         ends = [("the longest values", extreme), ("empty texts and negative numbers", shortest)]
         ends += [(f"{number} as each number", partial(boundless, number=number)) for number in ("INF", "NaN")]
@@ -203,13 +207,23 @@ class _Changes:
                     self._wait(readers, made, leaves)
                     if leaves is free:
                         break
+
+    def _parts(self, act: Act, declared: Element, node: Node, free: _Leaves, readers: list[_Message]) -> None:
+        """Write messages without a part, with other numbers of parts, and of derived types; read what comes of it."""
+        until = time.monotonic() + _BUDGET_S
         names = {node.at(path).name.lower() for path, _ in free} | act.inherited
-        for says, made in (*_without(declared, node), *_derived(declared, node)):
+        # What is left out has to keep a value that is not the first one, which a device may go back to.
+        node = _varied(node, free, 1) if act.keeps else node
+        if act.keeps:
+            self.caller.ask(act, node, "a message with other values")
+        for says, made in (*_without(declared, node), *_counted(declared, node), *_derived(declared, node)):
             if time.monotonic() < until and not self.caller.messages.found.types.invalid(parse(made.written())):
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
                 left = [(path, kind, made.at(path)) for path, kind in simple_leaves(declared, made) if path]
                 left = [one for one in left if one[2].text or one[2].name.lower() in act.emptied]
                 self._wait(readers, made, [one[:2] for one in left if one[2].name.lower() in names])
+                if act.keeps and says.startswith("a message without"):
+                    self._wait(readers, node, free)
 
     def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> bool:
         """Read until a written value is read, or the time for it is over; return whether any was."""
@@ -307,10 +321,10 @@ class _Changes:
             yield
         typed = [_told(probe) for probe in self._created_as_derived(act, declared, node)]
         made += [texts[0] for told in typed for name, texts in told.items() if REFERS.search(name)][: len(typed)]
-        own = [Node("", "", tuple(Node(name, texts[0]) for name, texts in told.items())) for told in typed]
+        asks += [Node("", "", tuple(Node(name, texts[0]) for name, texts in told.items())) for told in typed]
         time.sleep(SETTLES_S)
         self._read(lists, node)
-        for asked in (*asks * 3, *own * _TURNS[0]):
+        for asked in asks * 3:
             self._read(readers, asked)
         for kind in (0, _REFUSALS - 1):
             self._refuse(act, declared, _varied(node, free, _THINGS), kind)
@@ -341,16 +355,34 @@ class _Changes:
 
     def read_often(self) -> None:
         """Read again and again, one after another and at the same moment."""
-        readers = [one for one in self.acts if one[0].role is Role.READS]
         # Values that writes change were read as often beside them.
         written = [act for act, _, _ in self.by_role(Role.WRITES)]
-        for act, _, node in readers:
-            for _ in range(0 if any(map(act.shows, written)) else _READS[not self._is_quick]):
-                self.caller.ask(act, node, "a valid message", Kind.USUAL)
-        if len(readers) > 1:
-            clients = [readers[number % len(readers)] for number in range(MOST_CLIENTS)]
+        asked = list[tuple[Act, Node | None]]()
+        for act, declared, node in [one for one in self.acts if one[0].role is Role.READS]:
+            for says, made in _bounded(declared, node) if declared and node else ():
+                self.caller.ask(act, made, says)  # there may be nothing of that number
+            own = [(act, node), *((act, made) for made in self._about_another(act, declared, node))]
+            for turn in range(0 if any(map(act.shows, written)) else _READS[not self._is_quick]):
+                self.caller.ask(act, own[turn % len(own)][1], "a valid message", Kind.USUAL)
+            asked += own
+        if len(asked) > 1:
             rounds = range(_ROUNDS[not self._is_quick])
-            send_together([[self._addressed(act, node) for act, _, node in clients] for _ in rounds])
+            clients = [[asked[(number + turn) % len(asked)] for number in range(MOST_CLIENTS)] for turn in rounds]
+            send_together([list(starmap(self._addressed, together)) for together in clients])
+
+    def _about_another(self, act: Act, declared: Element | None, node: Node | None) -> Iterator[Node]:
+        """Yield a message that reads something else, if the device accepts it."""
+        if declared is None or node is None:
+            return
+        made, known = (
+            _varied(node, [leaf for leaf in simple_leaves(declared, node) if leaf[0]], 1),
+            self.caller.known(act),
+        )
+        for path, _ in simple_leaves(declared, node):
+            others = [text for text in known.get(node.at(path).name.lower(), ()) if text != node.at(path).text]
+            made = with_text(made, path, others[0]) if others else made
+        if made != node and self.caller.ask(act, made, "a message about another thing").succeeded:
+            yield made
 
     def _addressed(self, act: Act, node: Node | None) -> Addressed:
         """Return a message as one of several clients sends it."""
@@ -505,6 +537,18 @@ def _turned(node: Node) -> Node:
     return replace(node, children=tuple(map(_turned, node.children)), attributes=node.attributes[::-1])
 
 
+def _bounded(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield messages whose numbers are all as small or as great as their types allow, each with its description."""
+    for says in ("smallest", "greatest"):
+        made = node
+        for path, simple in simple_leaves(declared, node):
+            bound = simple.minimum if says == "smallest" else simple.maximum
+            if bound is not None and simple.builtin in NUMBERS and not simple.enumeration:
+                made = with_text(made, path, f"{bound:f}")
+        if made != node:
+            yield f"the {says} numbers", made
+
+
 def _derived(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
     """Yield messages in which a derived type takes the place of its base, each with what is special about it."""
     for made in derived(declared, node):
@@ -520,3 +564,15 @@ def _without(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
             yield f'xsi:nil="{text}" at {node.at(path).name}', node.replaced(path, nil)
         if not part.minimum:
             yield f"a message without {node.at(path).name}", node.replaced(path)
+
+
+def _counted(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+    """Yield messages that have an element that is there twice never or once more, each with its description."""
+    for path, part in declarations(declared, node):
+        around, first = node.at(path[:-1]), path[-1]
+        tags = [child.tag for child in around.children]
+        count = tags.count(part.tag)
+        for many in (0, count + 1) if count > 1 and tags.index(part.tag) == first else ():
+            repeated = (around.children[first],) * many
+            parts = (*around.children[:first], *repeated, *around.children[first + count :])
+            yield f"{many} times {local(part.tag)}", node.replaced(path[:-1], replace(around, children=parts))

@@ -150,7 +150,8 @@ def another(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa
         low = float(simple.minimum) if simple.minimum is not None else 0.0
         high = float(simple.maximum) if simple.maximum is not None else low + 1.0
         share = (0.25, 0.75, 0.5, 0.6, 0.4, 0.7)[turn % 6]
-        return f"{low + share * (high - low):.10g}"
+        number = low + share * (high - low)
+        return f"{number if simple.digits is None else round(number, simple.digits):.10g}"
     return text
 
 

@@ -30,6 +30,10 @@ SETTLES_S: Final = 1.0
 _NIL: Final = re.compile(r"\b(?:nil|null)\b", re.IGNORECASE)
 _REMOVES: Final = re.compile(r"\b(?:remov|clear|delet|eras|unset|empt)", re.IGNORECASE)
 _NOT: Final = re.compile(r"\b(?:not|never|no|keep|leav|ignor|unchang)|n't", re.IGNORECASE)
+# A sentence by which a value stays if a message leaves it out.
+_LEFT_OUT: Final = re.compile(r"\b(?:left out|leaves? out|omit\w*|absent|missing)\b", re.IGNORECASE)
+_STAYS: Final = re.compile(r"\b(?:keeps?|stays?|unchanged|retains?|remains?|as it (?:was|is))\b", re.IGNORECASE)
+_NEVER: Final = re.compile(r"(?!)|\b(?:not|never|no)\b|n't", re.IGNORECASE)
 # Elements of a message that are nested deeper than this are not compared.
 _DEEPEST: Final = 6
 # A message longer than this is not read, octets.
@@ -74,6 +78,7 @@ class Act:
         told: simple types of the values in its response.
         emptied: names of values that have none any more once they were sent with xsi:nil: where the schema demands the
             element, or the documentation says so. Elsewhere, a device may take xsi:nil for "as it was".
+        keeps: whether the documentation says that a value stays if a message leaves it out.
         inherited: names of values that a derived type demands, and its base does not know.
     """
 
@@ -85,6 +90,7 @@ class Act:
     needs: frozenset[str] = frozenset()
     told: dict[str, Simple] = field(default_factory=dict)
     emptied: frozenset[str] = frozenset()
+    keeps: bool = False
     inherited: frozenset[str] = frozenset()
 
     @property
@@ -148,15 +154,16 @@ def _act(found: Wsdl, port: SoapPort, operation: SoapOperation) -> Act:
         {name: simple for name, (simple, _) in sent.items()},
         frozenset(name for name, (_, needed) in sent.items() if needed),
         {name: simple for name, simple, _ in _values(response)} if response else {},
-        frozenset(_emptied(request, clears=_is_cleared_by_nil(operation.documentation))) if request else frozenset(),
+        frozenset(_emptied(request, clears=_says(operation, _NIL, _REMOVES, _NOT))) if request else frozenset(),
+        _says(operation, _LEFT_OUT, _STAYS),
         frozenset(_inherited(request)) if request else frozenset(),
     )
 
 
-def _is_cleared_by_nil(documentation: str) -> bool:
-    """Return whether a documentation says that xsi:nil removes a value."""
-    sentences = re.split(r"[.;]", documentation)
-    return any(_NIL.search(one) and _REMOVES.search(one) and not _NOT.search(one) for one in sentences)
+def _says(operation: SoapOperation, what: re.Pattern[str], does: re.Pattern[str], no: re.Pattern[str] = _NEVER) -> bool:
+    """Return whether a sentence of the documentation says what happens, without a word that denies it."""
+    sentences = re.split(r"[.;]", operation.documentation)
+    return any(what.search(one) and does.search(one) and not no.search(one) for one in sentences)
 
 
 def _emptied(declared: Element, depth: int = 0, *, clears: bool) -> Iterator[str]:

@@ -25,6 +25,7 @@ _FAULTS = (
     {
         "label ignored": ("written-is-read", "label '"),
         "NaN is zero": ("written-is-read", "offset 'NaN'"),
+        "slots crossed": ("written-is-read", "which was asked for"),
         "burst is slow": ("written-is-read", "mode '"),
         "delete does nothing": ("deleted-is-gone", "which was removed"),
     },
@@ -37,12 +38,16 @@ _FAULTS = (
     {
         "escaped twice": ("written-is-read", "label '"),
         "stale at times": ("written-is-read", "mode '"),
-        "no maxInclusive": ("invalid-refused", "'8.001' at "),
+        "no maxInclusive": ("invalid-refused", "'10' at Tray"),
     },
     {"lost after refusal": ("written-is-read", "SetSettings"), "no maxLength": ("invalid-refused", "p' at Title")},
     {"utf-16 lost": ("written-is-read", "label '"), "delete takes another": ("created-is-there", "and with all else")},
     {"mandatory label applied": ("refused-keeps", "label '"), "empty label stays": ("written-is-read", "label ''")},
-    {"fails at times": ("valid-accepted", "GetSettings"), "mode burst refused": ("valid-accepted", "SetSettings")},
+    {
+        "last slot is far": ("response-valid", "'90'"),
+        "fails at times": ("valid-accepted", "GetSettings"),
+        "mode burst refused": ("valid-accepted", "SetSettings"),
+    },
     {"refused creates": ("refused-keeps", "a list as before"), "id twice": ("created-is-there", "of a new thing")},
 )
 
