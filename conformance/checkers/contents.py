@@ -85,9 +85,11 @@ class Contents:
             return
         self._whole.clear()
         self._parts.clear()
-        self._sent.clear()
         is_file = keeps_octets(request.media_type) or request.media_type == _TEXT
         is_file = is_file and 0 < len(request.body) <= _LARGEST
+        # A file that is uploaded elsewhere does not change those before.
+        if not (is_file and request.method == "PUT") or len(self._sent) >= _MOST:
+            self._sent.clear()
         if is_file and answer.ok and answer.status != HTTPStatus.ACCEPTED:
             if request.method == "PUT":
                 self._sent[request.url] = occasion

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final
-from urllib.parse import unquote
+from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.listing import listed
 from conformance.api.rest.things import collection_of, identifier_of, represented
@@ -14,6 +14,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json, shown
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
+from conformance.transport.reach import joined
 from conformance.verdict.evidence import Case
 
 # Normalised names of members that identify one thing.
@@ -67,6 +68,7 @@ class Identities:
                 self._listed[path] |= ids
         if collection_of(operation.template):
             yield from self._item(occasion, operation, above, id_)
+            yield from self._located(occasion, operation, above, id_)
 
     def _item(self, occasion: Occasion, operation: Operation, above: str, id_: str) -> Iterator[Case]:
         own, known = self._own[above], self._listed[above]
@@ -85,6 +87,17 @@ class Identities:
                 f"the item with the identifier {text}",
                 cause=operation.label,
             )
+
+    def _located(self, occasion: Occasion, operation: Operation, above: str, id_: str) -> Iterator[Case]:
+        """Judge whether Content-Location names no other item; it may name a format of this one (RFC 9110 8.7)."""
+        url, value = occasion.request.url, occasion.response.header("content-location") or ""
+        near, _, last = urlsplit(joined(url, value)).path.rstrip("/").rpartition("/")
+        other, known = unquote(last).casefold(), {id_} | self._own[above] | self._listed[above]
+        is_item = identifier_of(read_json(occasion.response.body).value, operation) == id_
+        if value and f"{near}/".endswith(f"{above}/") and is_item and other in known:
+            expected, cause = f"Content-Location of the item {id_}, if any", f"{operation.label} Content-Location"
+            found = f"Content-Location: {value}"
+            yield occasion.case("description/own-identifier", other == id_, expected, found, cause=cause)
 
 
 class Uniques:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -95,6 +95,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                     thing.in_parts(read, thing.target)
                 thing.written(changes)
                 thing.filled()
+                thing.beside(create, delete)
                 thing.listed_below(operations)
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
@@ -129,6 +130,8 @@ class _Thing:
     is_own: bool = True
     # Existing files below it.
     below: list[tuple[Operation, Outgoing]] = field(default_factory=list)
+    # Reads of files that were uploaded, with the last upload and all files.
+    uploads: list[tuple[Operation, Outgoing, list[bytes]]] = field(default_factory=list)
 
     @property
     def api(self) -> RestInterface:
@@ -314,6 +317,20 @@ class _Thing:
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
                 self._ended(put, read, operations.get(("DELETE", template)), request, whole)
+                self.uploads.append((read, request, [octets for _, octets in files]))
+
+    def beside(self, create: Operation, delete: Operation | None) -> None:
+        """Upload files to another thing, which is created for this, and to this one in turn; read that of the other."""
+        other = created_path(self.surveyor, create, self.read) if self.uploads and create.method == "POST" else ""
+        for read, own, files in self.uploads if other else ():
+            there = other.rstrip("/") + own.target.removeprefix(self.target.rstrip("/"))
+            whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=there)
+            for first, second in pairwise(files):
+                for target, octets in ((there, first), (own.target, second)):
+                    self.api.send(replace(own, target=target, body=octets))
+                self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
+        if delete is not None and other:
+            Writer(self.api, self.surveyor.values).conditional(delete, self.read, other)
 
     def listed_below(self, operations: Mapping[tuple[str, str], Operation]) -> None:
         """Create items in each list below it, and look for them there, in parts, and below another thing."""

@@ -35,11 +35,12 @@ def _wrong(contract, reads):
         return numbers.get(one, one)
 
     checkers, found = RestCheckers(pack, _BASE), []
-    for turn, (method, last, answered) in enumerate(reads):
+    for turn, (method, last, answered, *located) in enumerate(reads):
         body = [{member: id_of(one)} for one in answered] if not last else {member: id_of(answered[0]), "more": 1}
         path = f"/things/{id_of(last)}" if last else "/things"
         request = Request(method, _BASE + path, (("Host", "device"), ("Accept", "*/*")))
-        answer = Response(200, (("Content-Type", "application/json"),), json.dumps(body).encode(), 1.0)
+        fields = [("Content-Location", f"/things/{id_of(one)}") for one in located]
+        answer = Response(200, (("Content-Type", "application/json"), *fields), json.dumps(body).encode(), 1.0)
         cases = [one for one in checkers(Exchange(request, answer)) if one.requirement == "description/own-identifier"]
         found += [turn for one in cases if not one.holds]
     return found
@@ -52,6 +53,12 @@ _RIGHT = {
     "never its own": [_LIST, ("GET", "a", ["c"]), ("GET", "b", ["c"])],
     "renamed": [_LIST, ("GET", "a", ["a"]), ("PATCH", "a", ["e"]), ("GET", "a", ["e"])],
     "HEAD and no identifier": [_LIST, ("GET", "a", ["a"]), ("HEAD", "a", ["b"]), ("GET", "a", [None])],
+    "Content-Location": [
+        _LIST,
+        ("GET", "a", ["a"], "a"),
+        ("GET", "a", ["a"], "a.json"),
+        ("GET", "x-current", ["a"], "a"),
+    ],
     "an identifier of another kind": [_LIST, ("GET", "a", ["a"]), ("GET", "b", ["x-17"])],
 }
 _WRONG = {
@@ -59,6 +66,7 @@ _WRONG = {
     "always the first one": ([_LIST, ("GET", "a", ["a"]), ("GET", "b", ["a"]), ("GET", "c", ["a"])], [2, 3]),
     "one of those created later": ([("GET", "a", ["a"]), ("GET", "b", ["b"]), _LIST, ("GET", "c", ["b"])], [3]),
     "after a change of another": ([("GET", "a", ["a"]), ("PUT", "b", ["b"]), ("GET", "a", ["b"])], [2]),
+    "another one as Content-Location": ([_LIST, ("GET", "a", ["a"], "b")], [1]),
     "after a deletion": ([_LIST, ("GET", "b", ["b"]), ("DELETE", "a", ["a"]), ("GET", "b", ["c"])], [3]),
 }
 
