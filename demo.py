@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from conformance.commandline.exit_codes import ExitCode
-from proof.selftest.robots import own_domain, stopped
+from proof.selftest.robots import own_domain, stop_after
 
 _ROAAS = (sys.executable, "-P", "-m", "roaas")
 _START_S = 60
@@ -64,7 +64,7 @@ def _robot(domain: int) -> Iterator[tuple[str, str]]:
     _say("1/3", f"starting the reference robot on ROS domain {domain}")
     command = [*_ROAAS, "robot", "--rest-port", "0", "--soap-port", "0", "--domain-id", str(domain)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)  # noqa: S603 - ours
-    with stopped(process):
+    with stop_after(process):
         # Kill a robot that never gets ready, so that the demo does not wait for ever.
         watchdog = threading.Timer(_START_S, process.kill)
         watchdog.daemon = True

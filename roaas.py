@@ -156,7 +156,7 @@ class _Rooms(click.Group):
             ctx.exit(_INTERRUPTED)
         except ModuleNotFoundError as missing:
             extras = import_module("conformance.commandline.extras")
-            problem = extras.told(missing.name, f"'roaas {ctx.invoked_subcommand}'")
+            problem = extras.missing_extra(missing.name, f"'roaas {ctx.invoked_subcommand}'")
             if problem is None:
                 ctx.exit(guard.report_failure(missing))
             raise click.UsageError(problem) from missing
@@ -233,7 +233,7 @@ class FrontDoor:
         refused = import_module("conformance.documents.description").DescriptionError
         unreachable = import_module("conformance.transport.reach").UnreachableError
         try:
-            found = comparing.compared(old, new, allow_files=allow_files)
+            found = comparing.compare(old, new, allow_files=allow_files)
             return [(one.breaking, one.operation, one.text) for one in found]
         except (refused, unreachable) as error:
             raise click.UsageError(str(error)) from error
@@ -260,7 +260,7 @@ class FrontDoor:
     def known(pack: str | None) -> dict[str, Any]:
         """Return what the installed suite contains for a contract pack: digest, requirement sets, profiles."""
         try:
-            known: dict[str, Any] = import_module("conformance.engine.suite").known(pack)
+            known: dict[str, Any] = import_module("conformance.engine.suite").suite_facts(pack)
         except import_module("conformance.contract.locating").ContractError as error:
             raise click.UsageError(str(error)) from error
         return known

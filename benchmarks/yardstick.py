@@ -7,10 +7,10 @@ roaas selftest --against FILE --results out/later/selftest.json
 import sys
 from pathlib import Path
 
-from proof.selftest.against import read, stored
+from proof.selftest.against import file_content, read
 
 if __name__ == "__main__":
     target, *runs = map(Path, sys.argv[1:])
     tables = read(runs)
-    target.write_bytes(stored(tables))
+    target.write_bytes(file_content(tables))
     print(f"{target}: {', '.join(f'{len(table)} {name}' for name, table in tables.items())}")

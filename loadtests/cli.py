@@ -15,10 +15,10 @@ from typing import IO, TYPE_CHECKING, Any, Self
 import click
 
 from conformance.commandline.device_options import credential_options, description_options
-from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, undisturbed
+from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, ignore_signals
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.help_pages import Group, inert, options_of
-from conformance.commandline.out_folder import FolderError, command_without_folders, held
+from conformance.commandline.out_folder import FolderError, command_without_folders, hold
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
 from conformance.papers_robot.statement import RobotStatement, load_robot_statement
@@ -71,7 +71,7 @@ def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Ite
     The process has its own session, so that Ctrl-C reaches it only through this process: it then writes a partial
     result.
     """
-    guards = [descriptor for each in stopping if (descriptor := each.guarded()) is not None]
+    guards = [descriptor for each in stopping if (descriptor := each.start_guard()) is not None]
     child = subprocess.Popen(
         [sys.executable, "-P", "-m", "loadtests"],
         stdin=subprocess.PIPE,
@@ -312,7 +312,7 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
     except KeyboardInterrupt:
         return CommandResult(ExitCode.INTERRUPTED)
     finally:
-        with undisturbed():
+        with ignore_signals():
             unstopped = "; ".join(filter(None, (each.stop() for each in (device.stopping if device else stopping))))
         if unstopped:
             click.secho(f"WARNING: {inert(unstopped)}", fg="red", err=as_json)
@@ -404,6 +404,6 @@ def _command_line() -> str:
 def _hold_folder(context: click.Context, folder: Path) -> None:
     """Make the folder for the result, and lock it against other runs before the run starts."""
     try:
-        context.with_resource(held(folder))
+        context.with_resource(hold(folder))
     except FolderError as error:
         raise SettingsError(f"--out {str(folder)!r}: {error}") from None

@@ -48,7 +48,7 @@ def _work(words: list[str]) -> int:
         click.echo("--worker needs --master-host", err=True)
         return ExitCode.USAGE
     try:
-        trust = Trust.of(*map(as_http, _said(words)), hosts=_said(words, "--trust-host"))
+        trust = Trust.of(*map(as_http, _values_of(words)), hosts=_values_of(words, "--trust-host"))
         secrets = secrets_of({name: _value(words, f"--{name.replace('_', '-')}") for name in CREDENTIALS})
     except (SettingsError, ValueError) as error:
         click.echo(f"roaas-load-node: {error}", err=True)
@@ -63,10 +63,10 @@ def _work(words: list[str]) -> int:
 
 def _value(words: list[str], option: str) -> str | None:
     """Return an option's value."""
-    return next(iter(_said(words, option)), None)
+    return next(iter(_values_of(words, option)), None)
 
 
-def _said(words: list[str], option: str = "") -> list[str]:
+def _values_of(words: list[str], option: str = "") -> list[str]:
     """Return the values of an option, given as `--option value` or `--option=value`; without one, of all words."""
     apart = [part for word in words for part in (word.split("=", 1) if word.startswith("--") else [word])]
     pairs = zip(["", *apart], apart, strict=False)

@@ -48,13 +48,13 @@ class RosCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the command line after moving the ROS arguments from it into the parameter ``ros_arguments``."""
-        own, ros = divided(args)
+        own, ros = divide_words(args)
         left = super().parse_args(ctx, own)
         ctx.params["ros_arguments"] = tuple(ros)
         return left
 
 
-def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
+def divide_words(words: Iterable[str]) -> tuple[list[str], list[str]]:
     """Return the program's own words and the ROS words of a command line.
 
     ROS words reach from each ``--ros-args`` up to the next ``--`` or the end, both included.

@@ -52,7 +52,7 @@ class GoalStatuses:
 
     def _keep(self, array: GoalStatusArray) -> None:
         self._is_of_newest = True
-        self.reported = tuple(_reported(status) for status in array.status_list)
+        self.reported = tuple(_report_of(status) for status in array.status_list)
         self._on_change()
 
     def _note_servers(self, change: Any) -> None:
@@ -70,6 +70,6 @@ class GoalStatuses:
             self._on_change()
 
 
-def _reported(status: GoalStatus) -> ReportedGoal:
+def _report_of(status: GoalStatus) -> ReportedGoal:
     info = status.goal_info
     return ReportedGoal(bytes(info.goal_id.uuid).hex(), status.status, info.stamp.sec, info.stamp.nanosec)

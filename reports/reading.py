@@ -63,10 +63,10 @@ def read_fleet(path: Path) -> dict[str, Any]:
 def _read(path: Path, expected: str) -> dict[str, Any]:
     document = _parse(path, _text(path))
     if not isinstance(document, dict):
-        raise ResultInvalidError(f"{path}: at $: expected an object, found {_shown(document)}")
+        raise ResultInvalidError(f"{path}: at $: expected an object, found {_excerpt(document)}")
     found = document.get("format")
     if found != expected:
-        raise ResultFormatError(f"{path}: at $.format: expected {expected!r}, found {_shown(found)}")
+        raise ResultFormatError(f"{path}: at $.format: expected {expected!r}, found {_excerpt(found)}")
     # msgspec accepts no lone surrogate, which JSON may contain.
     with suppress(UnicodeEncodeError):
         if _quick_validator(expected).is_valid(document):
@@ -101,8 +101,8 @@ def _parse(path: Path, text: str) -> Any:
 
 
 def _where(error: ValidationError) -> str:
-    return f"at {error.json_path}: {excerpt(error.message, 300)} (value: {_shown(error.instance)})"
+    return f"at {error.json_path}: {excerpt(error.message, 300)} (value: {_excerpt(error.instance)})"
 
 
-def _shown(value: object) -> str:
+def _excerpt(value: object) -> str:
     return excerpt(json.dumps(value, ensure_ascii=False, default=repr), 120)

@@ -43,7 +43,7 @@ class Kept(Listener):
     def __init__(self) -> None:
         self.exchanges: list[Exchange] = []
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Keep an exchange."""
         self.exchanges.append(exchange)
 

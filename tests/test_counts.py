@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from conformance.verdict.finding import counted as in_terminal
+from conformance.verdict.finding import count_of as in_terminal
 from reports.pages.page import counted as in_pages
 
 ROOT = Path(__file__).parents[1]

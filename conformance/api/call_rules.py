@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from conformance.documents.openapi import Operation
 from conformance.statement.motion_calls import named_by
-from conformance.verdict.finding import counted, listed
+from conformance.verdict.finding import count_of, few_of
 
 if TYPE_CHECKING:
     from conformance.verdict.run import Run
@@ -93,7 +93,7 @@ class CallRules:
         is_permitted = operation.safe or any(matches(pattern, operation) for pattern in self.allow)
         return allowed if is_permitted else Reason.CHANGES
 
-    def unused(self, operations: Sequence[Operation]) -> list[str]:
+    def unused_patterns(self, operations: Sequence[Operation]) -> list[str]:
         """Return the patterns that match no operation."""
         patterns = (*self.allow, *self.never)
         return [pattern for pattern in patterns if not any(matches(pattern, operation) for operation in operations)]
@@ -129,7 +129,7 @@ def words_of(text: str) -> set[str]:
     return {word.lower() for word in _WORD.findall(text)}
 
 
-def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[str] = ()) -> list[str]:
+def plan_lines(rules: CallRules, operations: Sequence[Operation], mapped: Collection[str] = ()) -> list[str]:
     """Return lines on which operations a run calls, and why not the others.
 
     Args:
@@ -146,15 +146,15 @@ def told(rules: CallRules, operations: Sequence[Operation], mapped: Collection[s
     called = [label for reason, labels in by_reason.items() if reason.may for label in labels]
     changing = by_reason.get(Reason.ALLOWED, []) + by_reason.get(Reason.MAPPED, [])
     kept = len(operations) - len(called)
-    all_ = counted(len(operations), "operation")
+    all_ = count_of(len(operations), "operation")
     lines = [f"Calls {len(called)} of {all_}; state is changed by {len(changing)}; not called: {kept}."]
     for reason in Reason:
         labels = by_reason.get(reason, [])
         if labels and reason is not Reason.SAFE:
             verb = "  Calls" if reason.may else "  Does not call"
             named = f", as in --call '{labels[0]}'" if reason is Reason.HARMFUL else ""
-            lines.append(f"{verb} {len(labels)}, because {reason}{named}: {listed(labels)}")
+            lines.append(f"{verb} {len(labels)}, because {reason}{named}: {few_of(labels)}")
     stops = [operation.label for operation in operations if operation.stop]
     if stops and changing:
-        lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {listed(stops)}")
+        lines.append(f"  Sends at the end, to stop the device (x-roaas-stop): {few_of(stops)}")
     return lines

@@ -55,7 +55,7 @@ class Device:
         """Return a valid value for an operation (body, or parameters by name) that is also sensible for the device."""
         return value
 
-    def marked(self, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
+    def mark(self, operation_id: str, value: Any) -> Any:  # noqa: ARG002 - for packs
         """Return a valid value with a text that identifies the suite, if the operation has room for one."""
         return value
 

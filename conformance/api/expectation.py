@@ -62,7 +62,7 @@ class Expectation:
         is_closed = isinstance(self.attempt, Unanswered) and self.attempt.kind is NoAnswer.CLOSED
         return self.that(or_else or (closed and is_closed), expected, cause=cause)
 
-    def taken(self, when: str, *, or_else: bool = False, cause: str = "") -> bool:
+    def accepts(self, when: str, *, or_else: bool = False, cause: str = "") -> bool:
         """Record whether a valid request was accepted, or deferred with 409 because a goal is active."""
         return self.status("2xx", 409, when=when, or_else=or_else, cause=cause)
 

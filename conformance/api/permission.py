@@ -13,7 +13,7 @@ from conformance.documents.openapi import Operation, is_normal, matching
 from conformance.statement.motion_calls import covers
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import SAFE_METHODS
-from conformance.transport.reach import moved
+from conformance.transport.reach import at_server
 from conformance.verdict.run import Run
 
 _SLASHES = re.compile("/{2,}")
@@ -46,7 +46,7 @@ class Permission:
 
         found = services_of(self._run.contract)
         for port in found.ports if found else ():
-            self.may_post_to(moved(port.url, found.base, base_url) if found else port.url)
+            self.may_post_to(at_server(port.url, found.base, base_url) if found else port.url)
 
     def forbid_post_to(self, url: str) -> None:
         """Withdraw may_post_to(): a service whose operations act has the same URL."""
@@ -91,7 +91,7 @@ class Permission:
             return ""  # the request changes nothing, whatever the server serves at its path
         reason = rules.decide(declared or Operation(path, method, path))
         mapped = declared is not None and any(
-            covers(call, f"{method} {path}") or covers(call, f"{method} {sent}") for call in self._run.mapped
+            covers(call, f"{method} {path}") or covers(call, f"{method} {sent}") for call in self._run.mapped_calls
         )
         if mapped and reason not in {Reason.NEVER, Reason.EXCLUDED}:
             return ""
@@ -111,7 +111,7 @@ class Permission:
         return None if operation is None else operation.motion
 
 
-def permitted(run: Run, client: HttpClient, methods: Iterable[str], path: str, *ids: str) -> list[str]:
+def permitted_methods(run: Run, client: HttpClient, methods: Iterable[str], path: str, *ids: str) -> list[str]:
     """Return the methods that this run may send to a path.
 
     If there are others, the requirements that need motion are not tested: they do not pass on half of the evidence.

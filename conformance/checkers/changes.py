@@ -15,7 +15,7 @@ from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, represented
+from conformance.api.rest.things import collection_of, object_in
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -143,15 +143,15 @@ class Changes:
         template = operation.template.rstrip("/") if operation is not None else ""
         above, item = path.rpartition("/")[0], template.rpartition("/")[0]
         if operation is not None and occasion.response.ok and state_of(operation) == self._states.get(item, "-"):
-            yield from self._fallen(occasion, item, above)
+            yield from self._judge_growth(occasion, item, above)
         if operation is not None and occasion.response.ok and item in self._states:
-            yield from self._told(occasion, operation, above, self._states[item])
+            yield from self._judge_change(occasion, operation, above, self._states[item])
         elif operation is not None and occasion.response.ok and template in self._states:
             self._known.pop(path, None)
         elif operation is None or f"{template}/" not in {f"{collection_of(state)}/" for state in self._states}:
             self._known.clear()
 
-    def _told(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
+    def _judge_change(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
         """Judge the response to an operation on a thing: a finished thing cannot be ended again."""
         before = self._known.pop(path, None)
         now = _state_in(occasion, name) if state_of(operation) == name else ""
@@ -193,7 +193,7 @@ class Changes:
         if len(self._there) < _MOST_THINGS:
             self._there[path] = ""
         template = operation.template.rstrip("/")
-        yield from self._fallen(occasion, template, path)
+        yield from self._judge_growth(occasion, template, path)
         if template in self._states and (state := _state_in(occasion, self._states[template])):
             yield from self._state(occasion, operation, path, state)
 
@@ -228,11 +228,11 @@ class Changes:
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
         self._known[path] = _State(now, occasion.response.received_s)
 
-    def _fallen(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
+    def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
         """Judge the members of a thing that never decrease, by the description."""
         names, answer = self._growing.get(template, frozenset()), occasion.response
         value = read_json(answer.body).value if names and is_json(answer.media_type) else None
-        now = {name: one for name, one in represented(value, names).items() if name in names and is_number(one)}
+        now = {name: one for name, one in object_in(value, names).items() if name in names and is_number(one)}
         before, at_s = self._grown.get(path, ({}, 0.0))
         if occasion.sent_s >= at_s and now:
             for name in now.keys() & before.keys():
@@ -298,7 +298,7 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
 def _state_in(occasion: Occasion, name: str) -> str:
     body = occasion.response.body
     value = read_json(body).value if is_json(occasion.response.media_type) and len(body) <= _MOST_OCTETS else None
-    found = represented(value, {plain_name(name)}).get(name)
+    found = object_in(value, {plain_name(name)}).get(name)
     return found if isinstance(found, str) else ""
 
 
@@ -322,12 +322,14 @@ class Transitions:
         reads = _reads(operations)
         # By template: the member with the thing's state. Below: the states from which each operation starts.
         self._states = {template: name for template, one in reads.items() if (name := state_member(one))}
-        self._starts = {operation.label: named for operation in operations if (named := self._named(reads, operation))}
+        self._starts = {
+            operation.label: named for operation in operations if (named := self._states_named(reads, operation))
+        }
         # By path: members of the thing at the last read.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
 
-    def _named(self, reads: dict[str, Operation], operation: Operation) -> frozenset[str]:
+    def _states_named(self, reads: dict[str, Operation], operation: Operation) -> frozenset[str]:
         """Return the states that the description of an operation names; none where they may mean something else."""
         above = operation.template.rstrip("/").rpartition("/")[0]
         if operation.method != "POST" or "409" not in operation.responses or above not in self._states:
@@ -374,7 +376,7 @@ class Transitions:
         """Record the members of a thing as read."""
         answer, name = occasion.response, self._states.get(template, "")
         is_usable = bool(name) and answer.ok and is_json(answer.media_type) and len(answer.body) <= _MOST_OCTETS
-        now = represented(read_json(answer.body).value, {plain_name(name)}) if is_usable else {}
+        now = object_in(read_json(answer.body).value, {plain_name(name)}) if is_usable else {}
         self._seen.pop(path, None)
         if now and len(self._seen) < _MOST_THINGS:
             self._seen[path] = now

@@ -62,7 +62,7 @@ class Codings:
         if request.method not in SAFE_METHODS:
             self._resources.clear()
         elif request.method == "GET" and request.raw is None and "range" not in names and not sent.response.cut:
-            yield from _allowed(occasion)
+            yield from _judge_allowed(occasion)
             if sent.response.status == HTTPStatus.OK:
                 yield from self._read(occasion)
 
@@ -80,7 +80,7 @@ class Codings:
                 known.coded.append(occasion)
 
 
-def _allowed(occasion: Occasion) -> Iterator[Case]:
+def _judge_allowed(occasion: Occasion) -> Iterator[Case]:
     """Judge a response's coding by Accept-Encoding; without that header, any coding is allowed."""
     asked = ", ".join(value for name, value in occasion.request.headers if name.lower() == "accept-encoding")
     coding, weights = occasion.response.content.coding, _weights(asked)

@@ -75,11 +75,11 @@ class Contents:
         if request.method != "HEAD":
             yield from _digests(occasion)
         if request.method not in SAFE:
-            yield from self._written(occasion)
+            yield from self._keep_write(occasion)
         elif request.method == "GET":
             yield from self._read(occasion)
 
-    def _written(self, occasion: Occasion) -> Iterator[Case]:
+    def _keep_write(self, occasion: Occasion) -> Iterator[Case]:
         request, answer = occasion.request, occasion.response
         if refuses(answer.status, occasion.operation):
             return
@@ -102,7 +102,7 @@ class Contents:
         if answer.status == HTTPStatus.PARTIAL_CONTENT and "range" in names:
             if "if-range" in names:
                 value = next(value for name, value in request.headers if name.lower() == "if-range")
-                yield from self._ignored(occasion, value)
+                yield from self._judge_if_range(occasion, value)
             if len(self._parts) < _MOST:
                 self._parts.setdefault(key, []).append(occasion)
         if answer.status != HTTPStatus.OK or "range" in names:
@@ -117,7 +117,7 @@ class Contents:
         if answer.media_type == (sent.request.media_type if sent is not None else _OCTETS):
             yield from self._file(occasion, sent)
         elif sent is not None and sent.request.body == answer.body:
-            yield from _mislabelled(occasion, sent)
+            yield from _judge_label(occasion, sent)
 
     def _file(self, occasion: Occasion, sent: Occasion | None) -> Iterator[Case]:
         """Judge a read by the file that was sent just before; the file before that may stay for a moment."""
@@ -137,7 +137,7 @@ class Contents:
             del self._known[next(iter(self._known))]
 
     @staticmethod
-    def _ignored(occasion: Occasion, value: str) -> Iterator[Case]:
+    def _judge_if_range(occasion: Occasion, value: str) -> Iterator[Case]:
         """Judge a part for a client whose If-Range names another content (RFC 9110 13.1.5)."""
         tag = occasion.response.header("etag") or ""
         # A weak entity tag is not valid in If-Range.
@@ -146,7 +146,7 @@ class Contents:
             yield occasion.case(_TAGS, False, expected, cause=f"{label_of(occasion.operation)} If-Range")  # noqa: FBT003
 
 
-def _mislabelled(occasion: Occasion, sent: Occasion) -> Iterator[Case]:
+def _judge_label(occasion: Occasion, sent: Occasion) -> Iterator[Case]:
     """Judge a file that is read as it was sent, but under another of the media types that both operations have."""
     kind, other = sent.request.media_type, occasion.response.media_type
     if occasion.operation is None or sent.operation is None or not keeps_octets(other):
@@ -202,7 +202,7 @@ def _digests(occasion: Occasion) -> Iterator[Case]:
     is_whole = occasion.request.method == "GET" and answer.status == HTTPStatus.OK
     for name in ("Content-Digest", "Repr-Digest", "Digest") if is_whole else ("Content-Digest",):
         for algorithm, text in _DIGEST.findall(answer.header(name) or ""):
-            said, own = _decoded(text), _HASHES[algorithm.lower()](answer.octets).digest()
+            said, own = _decode(text), _HASHES[algorithm.lower()](answer.octets).digest()
             expected = f"the digest of the content in {name}"
             found, cause = f"{algorithm} of something else", f"{label_of(occasion.operation)} {name}"
             yield occasion.case(_DIGESTS, said == own, expected, found, cause=cause)
@@ -223,7 +223,7 @@ def _member(occasion: Occasion) -> Iterator[Case]:
                 )
 
 
-def _decoded(text: str) -> bytes | None:
+def _decode(text: str) -> bytes | None:
     try:
         return b64decode(text, validate=True)
     except ValueError:

@@ -82,9 +82,9 @@ def status(occasion: Occasion) -> Iterator[Case]:
 
 def _status_fits(occasion: Occasion, operation: Operation) -> bool:
     status, context = occasion.response.status, occasion.context
-    if status in _ANY_REQUEST or operation.declared(status) is not None:
+    if status in _ANY_REQUEST or operation.schemas_for(status) is not None:
         return True
-    if status == _OK and operation.declared(_NO_CONTENT) is not None:
+    if status == _OK and operation.schemas_for(_NO_CONTENT) is not None:
         return True  # a robot may send 200 instead of 204
     if status == _NOT_ACCEPTABLE:
         return context.accept not in {None, "*/*"}
@@ -102,7 +102,7 @@ def _status_fits(occasion: Occasion, operation: Operation) -> bool:
 def body(occasion: Occasion) -> Iterator[Case]:
     """Judge the body of a success by the schema of its operation."""
     operation, answer = occasion.operation, occasion.response
-    content = operation.declared(answer.status) if operation and answer.ok and not occasion.context.is_head else None
+    content = operation.schemas_for(answer.status) if operation and answer.ok and not occasion.context.is_head else None
     if operation is None or not content:
         return
     media_type = answer.media_type
@@ -164,7 +164,7 @@ class WriteOnly:
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange; the first ones of each operation are judged."""
         operation, answer = occasion.operation, occasion.response
-        content = operation.declared(answer.status) if operation and answer.ok and answer.body else None
+        content = operation.schemas_for(answer.status) if operation and answer.ok and answer.body else None
         if operation is None or not content or not is_json(answer.media_type) or answer.media_type not in content:
             return
         self._seen[operation.id] += 1

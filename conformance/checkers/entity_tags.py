@@ -6,7 +6,7 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
 from conformance.checkers.occasion import Occasion
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import SAFE_METHODS, Response
 from conformance.verdict.evidence import Case
@@ -46,7 +46,7 @@ class _Condition(NamedTuple):
     before: Response
 
     @property
-    def refused(self) -> bool:
+    def is_refused(self) -> bool:
         """Whether the condition is why it was refused, although a strong tag may match."""
         return self.occasion.response.status == HTTPStatus.PRECONDITION_FAILED and not self.tag.startswith("W/")
 
@@ -85,7 +85,7 @@ class EntityTags:
             yield from self._write(occasion, asked)
         elif request.method in {"GET", "HEAD"} and "range" not in asked:
             if "if-none-match" in asked:
-                yield from self._cached(occasion, asked)
+                yield from self._judge_cached(occasion, asked)
             if request.method == "GET":
                 yield from self._read(occasion)
 
@@ -104,7 +104,7 @@ class EntityTags:
         if waiting is not None:
             yield from _effect(waiting, answer)
             # A single difference may come from another client's write.
-            is_lost = waiting.matches and waiting.refused and waiting.before.body == answer.body
+            is_lost = waiting.matches and waiting.is_refused and waiting.before.body == answer.body
             self._refused += is_lost
             if is_lost and self._refused > 1 and waiting.tag != answer.header("etag"):
                 expected = f"another status than 412, because the content is still what {waiting.tag} named"
@@ -128,7 +128,7 @@ class EntityTags:
             expected, found = f"ETag: {tag}, which a read right after gets with the same content", f"ETag: {then}"
             yield wrote.case(_TAGS, then == tag, expected, found, cause=f"{label_of(wrote.operation)} after")
 
-    def _cached(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+    def _judge_cached(self, occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
         """Judge a read by a client that has a copy: if it is current, it gets 304."""
         answer, label = occasion.response, label_of(occasion.operation)
         tags = {item.removeprefix("W/") for item in _TAG.findall(asked["if-none-match"])}
@@ -183,7 +183,7 @@ class EntityTags:
                 self._wrote[url] = occasion
         yield from self._at_once(occasion, now, wanted or "")
         if now is not None:
-            yield from _performed(occasion, asked)
+            yield from _judge_needed(occasion, asked)
         is_any = (wanted or "").strip() == "*"
         if wanted is None or now is None or not (is_any or _LIST.fullmatch(wanted)):
             return
@@ -234,7 +234,7 @@ class EntityTags:
             self._spent[url] = before, occasion.request.body
 
 
-def _performed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
+def _judge_needed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
     """Judge an unconditional request that needs If-Match, or If-None-Match: * (RFC 9110 13.1.2, RFC 6585 3)."""
     operation, answer = occasion.operation, occasion.response
     is_done = answer.ok and answer.status != HTTPStatus.ACCEPTED
@@ -289,7 +289,7 @@ def _effect(waiting: _Condition, after: Response) -> Iterator[Case]:
         if all(isinstance(item, dict) for item in (sent, old, new)):
             changed = [name for name, value in sent.items() if name in old and old[name] != value]
             if changed and all(new.get(name) == sent[name] for name in changed):
-                acted = f"{changed[0]} as it was sent, {shown(sent[changed[0]])}"
+                acted = f"{changed[0]} as it was sent, {clip(sent[changed[0]])}"
     expected = f"no effect of a request that was refused with status {status}"
     yield occasion.case(_MATCH, not acted, expected, acted, cause=f"{label} effect")
 
@@ -317,12 +317,12 @@ def difference(one: Response, other: Response) -> str:
         return ""
     if isinstance(old, dict) and isinstance(new, dict):
         name = next(name for name in (*old, *new) if old.get(name, old) != new.get(name, new))
-        return f"{name} {_said(new, name)}, and {_said(old, name)} before"
+        return f"{name} {_member_text(new, name)}, and {_member_text(old, name)} before"
     return "another content than before"
 
 
-def _said(value: dict[str, Any], name: str) -> str:
-    return shown(value[name]) if name in value else "missing"
+def _member_text(value: dict[str, Any], name: str) -> str:
+    return clip(value[name]) if name in value else "missing"
 
 
 def label_of(operation: Operation | None) -> str:

@@ -51,7 +51,7 @@ def content_type(occasion: Occasion) -> Iterator[Case]:
 
 def once(occasion: Occasion) -> Iterator[Case]:
     """Judge that no header field occurs twice unless its value is a list (RFC 9110 5.3)."""
-    twice = occasion.response.repeated(*_SINGLE)
+    twice = occasion.response.repeated_name(*_SINGLE)
     expected = "no header twice, unless its value is a list"
     yield occasion.case("http/field-once", not twice, expected, f"{twice} several times")
 

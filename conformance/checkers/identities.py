@@ -8,10 +8,10 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import unquote, urlsplit
 
-from conformance.api.rest.listing import listed
-from conformance.api.rest.things import collection_of, identifier_of, represented
+from conformance.api.rest.listing import items_of
+from conformance.api.rest.things import collection_of, identifier_of, object_in
 from conformance.checkers.occasion import Occasion
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.transport.reach import joined
@@ -61,7 +61,7 @@ class Identities:
             return
         item = self._items.get(operation.template.rstrip("/"))
         if item is not None:
-            items = listed(read_json(answer.body).value) or []
+            items = items_of(read_json(answer.body).value) or []
             ids = {identifier_of(one, item) for one in items if isinstance(one, dict)} - {""}
             self._count += len(ids)
             if self._count < _REMEMBERED:
@@ -129,18 +129,18 @@ class Uniques:
         path = occasion.context.target.partition("?")[0].rstrip("/")
         above, _, last = path.rpartition("/")
         if method == "POST" and is_json(occasion.request.media_type):
-            self._created(occasion, path)
+            self._keep_created(occasion, path)
         elif method in {"PUT", "PATCH", "DELETE"} and answer.ok:
             self._read[above].clear()
         elif method == "GET" and answer.ok and is_json(answer.media_type) and self._bodies.get(path):
-            yield from self._listed(occasion, operation, self._bodies[path])
+            yield from self._judge_list(occasion, operation, self._bodies[path])
         elif method == "GET" and answer.ok and self._unique[above] and occasion.context.plain:
             value = read_json(answer.body).value if is_json(answer.media_type) else None
-            now = {name: one for name, one in represented(value, self._unique[above]).items() if _is_plain(one)}
-            yield from self._judged(occasion, operation, above, last, now)
+            now = {name: one for name, one in object_in(value, self._unique[above]).items() if _is_plain(one)}
+            yield from self._judge_read(occasion, operation, above, last, now)
             self._read[above][last] = now
 
-    def _created(self, occasion: Occasion, path: str) -> None:
+    def _keep_created(self, occasion: Occasion, path: str) -> None:
         body = read_json(occasion.request.body).value if len(occasion.request.body) < _OCTETS else None
         if not isinstance(body, dict):
             return
@@ -158,20 +158,20 @@ class Uniques:
             self._refused[path] = [*refused, body][-_FEW:]
 
     @staticmethod
-    def _listed(occasion: Occasion, operation: Operation, bodies: list[dict[str, Any]]) -> Iterator[Case]:
+    def _judge_list(occasion: Occasion, operation: Operation, bodies: list[dict[str, Any]]) -> Iterator[Case]:
         """Judge whether two created things that a list contains have different identifiers."""
         own = dict[str, dict[str, Any]]()
-        for item in listed(read_json(occasion.response.body).value) or []:
+        for item in items_of(read_json(occasion.response.body).value) or []:
             names = [name for name in item if plain_name(name) in _IDS] if isinstance(item, dict) else []
             body = next((one for one in bodies if names and one and one.items() <= item.items()), None)
             if body is None or names[0] in body:
                 continue
-            id_ = shown(item[names[0]])
+            id_ = clip(item[names[0]])
             holds, expected = own.setdefault(id_, body) == body, f"another {names[0]} for each created thing"
             found, cause = f"{names[0]} {id_} of two things that were created", f"{operation.label} two"
             yield occasion.case("description/created-is-there", holds, expected, found, cause=cause)
 
-    def _judged(
+    def _judge_read(
         self, occasion: Occasion, operation: Operation, above: str, last: str, now: dict[str, Any]
     ) -> Iterator[Case]:
         for name, value in now.items():
@@ -180,7 +180,7 @@ class Uniques:
                     (key for key, one in self._read[above].items() if key != last and one.get(name) == value), ""
                 )
                 expected = f"another {name} than {above}/{twice} has, because creations with a taken one are refused"
-                found, cause = f"{name} {shown(value)}, as {above}/{twice} has", f"{operation.label} {name} twice"
+                found, cause = f"{name} {clip(value)}, as {above}/{twice} has", f"{operation.label} {name} twice"
                 yield occasion.case("description/own-identifier", not twice, expected, found, cause=cause)
 
 

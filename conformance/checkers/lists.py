@@ -63,12 +63,12 @@ class Lists:
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
         if occasion.request.method not in SAFE:
-            self._totals.changed(occasion.response.received_s)
+            self._totals.note_change(occasion.response.received_s)
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
             return
-        page, sent = page_of(occasion.response, operation), listing.sent(occasion.context.target)
+        page, sent = page_of(occasion.response, operation), listing.query_texts(occasion.context.target)
         if page is None or sent is None or not (listing.operation.parameters or page.totals):
             return
         yield from self._limit(occasion, listing, page, sent)
@@ -88,7 +88,7 @@ class Lists:
                 own = members_of(item)
                 self._seen.update(hash((listing.operation.label, identity, name, str(own.get(name)))) for name in names)
 
-    def _known(self, listing: Listing, page: Page, name: str) -> Iterator[Any]:
+    def _known_values(self, listing: Listing, page: Page, name: str) -> Iterator[Any]:
         """Yield a member's value for each item in which it is known from before."""
         for identity, item in zip(page.identities, page.items, strict=True):
             value = members_of(item).get(name)
@@ -139,7 +139,7 @@ class Lists:
             if not text or text.lower() in _ALL or parameter.media_type:
                 continue
             asked = text.split(",") if "array" in kinds_of(parameter.schema) else [text]
-            values = list(self._known(listing, page, name))
+            values = list(self._known_values(listing, page, name))
             wrong = self._wrong(listing, name, asked, values)
             if wrong is None:
                 continue
@@ -155,7 +155,7 @@ class Lists:
         """Judge bounds of members; an undescribed parameter is one if earlier lists show its effect."""
         for bound in listing.bounds:
             name = bound.parameter.name
-            text, values = sent.get(name), list(self._known(listing, page, bound.member))
+            text, values = sent.get(name), list(self._known_values(listing, page, bound.member))
             if not text:
                 continue
             counts, is_sure = self._counts[listing.operation.label, name], bound.is_said
@@ -220,7 +220,7 @@ class Lists:
         sort = listing.sort
         if sort is None or listing.reverses:
             return
-        default = flat(sort.schema).get("default", "") if sent.keys() <= listing.known else ""
+        default = flat(sort.schema).get("default", "") if sent.keys() <= listing.known_names else ""
         text = sent.get(sort.name, str(default))
         sorting = listing.sortings.get(text.split(",")[0])
         if sorting is None:
@@ -233,7 +233,7 @@ class Lists:
             descending = str(given).lower().startswith("desc") if given else descending
         if "enum" in schema or schema.get("format") == "duration":
             return  # such values may be sorted by meaning
-        values = list(self._known(listing, page, sorting.member))[:_COMPARED]
+        values = list(self._known_values(listing, page, sorting.member))[:_COMPARED]
         pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
         up, down = ([(one, other) for one, other, said in pairs if said is way] for way in (True, False))
         if not up and not down:
@@ -263,7 +263,7 @@ def _links(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, 
     here, begins = _place(listing, sent), {0} if listing.page is None else {0, 1}
     chosen = {one.name for one in (*listing.filters.values(), listing.sort) if one is not None}
     for relation, text in _linked(occasion.response, page):
-        target = listing.sent(text)
+        target = listing.query_texts(text)
         if target is None or not page.items:
             continue
         there, wrong = _place(listing, target), ""

@@ -16,22 +16,22 @@ from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.call_rules import words_of
-from conformance.api.rest.listing import listed
+from conformance.api.rest.listing import items_of
 from conformance.api.rest.references import collections_of, singular
 from conformance.api.rest.things import (
     as_answered,
     collection_of,
     differences,
-    identified,
+    id_member,
     identifier_of,
     is_marked_deleted,
     is_shared,
+    object_in,
     parts_of,
-    represented,
 )
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -185,7 +185,7 @@ class Memory:
         path = _path_in(occasion.context.target)
         if method in SAFE or not self._items:
             if method == "GET" and operation is not None:
-                yield from self._seen(occasion, operation, path)
+                yield from self._judge_read(occasion, operation, path)
             return
         self._acts += 1
         status = occasion.response.status
@@ -196,9 +196,9 @@ class Memory:
         if operation is None or not occasion.response.ok:
             self.forget()
         elif item is not None and method in {"PUT", "PATCH", "DELETE"}:
-            yield from self._changed(occasion, operation, path)
+            yield from self._take_change(occasion, operation, path)
         elif made is not None and method == "POST":
-            yield from self._created(occasion, operation, made, path)
+            yield from self._take_creation(occasion, operation, made, path)
         elif operation.template in self._actions:
             # An action on a thing may change it and the things below it.
             self._drop(lambda other: _is_below(path, other) or _is_below(other, path))
@@ -210,17 +210,17 @@ class Memory:
         else:
             self.forget()
 
-    def _seen(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+    def _judge_read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         item = self._items.get(operation.template.rstrip("/"))
         if item is not None and occasion.context.plain:
             yield from self._read(occasion, item, path)
         elif item is None and occasion.response.ok:
-            yield from self._listed(occasion, operation, path)
+            yield from self._judge_list(occasion, operation, path)
 
     def _drop(self, concerns: Any) -> None:
         self._things = {key: one for key, one in self._things.items() if not concerns(one.path)}
 
-    def _changed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+    def _take_change(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Take a PUT, PATCH or DELETE of an item."""
         if not collection_of(operation.template):
             # The parent may list the changed thing.
@@ -230,7 +230,7 @@ class Memory:
         if operation.method != "DELETE" and last is not None:
             self._last[path] = last[0], {}
         if operation.method == "PUT" and occasion.response.status == HTTPStatus.CREATED:
-            yield from self._located(occasion, path, path)
+            yield from self._judge_location(occasion, path, path)
             yield from self._defaults(occasion, operation)
         below = self._ending(operation, path) if operation.method == "DELETE" else []
         self._drop(lambda other: other != path and (_is_below(other, path) or other.casefold() == path.casefold()))
@@ -262,10 +262,10 @@ class Memory:
             text for text in found if text in self._made and said & set(map(singular, text[len(path) :].split("/")))
         ]
 
-    def _created(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
+    def _take_creation(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
         response = occasion.response
-        _, id_ = identified(read_json(response.body).value, item) if is_json(response.media_type) else ("", None)
+        _, id_ = id_member(read_json(response.body).value, item) if is_json(response.media_type) else ("", None)
         location, target = response.header("location"), ""
         if location is not None and is_same(joined(occasion.request.url, location), occasion.request.url):
             base = occasion.request.url.removesuffix(occasion.context.target)
@@ -280,7 +280,7 @@ class Memory:
         before = self._things.pop(target.casefold(), None)
         self._last.pop(target, None)
         if response.status == HTTPStatus.CREATED:
-            yield from self._located(occasion, path, target)
+            yield from self._judge_location(occasion, path, target)
             yield from self._defaults(occasion, operation)
             sent = _sent_of(occasion)
             if before is not None and before.gone and _is_for_ever(item, operation):
@@ -299,7 +299,7 @@ class Memory:
             if len(self._things) > _MOST_THINGS:
                 del self._things[next(iter(self._things))]
 
-    def _located(self, occasion: Occasion, above: str, path: str) -> Iterator[Case]:
+    def _judge_location(self, occasion: Occasion, above: str, path: str) -> Iterator[Case]:
         """Judge whether the header fields of a creation name no other thing (RFC 9110 8.7, 15.3.2)."""
         for name in ("Location", "Content-Location"):
             value, url = occasion.response.header(name), occasion.request.url
@@ -322,7 +322,7 @@ class Memory:
         parts = flat(body.schema).get("properties", {})
         given = {name: flat(one).get("default") for name, one in parts.items() if name not in sent}
         given = {name: one for name, one in given.items() if isinstance(one, str | int | float) and one != ""}
-        now = represented(answer, {plain_name(name) for name in (*sent, *given)})
+        now = object_in(answer, {plain_name(name) for name in (*sent, *given)})
         for name, one in ((name, one) for name, one in given.items() if name in now):
             other = next(differences({name: one}, now, body.schema, operation.shape, self._collections), "")
             key = operation.label, name
@@ -340,7 +340,7 @@ class Memory:
         own = self._own[item.template.rstrip("/")]
         answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         shape = flat(item.shape or {}).get("properties", {})
-        now = represented(answer, {plain_name(name) for name in shape})
+        now = object_in(answer, {plain_name(name) for name in shape})
         now = {name: one for name, one in now.items() if len(str(one)) <= _SHOWN}
         before, sent = self._last.pop(path, ({}, {}))
         if len(self._last) < _MOST_THINGS:
@@ -353,7 +353,7 @@ class Memory:
                 name in before and before[name] != now[name] and _FOR_EVER.fullmatch(plain_name(name)) is not None
             )
             expected = f"{name}, which is readOnly, as the device gave it"
-            found = f"{shown(now[name])} as {name}" + (f", and {shown(before[name])} before" if name in before else "")
+            found = f"{clip(now[name])} as {name}" + (f", and {clip(before[name])} before" if name in before else "")
             holds = not (is_taken or is_other)
             yield occasion.case("description/read-only", holds, expected, found, cause=f"{item.label} {name}")
 
@@ -368,7 +368,7 @@ class Memory:
         if age_s < 0:
             return  # the response began before the write
         if thing.gone:
-            yield from self._deleted(occasion, item, thing, age_s)
+            yield from self._judge_deleted(occasion, item, thing, age_s)
             return
         kept = item.template, ""
         if response.status in _ABSENT and thing.made:
@@ -382,9 +382,9 @@ class Memory:
             if thing.told is not None:
                 yield from self._told(occasion, item, thing.told)
                 thing.told = None
-            yield from self._compared(occasion, item, thing, age_s)
+            yield from self._compare(occasion, item, thing, age_s)
 
-    def _deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
+    def _judge_deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge a read of a deleted thing."""
         response = occasion.response
         thing.absent |= response.status in _ABSENT
@@ -400,7 +400,7 @@ class Memory:
             self._gone.add(item.template)
             yield from self._back.pop(item.template, [])
 
-    def _listed(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+    def _judge_list(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Judge whether a list, however it is filtered, has things that were deleted, or is below such a thing."""
         above = self._things.get(path.rpartition("/")[0].casefold())
         if above is not None and above.absent and "404" in operation.responses:
@@ -412,7 +412,7 @@ class Memory:
         gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
         if item is None or not gone or not is_json(occasion.response.media_type):
             return
-        for value in listed(read_json(occasion.response.body).value) or ():
+        for value in items_of(read_json(occasion.response.body).value) or ():
             thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
             age_s = occasion.sent_s - thing.changed_s if thing is not None else 0.0
             if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
@@ -441,10 +441,10 @@ class Memory:
         elif len(self._pending[kept]) < _MOST_PENDING:
             self._pending[kept].append((age_s, seen, case))
 
-    def _compared(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
+    def _compare(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge whether the members of a thing read as they were written."""
         value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
-        now = represented(value, {plain_name(name) for name in thing.written})
+        now = object_in(value, {plain_name(name) for name in thing.written})
         for name, (wanted, operation) in thing.written.items() if now else ():
             schema = operation.bodies[next(iter(operation.bodies))].schema
             other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
@@ -471,8 +471,8 @@ class Memory:
             return
         own, shape, sent = parts_of(operation.shape), parts_of(item.shape), _sent_of(write)
         schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
-        told = represented(read_json(answer.body).value, names)
-        now = represented(read_json(occasion.response.body).value, names)
+        told = object_in(read_json(answer.body).value, names)
+        now = object_in(read_json(occasion.response.body).value, names)
         for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
             seen, key = {name: now[name]}, (operation.label, name)
             if flat(own[name]) != flat(shape[name]) or is_shared(name):
@@ -484,7 +484,7 @@ class Memory:
             other = next(differences(seen, told, schema, item.shape, self._collections), "")
             self._untrue[key] |= {write.request.body} if other else set()
             if not other or len(self._untrue[key]) >= _SEEN:
-                expected = f"{shown(now[name])} as {name}, as it was sent and as the next GET shows it"
+                expected = f"{clip(now[name])} as {name}, as it was sent and as the next GET shows it"
                 cause = f"{operation.label} {name} told"
                 yield write.case(f"description/{_READ}", not other, expected, other, cause=cause)
 
@@ -547,5 +547,5 @@ def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
         return None
     response = occasion.response
     answer = read_json(response.body).value if is_json(response.media_type) else None
-    shown = represented(answer, {plain_name(name) for name in value})
+    shown = object_in(answer, {plain_name(name) for name in value})
     return as_answered(value, shown, {}, operation.bodies[occasion.request.media_type].schema)

@@ -39,7 +39,7 @@ def inside(occasion: Occasion) -> Iterator[Case]:
         yield occasion.case("robustness/no-internals", not (inside or path), expected, found, cause=cause)
 
 
-def stated(occasion: Occasion) -> Iterator[Case]:
+def same_status(occasion: Occasion) -> Iterator[Case]:
     """Judge that a problem, where it states a status, states that of its response (RFC 9457 3.1.2)."""
     answer = occasion.response
     if answer.status < _ERROR or answer.media_type not in {JSON, XML} or not answer.body or answer.cut:

@@ -127,7 +127,7 @@ class Resources:
             occasion.response.status,
         )
         if occasion.operation is not None:
-            yield from self._declared(occasion, path)
+            yield from self._take_declared(occasion, path)
             return
         resource = resource_at(occasion.contract, path)
         if resource is None:
@@ -144,7 +144,7 @@ class Resources:
         elif status in _NO_RESOURCE and not self._there.isdisjoint(_places(path, resource)):
             self._suspects.append((path, occasion))
 
-    def _declared(self, occasion: Occasion, path: str) -> Iterator[Case]:
+    def _take_declared(self, occasion: Occasion, path: str) -> Iterator[Case]:
         """Record what a declared operation's response shows about a path, and judge the cases that waited for that."""
         status = occasion.response.status
         if status in _GONE or (occasion.request.method == "DELETE" and occasion.response.ok):

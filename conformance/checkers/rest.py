@@ -24,7 +24,7 @@ from conformance.verdict.evidence import Case
 # _ANY: checkers of every response. _DOCUMENTS: checkers that need the description's operation.
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
-    fields.json, fields.charset, problem.inside, problem.stated, problem.form, fields.allow, fields.challenge,
+    fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
     declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
 )  # fmt: skip
 

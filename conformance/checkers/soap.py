@@ -109,7 +109,7 @@ def _message(
     rules: _Rules, response: Response, root: etree._Element, answers: Collection[str], encoding: str
 ) -> Iterator[Case]:
     case = rules.case
-    once = not response.repeated("Content-Type")
+    once = not response.repeated_name("Content-Type")
     yield case(
         "content-type", response.media_type == "text/xml" and once, "Content-Type: text/xml", lambda: _type(response)
     )

@@ -109,7 +109,7 @@ class _Past:
         if not got or self.misses >= _SEEN:
             yield case(f"soap/{name}", not got, exchange, expected, got, cause)
 
-    def lasted(self, age_s: float, text: str) -> Iterator[Case]:
+    def overdue_cases(self, age_s: float, text: str) -> Iterator[Case]:
         """Yield the values that should have lasted as long as another one did, once that one was read again."""
         waiting, self.pending = self.pending, []
         for one in waiting:
@@ -168,10 +168,10 @@ class SoapMemory:
         if (act.role is not Role.READS or not sent) and len(self._given) < _MOST:
             self._given.update((name, text) for name, texts in told.items() if REFERS.search(name) for text in texts)
         if act.role is Role.READS:
-            yield from self._gone(act, attempt, sent, told)
+            yield from self._judge_removed(act, attempt, sent, told)
             if response.ok and answer is not None and not is_fault:
-                yield from self._listed(act, attempt, told)
-                yield from self._named(act, attempt, sent, told)
+                yield from self._judge_list(act, attempt, told)
+                yield from self._judge_id(act, attempt, sent, told)
                 yield from self._values(act, attempt, sent, told)
                 # The items of a list tell what was written to each.
                 items = list(map(texts_of, answer.iterdescendants(etree.Element))) if not sent else []
@@ -181,24 +181,24 @@ class SoapMemory:
         self._changes += 1
         self._done_last = act, {text for texts in sent.values() for text in texts}, is_fault
         if is_fault:
-            self._refused(act, sent)
+            self._keep_refused(act, sent)
         elif not response.ok or self._types.invalid(payload):
             self._forget()
         else:
             nil = {local(str(one.tag)).lower() for one in payload.iter(etree.Element) if one.get(_NIL) in {"true", "1"}}
-            yield from self._done(act, attempt, sent, told, nil - act.emptied)
+            yield from self._keep_done(act, attempt, sent, told, nil - act.emptied)
 
     def _forget(self) -> None:
         self._written.clear()
         self._things.clear()
         self._done_last = None
 
-    def _refused(self, act: Act, sent: _Texts) -> None:
+    def _keep_refused(self, act: Act, sent: _Texts) -> None:
         for write in self._written[act.label]:
             for name, texts in sent.items():
                 write.refused[name].update(texts)
 
-    def _done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts, unsaid: set[str]) -> Iterator[Case]:
+    def _keep_done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts, unsaid: set[str]) -> Iterator[Case]:
         """Keep what a successful request did; judge whether what it created is a thing of its own.
 
         A device may leave the values of ``unsaid`` as they were, or not.
@@ -212,7 +212,7 @@ class SoapMemory:
             names = sent.keys() & act.sent.keys() - keys - unsaid
             if act.role is Role.OTHER:
                 names = {name for name in names if REFERS.search(name)}  # what it does may change all else
-            values = {name: _joined(told.get(name, sent[name])) for name in names}
+            values = {name: _join(told.get(name, sent[name])) for name in names}
             earlier = {name: text for write in before for name, text in write.values.items() if name not in unsaid}
             values = {**earlier, **values}
             others = [write for write in self._written[act.label] if write.key != key][-_MOST:]
@@ -225,7 +225,7 @@ class SoapMemory:
             new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
             new = [pair for pair in new if REFERS.search(pair[0])] or (new if len(new) == 1 else [])
             for name, text in new[:1]:
-                yield from self._made(_Thing(act, name, text, at_s, _texts(sent)), exchange)
+                yield from self._keep_thing(_Thing(act, name, text, at_s, _texts(sent)), exchange)
             del self._things[:-_MOST]
         elif act.role is Role.REMOVES:
             for thing in self._things:
@@ -234,7 +234,7 @@ class SoapMemory:
         else:
             self._things.clear()
 
-    def _made(self, thing: _Thing, exchange: Exchange) -> Iterator[Case]:
+    def _keep_thing(self, thing: _Thing, exchange: Exchange) -> Iterator[Case]:
         """Keep a thing; judge whether its id is its own."""
         own = [one for one in self._things if one.creator is thing.creator and not one.gone]
         self._things.append(thing)
@@ -259,7 +259,7 @@ class SoapMemory:
                     # A part of a list may lack what the other parts have, and a program may leave out 0 and false.
                     has_it = text not in _NOTHING and name in act.told and sent is not told
                     if texts := told.get(name) or ([act.told[name].default] if has_it else []):
-                        yield from self._compared(act, writer, write, name, exchange, _joined(texts), text)
+                        yield from self._judge_value(act, writer, write, name, exchange, _join(texts), text)
                 for name in writer.sent.keys() & told.keys() - write.values.keys() - write.key.keys():
                     # If a device has stored several texts, "None" for a left-out member comes from its program.
                     is_none = writer.sent[name].builtin in STRINGS and _NO_TEXTS.intersection(told[name])
@@ -268,7 +268,7 @@ class SoapMemory:
                         got, cause = f"{name} {told[name][0]!r}", f"{writer.label} {name}"
                         yield case("soap/written-is-read", False, exchange, expected, got, cause)  # noqa: FBT003 - see Case
 
-    def _compared(
+    def _judge_value(
         self, act: Act, writer: Act, write: _Write, name: str, exchange: Exchange, got: str, text: str
     ) -> Iterator[Case]:
         """Judge one value."""
@@ -284,7 +284,7 @@ class SoapMemory:
             past.kept[text] = max(past.kept.get(text, 0.0), age_s)
             if len(past.kept) >= _KEPT:
                 yield case("soap/written-is-read", True, exchange, expected)  # noqa: FBT003 - see Case
-            yield from past.lasted(age_s, text)
+            yield from past.overdue_cases(age_s, text)
             return
         if _is_near(simple, text, got):
             return  # a measured value is noisy
@@ -316,7 +316,7 @@ class SoapMemory:
             cause = f"{writer.label} {name}"
             found = case(requirement, False, exchange, expected, f"{name} {got!r}", cause)  # noqa: FBT003 - see Case
             past.pending = [*past.pending, (0.0 if is_ignored or is_begun or is_merged else age_s, got, found)][-_MOST:]
-            yield from past.lasted(past.longest(got), _BETWEEN)
+            yield from past.overdue_cases(past.longest(got), _BETWEEN)
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past, name: str) -> bool:
         """Return whether a device stores the values beside one, and never that value."""
@@ -332,7 +332,7 @@ class SoapMemory:
             and any(len(other.kept) >= _KEPT and not other.moves for other in beside)
         )
 
-    def _named(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+    def _judge_id(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
         """Judge whether a response is about the thing whose id, as the device gave it, was sent."""
         for name in sent.keys() & told.keys() & act.sent.keys():
             if len(sent[name]) != 1 or len(told[name]) != 1:
@@ -353,7 +353,7 @@ class SoapMemory:
                 continue
             yield from past.twice("written-is-read", exchange, expected, got, f"{act.label} {name}")
 
-    def _gone(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
+    def _judge_removed(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
         """Judge whether a thing that was removed can still be read; a value of its own may say that it is removed."""
         for thing in self._things:
             age_s = exchange.response.received_s - thing.at_s
@@ -365,7 +365,7 @@ class SoapMemory:
             got = "its values" if [thing.id] in told.values() else ""
             yield from past.twice("deleted-is-gone", exchange, expected, got, f"{thing.creator.label} {act.label}")
 
-    def _unchanged(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
+    def _judge_steady(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
         """Judge whether a list is as it was, but for what the one request did that came since."""
         names = {thing.name for thing in self._things if act.lists(thing.creator)}
         ids = {text for name in names for text in told.get(name, ())}
@@ -388,9 +388,9 @@ class SoapMemory:
         got = f"a list with or without {', '.join(sorted(odd))}" if odd else ""
         yield from past.twice(name, exchange, what, got, f"{doer.label} {act.label}")
 
-    def _listed(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
+    def _judge_list(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
         """Judge whether a list contains created things, and no removed ones."""
-        yield from self._unchanged(act, exchange, told)
+        yield from self._judge_steady(act, exchange, told)
         ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
         for thing in self._things:
             if not act.lists(thing.creator):
@@ -416,7 +416,7 @@ def _texts(sent: _Texts) -> frozenset[tuple[str, str]]:
     return frozenset((name, text) for name, texts in sent.items() for text in texts if len(text) > _FEW)
 
 
-def _joined(texts: list[str]) -> str:
+def _join(texts: list[str]) -> str:
     """Return the values of one name as one text, in any order."""
     return _BETWEEN.join(sorted(texts))
 

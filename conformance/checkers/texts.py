@@ -7,9 +7,9 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
-from conformance.api.rest.listing import listed
+from conformance.api.rest.listing import items_of
 from conformance.checkers.occasion import Occasion
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import is_json
 from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.transport.reach import joined
@@ -49,7 +49,7 @@ class Texts:
             value = _members(answer.body, answer.media_type)
             write = self._written.pop(url, None)
             if write is not None and write.id is not None:
-                items = listed(read_json(answer.body).value) or [] if is_json(answer.media_type) else []
+                items = items_of(read_json(answer.body).value) or [] if is_json(answer.media_type) else []
                 value = next((item for item in items if isinstance(item, dict) and item.get("id") == write.id), {})
             if write is not None and len(self._shown) < _MOST:
                 yield from self._read(occasion, write, value)
@@ -73,13 +73,13 @@ class Texts:
             seen = value.get(name)
             if not isinstance(seen, str) or seen == write.before.get(name):
                 continue
-            expected = f"{name} {shown(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
+            expected = f"{name} {clip(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
             label = occasion.operation.label if occasion.operation else ""
             same = _plain(seen) in {_plain(text), _ascii(text)}
             # A list may show only the beginning of a text.
             same |= write.id is not None and _plain(text).startswith(_plain(seen.rstrip(". \u2026")))
             cause = f"{label} {name} text"
-            yield occasion.case("description/written-is-read", same, expected, f"{name} {shown(seen)}", cause=cause)
+            yield occasion.case("description/written-is-read", same, expected, f"{name} {clip(seen)}", cause=cause)
 
 
 def _members(body: bytes, media_type: str) -> dict[str, Any]:

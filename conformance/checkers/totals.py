@@ -96,7 +96,7 @@ class _Count:
         self.times += is_same and is_quiet
         return is_quiet and (self.times >= _OFTEN or now_s - since_s >= SETTLES_S)
 
-    def agreed(self, page: Page, changed_s: float) -> list[tuple[Occasion, int]]:
+    def agree(self, page: Page, changed_s: float) -> list[tuple[Occasion, int]]:
         """Record the list that a total agrees with; return earlier parts that had another total meanwhile.
 
         One that is late after a change is not the number of items that a part shows.
@@ -119,7 +119,7 @@ class Totals:
         self._longest: dict[str, int] = defaultdict(int)
         self._changed_s = float("-inf")
 
-    def changed(self, when_s: float) -> None:
+    def note_change(self, when_s: float) -> None:
         """Note a request that may have changed a list."""
         self._changed_s = when_s
 
@@ -128,7 +128,7 @@ class Totals:
         label, shown = listing.operation.label, len(page.items)
         self._longest[label] = max(self._longest[label], shown)
         elsewhere = {parameter.name for parameter in (listing.page, listing.cursor) if parameter is not None}
-        if not sent.keys() <= listing.known - elsewhere:
+        if not sent.keys() <= listing.known_names - elsewhere:
             return
         texts = {
             parameter.name: sent[parameter.name]
@@ -158,15 +158,15 @@ class Totals:
             if whole and shown and (not chosen or part.least < every.all):
                 count.learn(total, part)
             if count.agrees and (count is not every or not chosen):
-                yield from self._judged(count, every, part, name, total)
+                yield from self._judge_total(count, every, part, name, total)
 
-    def _judged(self, count: _Count, every: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
+    def _judge_total(self, count: _Count, every: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
         """Yield the cases of a total whose meaning is known; every: that of the list without filters."""
         shown, least = len(part.page.items), part.least
         is_of_page = plain_name(name) in COUNTS and not count.is_of_all and total >= shown
         if part.whole and total == least:
             count.wrong_since_s.pop(part.names, None)
-            other = count.agreed(part.page, self._changed_s) if not part.offset else []
+            other = count.agree(part.page, self._changed_s) if not part.offset else []
             every.times += len(other)
             for one, told in other if every.times >= _OFTEN else ():
                 expected = f"{total} as {name}, as the whole list tells before and after"

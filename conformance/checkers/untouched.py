@@ -16,7 +16,7 @@ from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, is_json
 from conformance.documents.parameters import plain_name
 from conformance.verdict.evidence import Case
@@ -127,7 +127,7 @@ class Untouched:
         ]
         id_ = "description/safe" if label == _CONDITIONAL else "description/refused-keeps"
         found = ", ".join(
-            f"{shown(now[text])} as {text}, and {shown(before.members.get(text))} before" for text in wrong[:1]
+            f"{clip(now[text])} as {text}, and {clip(before.members.get(text))} before" for text in wrong[:1]
         )
         expected = f"the members as before {label}, as {times} times"
         yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched")

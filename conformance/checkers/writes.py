@@ -20,11 +20,11 @@ from typing import Any, Final, NamedTuple
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, parts_of, represented
+from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, object_in, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -95,7 +95,7 @@ class _Change(NamedTuple):
     is_old: bool
 
     @property
-    def sent(self) -> Any:
+    def sent_value(self) -> Any:
         """The JSON value of its body."""
         return read_json(self.write.request.body).value
 
@@ -110,11 +110,11 @@ class _Change(NamedTuple):
         return f"{self.operation.label} with status {self.write.response.status}"
 
     @property
-    def told(self) -> dict[str, Any]:
+    def shown_members(self) -> dict[str, Any]:
         """The members that its response shows."""
         response = self.write.response
         answer = read_json(response.body).value if is_json(response.media_type) else None
-        return represented(answer, {plain_name(text) for text in self.now})
+        return object_in(answer, {plain_name(text) for text in self.now})
 
     def is_settled(self, name: str, names: Any) -> bool:
         """Return whether the device has acted by the second read, which a device that acts later has not.
@@ -123,7 +123,7 @@ class _Change(NamedTuple):
         """
         if self.is_old:
             return True
-        told = self.told
+        told = self.shown_members
         is_told = bool(told) and same(told.get(name), self.now.get(name)) and len(told) > 1
         return is_told or any(
             not same(self.now.get(one), self.before.get(one)) for one in names if one != name and one not in self.moving
@@ -190,7 +190,7 @@ class Writes:
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         response = occasion.response
         value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
-        now = represented(value, {plain_name(name) for name in parts_of(item.shape)})
+        now = object_in(value, {plain_name(name) for name in parts_of(item.shape)})
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
         sent_s, late = occasion.sent_s, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
@@ -205,44 +205,44 @@ class Writes:
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
                 is_old = sent_s - write.response.received_s > _SETTLES_S
                 if is_old or write is not late:
-                    yield from self._judged(occasion, item, write, _Sandwich(state.members, now, moving, is_old))
+                    yield from self._judge_write(occasion, item, write, _Sandwich(state.members, now, moving, is_old))
                 if write.response.ok and is_same and not is_old:
                     # A device may act later: a later read is compared as well.
                     self._late[path] = write
         if len(self._states) < _MOST:
             self._states[path] = _State(now, response.received_s)
 
-    def _judged(self, occasion: Occasion, item: Operation, write: Occasion, reads: _Sandwich) -> Iterator[Case]:
+    def _judge_write(self, occasion: Occasion, item: Operation, write: Occasion, reads: _Sandwich) -> Iterator[Case]:
         operation, request = write.operation, write.request
         is_readable = is_json(request.media_type) and len(request.body) <= _MOST_OCTETS
         if operation is None or request.media_type not in operation.bodies or not is_readable or not reads.now:
             return
         change = _Change(write, operation, *reads)
         if refuses(write.response.status, operation):
-            yield from self._refused(occasion, change)
+            yield from self._judge_refused(occasion, change)
             return
         if write.response.status == _NOT_NOW:
             return
         if JSON_PATCH in request.media_type:
-            yield from self._patched(occasion, item, change)
-        elif isinstance(change.sent, dict):
-            yield from self._owned(occasion, item, change)
+            yield from self._judge_patch(occasion, item, change)
+        elif isinstance(change.sent_value, dict):
+            yield from self._judge_own(occasion, item, change)
             # The schema of a merge patch need not say that null removes a member.
             if MERGE in request.media_type:
-                yield from self._merged(occasion, item, change)
+                yield from self._judge_merge(occasion, item, change)
             if not write.is_valid:
                 return
             yield from _entries(occasion, change)
-            yield from self._stamped(occasion, item, change)
+            yield from self._judge_stamp(occasion, item, change)
             yield from self._values(occasion, item, change)
             if request.method == "PUT":
                 yield from self._left_out(occasion, item, change)
             else:
                 yield from self._others(occasion, item, change)
 
-    def _refused(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
+    def _judge_refused(self, occasion: Occasion, change: _Change) -> Iterator[Case]:
         """Judge whether a refused request has changed nothing, not even in part."""
-        sent, accepted = change.sent, self._accepted.get(change.write.context.target)
+        sent, accepted = change.sent_value, self._accepted.get(change.write.context.target)
         if JSON_PATCH in change.write.request.media_type:
             made = [item for item in partly_patched(change.before, sent) if isinstance(item, dict)]
         else:
@@ -253,15 +253,15 @@ class Writes:
             is_late = isinstance(accepted, dict) and name in accepted and same(accepted[name], now)
             is_taken = not same(was, now) and any(name in item and same(item[name], now) for item in made)
             if is_taken and not is_late:
-                wrong = f"{shown(now)} as {name}, and {shown(was)} before"
+                wrong = f"{clip(now)} as {name}, and {clip(was)} before"
                 break
         expected = f"the members as they were before {change.label}"
         if made:
             yield occasion.case(_KEPT, not wrong, expected, wrong, cause=f"{change.operation.label} refused")
 
-    def _patched(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+    def _judge_patch(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge a JSON patch that was accepted."""
-        operations = change.sent
+        operations = change.sent_value
         try:
             made = patched(change.before, operations)
         except PatchError as error:
@@ -281,14 +281,14 @@ class Writes:
             is_free = name not in made and "default" in flat(parts_of(item.shape).get(name) or {})
             far = not same(kept, made.get(name)) and (is_same or (name in made and isinstance(kept, list)))
             if name not in change.moving and name in change.now and not is_free:
-                wrong = f"{shown(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
-                asked = f"{shown(made[name])} as {name}" if name in made else f"no {name}"
+                wrong = f"{clip(kept)} as {name}" if far and (not is_same or change.is_settled(name, touched)) else ""
+                asked = f"{clip(made[name])} as {name}" if name in made else f"no {name}"
                 expected = f"{asked}, as {change.label} asked for (RFC 6902)"
                 yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{change.operation.label} {name} patch")
 
-    def _owned(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+    def _judge_own(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a request has changed members that only the device may set."""
-        for name, value in change.sent.items():
+        for name, value in change.sent_value.items():
             parts = (parts_of(change.schema).get(name), parts_of(item.shape).get(name))
             if name in change.now and any(isinstance(part, dict) and flat(part).get("readOnly") for part in parts):
                 was, now = change.before.get(name), change.now[name]
@@ -297,14 +297,14 @@ class Writes:
                     self._doubts[change.operation.label, name].add(change.write.request.body)
                     is_taken = len(self._doubts[change.operation.label, name]) >= _SEEN
                 expected = f"{name}, which is readOnly, as the device gave it"
-                found = f"{shown(now)} as {name}, and {shown(was)} before"
+                found = f"{clip(now)} as {name}, and {clip(was)} before"
                 yield occasion.case(_OWN, not is_taken, expected, found, cause=f"{item.label} {name}")
 
-    def _stamped(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+    def _judge_stamp(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether the time of the last change moves, of a thing that has the time of its creation too."""
         names, parts = {plain_name(name): name for name in change.now}, parts_of(item.shape)
         stamp = next((name for text, name in names.items() if _CHANGED_AT.fullmatch(text)), "")
-        touched = (change.sent.keys() & change.now.keys() & parts.keys()) - change.moving
+        touched = (change.sent_value.keys() & change.now.keys() & parts.keys()) - change.moving
         is_changed = any(not same(change.before.get(name), change.now[name]) for name in touched)
         if not stamp:
             return
@@ -319,7 +319,7 @@ class Writes:
         if len(doubts) >= _SEEN:
             expected = f"the time of {change.label} as {stamp}, {now:%H:%M:%S} by the Date of its response"
             found, cause = (
-                f"{shown(change.now[stamp])} as {stamp}, as before",
+                f"{clip(change.now[stamp])} as {stamp}, as before",
                 f"{change.operation.label} {stamp} stays",
             )
             yield occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
@@ -328,16 +328,18 @@ class Writes:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
         shape = parts_of(item.shape)
         there = {name: one for name, one in change.now.items() if name not in change.moving}
-        for leaf in _leaves(parts_of(change.schema), change.sent, change.before, there):
+        for leaf in _leaves(parts_of(change.schema), change.sent_value, change.before, there):
             name, part, value, was, now = leaf
             if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
             key, wrong = (change.operation.label, name), ""
-            yield from self._unchanged(occasion, item, change, leaf)
+            yield from self._judge_same(occasion, item, change, leaf)
             if part.get("format") == "double" and _is_rounded(value, now):
                 self._doubts[key].add(str(value).encode())
-                is_sure = len(self._doubts[key]) >= _SEEN or same(change.told.get(leaf.top), change.now[leaf.top])
-                wrong = f"{shown(now)} as {name}" if is_sure else ""
+                is_sure = len(self._doubts[key]) >= _SEEN or same(
+                    change.shown_members.get(leaf.top), change.now[leaf.top]
+                )
+                wrong = f"{clip(now)} as {name}" if is_sure else ""
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
@@ -348,29 +350,29 @@ class Writes:
                     and "integer" not in kinds_of(shape.get(name, {}))
                 ):
                     self._doubts[key].add(str(value).encode())
-                    wrong = f"{shown(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
+                    wrong = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
             elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
                 wrong = f"{now} as {name}"
             elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
-                wrong = f"{shown(now)} as {name}" if _is_altered(value, now) else ""
+                wrong = f"{clip(now)} as {name}" if _is_altered(value, now) else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
             else:
                 continue
-            expected = f"{shown(value)} as {name}, as {change.label} wrote it"
+            expected = f"{clip(value)} as {name}, as {change.label} wrote it"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} value")
 
-    def _unchanged(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
+    def _judge_same(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
         """Judge a value that a write left as it was: an empty one by PUT, or two by PATCH that PUT alone changes."""
         key, last = (item.template, leaf.name), leaf.name.rpartition(".")[2]
         is_same, method = same(leaf.now, leaf.was), change.write.request.method
         if same(leaf.now, leaf.value):
             self._taken[key] |= set() if is_same else {method}
-        elif is_same and change.is_settled(leaf.top, change.sent) and not is_shared(last):
-            expected = f"{shown(leaf.value)} as {leaf.name}, as {change.label} wrote it"
-            cause, found = f"{change.operation.label} {leaf.name} value", f"{shown(leaf.now)} as {leaf.name}, as before"
+        elif is_same and change.is_settled(leaf.top, change.sent_value) and not is_shared(last):
+            expected = f"{clip(leaf.value)} as {leaf.name}, as {change.label} wrote it"
+            cause, found = f"{change.operation.label} {leaf.name} value", f"{clip(leaf.now)} as {leaf.name}, as before"
             case = occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
             is_open = "properties" in leaf.part or same(leaf.was, leaf.part.get("default"))
             if method == "PUT" and leaf.value in (None, [], {}) and not is_open:
@@ -393,11 +395,11 @@ class Writes:
         is_plain = all(map(is_number, (*value, *now))) and not part.get("uniqueItems")
         is_other = is_plain and len(value) == len(now) and sorted(value) == sorted(now) and value != now
         is_fewer = is_plain and len(now) < len(value) and set(value) == set(now)
-        return f"{shown(now)} as {name}" if is_other or is_fewer else ""
+        return f"{clip(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether members that a PUT leaves out get their default, or disappear if the description says so."""
-        is_said, bodies = GONE.search(change.operation.text), (change.sent, change.before, change.now)
+        is_said, bodies = GONE.search(change.operation.text), (change.sent_value, change.before, change.now)
         for leaf, is_needed in _missing(parts_of(change.schema), flat(item.shape or {}), bodies):
             name, given, default, was, now = leaf
             is_open = "default" not in given and (not is_said or is_needed)
@@ -405,15 +407,15 @@ class Writes:
                 continue
             if is_devices(name, given, self._collections) or is_shared(name) or leaf.top in change.moving:
                 continue
-            is_kept = same(now, was) and change.is_settled(leaf.top, change.sent)
+            is_kept = same(now, was) and change.is_settled(leaf.top, change.sent_value)
             of = "the default of what" if "default" in given else "which"
-            expected = f"{shown(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
-            found = f"{shown(now)} as {name}, as before"
+            expected = f"{clip(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
+            found = f"{clip(now)} as {name}, as before"
             yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=f"{item.label} {name}")
 
-    def _merged(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
+    def _judge_merge(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a merge patch removes by null, merges objects and replaces lists (RFC 7396)."""
-        for name, value in change.sent.items():
+        for name, value in change.sent_value.items():
             was, now = change.before.get(name), change.now.get(name)
             shape, given = (flat(parts_of(of).get(name) or {}) for of in (item.shape, change.schema))
             is_own = shape.get("readOnly") or given.get("readOnly")
@@ -425,7 +427,7 @@ class Writes:
                 expected = f"no {name}, which {change.label} removed by null (RFC 7396 2)"
                 # An empty value may be how the device shows that there is none.
                 is_kept = same(now, was) and not same(was, default) and was not in ("", [], {})
-                wrong = f"{shown(was)} as {name}" if is_kept and change.is_settled(name, change.sent) else ""
+                wrong = f"{clip(was)} as {name}" if is_kept and change.is_settled(name, change.sent_value) else ""
             elif isinstance(value, dict) and isinstance(was, dict) and isinstance(now, dict):
                 made = merged(was, value)
                 lost = [one for one in was if one in made and one not in value and now.get(one) is None is not was[one]]
@@ -435,7 +437,7 @@ class Writes:
                 wrong = wrong or self._reset_within(change, name)
             elif isinstance(value, list) and isinstance(was, list) and isinstance(now, list) and was:
                 is_added = len(now) > len(value) and len(now) >= len(was) and all(one in now for one in (*was, *value))
-                wrong = f"{shown(now)} as {name}" if is_added and not same(was, now) else ""
+                wrong = f"{clip(now)} as {name}" if is_added and not same(was, now) else ""
             else:
                 continue
             yield occasion.case(_PATCH, not wrong, expected, wrong, cause=f"{item.label} {name} merge")
@@ -445,18 +447,18 @@ class Writes:
 
         One member may follow another one. Two that reset each other, by values that change nothing, do not.
         """
-        value, was, now = change.sent[name], change.before[name], change.now[name]
+        value, was, now = change.sent_value[name], change.before[name], change.now[name]
         others = [item for item in was if item in now and item not in value and not same(now[item], was[item])]
         doubts = self._doubts[change.operation.label, f"{name} within"]
         if all(same(value[item], was.get(item)) for item in value):
             doubts |= {f"{item} resets {other}".encode() for item in value for other in others}
         both = [one for one in others if any(f"{one} resets {other}".encode() in doubts for other in value)]
-        return f"{shown(now[both[0]])} as {both[0]} in {name}" if both else ""
+        return f"{clip(now[both[0]])} as {both[0]} in {name}" if both else ""
 
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps the members that it does not name; it takes two bodies to rule out chance."""
         parts, label = parts_of(change.schema), change.operation.label
-        for name in change.before.keys() & parts.keys() - change.sent.keys() - change.moving:
+        for name in change.before.keys() & parts.keys() - change.sent_value.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])
             if was is None or is_devices(name, given, self._collections) or is_shared(name):
                 continue
@@ -465,15 +467,15 @@ class Writes:
             if is_reset:
                 self._doubts[label, f"{name} reset"].add(change.write.request.body)
                 if len(self._doubts[label, f"{name} reset"]) >= _SEEN:
-                    expected = f"{shown(was)} as {name}, which {change.label} does not name"
-                    found, cause = f"{shown(now)} as {name}", f"{label} {name} kept"
+                    expected = f"{clip(was)} as {name}, which {change.label} does not name"
+                    found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
                     yield occasion.case(_PATCH, False, expected, found, cause=cause)  # noqa: FBT003
 
 
 def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
     """Judge whether a map has all new entries of a body, if it has one of them."""
     for name, part in parts_of(change.schema).items():
-        value, was, now = (item.get(name) for item in (change.sent, change.before, change.now))
+        value, was, now = (item.get(name) for item in (change.sent_value, change.before, change.now))
         if isinstance(value, dict) and isinstance(now, dict) and "properties" not in flat(part):
             new = [item for item in value if item not in (was or {}) and value[item] is not None]
             lost = [item for item in new if item not in now]

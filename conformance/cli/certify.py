@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.api.call_rules import CallRules, told
-from conformance.cli.certify_drive import NotShownError, checked, drive_options, with_map
+from conformance.api.call_rules import CallRules, plan_lines
+from conformance.cli.certify_drive import NotShownError, drive_options, options_for, with_map
 from conformance.cli.certify_init import init, init_described
 from conformance.cli.certify_options import CertifyOptions
-from conformance.cli.selecting import SelectionError, failed_before, selected
+from conformance.cli.selecting import SelectionError, failed_before, select_ids
 from conformance.cli.summary import print_summary
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import end_like_ctrl_c, end_with_parent
@@ -34,7 +34,7 @@ from conformance.statement.statement import Statement, StatementError, api_of
 from conformance.target.naming import Judged, lock_result_folder, split_args, targets_or_roaas_toml, what_is_judged
 from conformance.transport.reach import UnreachableError
 from conformance.verdict.effort import DEEP_MINUTES, EFFORTS, Effort
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
     from conformance.engine.certification import Certification
@@ -184,7 +184,7 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
     if not options.fleet:
         named = targets_or_roaas_toml(targets, given)
         source, statement = split_args(named, options.openapi or options.wsdl, new=options.init)
-    options = checked(options, named=bool(source or statement))
+    options = options_for(options, named=bool(source or statement))
     if options.fleet:
         from conformance.cli.certify_fleet import certify_fleet  # noqa: PLC0415 - one robot needs nothing of it
 
@@ -272,11 +272,11 @@ def _write_baseline(path: Path, outcome: Certification, contract: Contract, old:
         for item in outcome.document["requirements"]
         if item["verdict"] == "fail" or "expected_failure" in item
     ]
-    known = load_baseline(old, contract.ledger, contract.renamed) if old else ()
+    known = load_baseline(old, contract.ledger, contract.ids_by_alias) if old else ()
     today = dt.datetime.now(dt.UTC).date()
     path.write_text(baseline_text(found, known, today), encoding="utf-8")
     told = "Write a reason and a last day to each, then give it by --baseline." if found else "Nothing fails."
-    click.echo(f"baseline: {path}, {counted(len(found), 'failure')}. {told}", err=True)
+    click.echo(f"baseline: {path}, {count_of(len(found), 'failure')}. {told}", err=True)
 
 
 def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> CommandResult:
@@ -307,7 +307,7 @@ def _certify(
         if chosen.endpoints.ca_file:
             connection.tls()
         requirements = judged_by(contract, options.requirements)
-        baseline = load_baseline(options.baseline, contract.ledger, contract.renamed) if options.baseline else ()
+        baseline = load_baseline(options.baseline, contract.ledger, contract.ids_by_alias) if options.baseline else ()
         given = Given(
             statement=file_digest(statement) if statement else None,
             baseline=file_digest(options.baseline) if options.baseline else None,
@@ -324,7 +324,9 @@ def _certify(
     notes = (*remarks, *_notes(run))
     command = command_without_folders(sys.argv[1:], ("--call", "--never"))
     robot = RobotUnderTest(run, connection)
-    calls = () if contract.is_claimed else tuple(told(CallRules.of(run), operations_of(contract), run.mapped))
+    calls = (
+        () if contract.is_claimed else tuple(plan_lines(CallRules.of(run), operations_of(contract), run.mapped_calls))
+    )
     progress, bar = None if options.progress == "none" else sys.stderr, options.progress == "auto"
     said: dict[str, Any] = {"progress": progress, "bar": bar, "notes": notes, "announced": calls}
     return run_certification(robot, options.out, command=command, baseline=baseline, **said)
@@ -346,10 +348,10 @@ def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     from conformance.verdict.time_limit import TimeLimit  # noqa: PLC0415 - as above
 
     known = {name for item in contract.ledger.values() for name in item.classes}
-    claims = tuple(name for name in chosen.claimed(contract) if name in known)
+    claims = tuple(name for name in chosen.claims_of(contract) if name in known)
     try:
         among = failed_before(options.out / "result.json") if options.last_failed else None
-        ids = selected(contract.ledger, claims, options.select, options.exclude, among)
+        ids = select_ids(contract.ledger, claims, options.select, options.exclude, among)
     except SelectionError as error:
         raise click.UsageError(str(error)) from error
     return Run(
@@ -375,7 +377,7 @@ def _notes(run: Run) -> tuple[str, ...]:
     ]
     operations = operations_of(run.contract) if run.contract.openapi_path else ()
     labels = [operation.label for operation in operations]
-    for pattern in CallRules.of(run).unused(operations):
+    for pattern in CallRules.of(run).unused_patterns(operations):
         near = difflib.get_close_matches(pattern, labels, 1)
         meant = f"; did you mean {near[0]!r}?" if near else "."
         notes.append(f"The pattern {pattern!r} matches no operation of the description{meant}")

@@ -63,7 +63,7 @@ def drive_options(command: _Command) -> _Command:
     return command
 
 
-def checked(options: CertifyOptions, *, named: bool) -> CertifyOptions:
+def options_for(options: CertifyOptions, *, named: bool) -> CertifyOptions:
     """Return the options of a run; with --drive it judges motion alone, at quick effort, unless options say otherwise.
 
     Args:
@@ -128,7 +128,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     try:
         operations = operations_of(judged.contract)
         plan = plan_of(operations, drive, options.read, options.calls, options.before)
-        for line in plan.told():
+        for line in plan.lines():
             click.echo(inert(line), err=True)
         if not options.yes and not click.confirm("May the robot move?", err=True):
             raise KeyboardInterrupt
@@ -142,7 +142,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         raise StatementError(f"--drive: {reason}") from reason
     try:
         finder = VelocityFinder if plan.is_velocity else PositionFinder
-        found = finder(api, binding_of(api), plan).found()
+        found = finder(api, binding_of(api), plan).find()
         api.client.close()
     except (NoAnswerError, NotPossibleError) as reason:
         raise NotShownError(str(reason)) from reason

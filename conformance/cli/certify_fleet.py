@@ -19,7 +19,7 @@ from conformance.fleet.fleet_file import TIME_LIMIT_S, FleetError, load_fleet, r
 from conformance.fleet.member_run import MemberResult, Outcome
 from conformance.target.naming import lock_result_folder
 from conformance.verdict.effort import DEEP_MINUTES
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 PARALLEL = 4
 # Options that apply to each robot of a fleet; all others belong to one robot, in the fleet file.
@@ -40,7 +40,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
     from conformance.fleet.result import ROBOTS_FOLDER, exit_code, fleet_document, write_fleet  # noqa: PLC0415
     from conformance.fleet.running import FleetRun  # noqa: PLC0415
 
-    shared = _shared()
+    shared = _shared_options()
     try:
         members = load_fleet(path, Contract.load(options.pack))
         if options.key:
@@ -64,7 +64,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
 
     def write(results: list[MemberResult], *, interrupted: bool) -> Path:
         document = fleet_document(
-            results, started=started.at, finished=started.ended, parallel=parallel, interrupted=interrupted
+            results, started=started.at, finished=started.now, parallel=parallel, interrupted=interrupted
         )
         return write_fleet(document, options.out)
 
@@ -74,7 +74,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
 
     async def judge() -> tuple[list[MemberResult], bool]:
         fleet = FleetRun(runs, parallel, None if options.progress == "none" else sys.stderr, keep)
-        return await fleet.judge(), fleet.interrupted
+        return await fleet.judge(), fleet.was_interrupted
 
     results, interrupted = asyncio.run(judge())
     try:
@@ -89,7 +89,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
     return CommandResult(exit_code(results, interrupted=interrupted), written, tell=not options.as_json)
 
 
-def _shared() -> list[str]:
+def _shared_options() -> list[str]:
     """Return the given options that apply to all robots.
 
     Raises:
@@ -117,11 +117,11 @@ def _print_summary(results: list[MemberResult]) -> None:
             click.secho(said, fg="red", nl=False)
     click.echo()
     for result in results:
-        trusted = ", ".join(result.trusted)
+        trusted = ", ".join(result.trusted_classes)
         told = f"may be trusted with {trusted}" if trusted else f"may be trusted with nothing{_because(result)}"
         click.echo(f"  {result.member.name:<{width}}  {result.outcome:<14}  {inert(told)}")
     count = sum(result.outcome is Outcome.CONFORMANT for result in results)
-    click.echo(f"\n{count} of {counted(len(results), 'robot')} conformant")
+    click.echo(f"\n{count} of {count_of(len(results), 'robot')} conformant")
 
 
 def _because(result: MemberResult) -> str:

@@ -66,7 +66,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
     if is_wsdl(source) or source == options.wsdl:
         raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
     path = _new_file(path, force=force)
-    where = options.applied(Endpoints())
+    where = options.apply(Endpoints())
     if options.ros and (problem := lacking_ros("proposing a ROS map")):
         raise click.UsageError(problem)
     api = Api(overlays=options.overlays, base_url=options.base_url or where.rest)

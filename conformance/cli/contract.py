@@ -14,7 +14,7 @@ from conformance.contract.classes import Level
 from conformance.contract.ledger import Requirement
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 #: ``--contract``, as the parameter ``pack``.
 contract_option = click.option(
@@ -26,7 +26,7 @@ contract_option = click.option(
 )
 
 
-def loaded(pack: str) -> Contract:
+def load_pack(pack: str) -> Contract:
     """Return a contract pack.
 
     Raises:
@@ -50,7 +50,7 @@ def contract() -> None:
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for other programs.")
 def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) -> None:
     """List the requirements: id, level, text, source and origin."""
-    contract = loaded(pack)
+    contract = load_pack(pack)
     if class_ not in {None, *contract.classes}:
         raise click.UsageError(f"--class {class_!r}: {contract.name} has {', '.join(contract.classes)}")
     found = [
@@ -61,7 +61,7 @@ def list_(pack: str, class_: str | None, level: str | None, *, as_json: bool) ->
         return
     for item in found:
         click.echo(f"{item.id}\n    {item.level}: {item.text} [{item.origin}: {item.source}]")
-    click.echo(f"{counted(len(found), 'requirement')} of contract {contract.label}", err=True)
+    click.echo(f"{count_of(len(found), 'requirement')} of contract {contract.label}", err=True)
 
 
 def _as_json(requirement: Requirement) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def _as_json(requirement: Requirement) -> dict[str, Any]:
 @click.option("--force", is_flag=True, help="Overwrite files that are there.")
 def export(directory: Path, pack: str, *, force: bool) -> None:
     """Write the contract's files to DIR: its text, OpenAPI, WSDLs and XSDs, WADL and the ledger."""
-    contract = loaded(pack)
+    contract = load_pack(pack)
     there = [path.name for path in contract.files if (directory / path.name).exists()]
     if there and not force:
         raise click.UsageError(f"{directory / there[0]} exists already; --force overwrites it")
@@ -86,7 +86,7 @@ def export(directory: Path, pack: str, *, force: bool) -> None:
             shutil.copyfile(path, directory / path.name)
     except OSError as error:
         raise click.UsageError(f"the contract cannot be written to {directory}: {error}") from error
-    click.echo(f"wrote {counted(len(contract.files), 'file')} of contract {contract.label} to {directory}")
+    click.echo(f"wrote {count_of(len(contract.files), 'file')} of contract {contract.label} to {directory}")
 
 
 @contract.command()
@@ -98,7 +98,7 @@ def coverage(door: Any, /, pack: str, out: Path | None) -> None:
 
     Exit code 1 when ledger, checks and mutants disagree.
     """
-    contract = loaded(pack)
+    contract = load_pack(pack)
     try:
         text, problems = door.coverage(contract)
     except ContractError as error:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from conformance.cli.contract import contract_option, loaded
-from conformance.cli.explanation import UnknownRequirementError, found, known, page_of
+from conformance.cli.contract import contract_option, load_pack
+from conformance.cli.explanation import UnknownRequirementError, find, ledger_of, page_of
 from conformance.contract.classes import QUESTIONS, Topic
 from conformance.contract.generic import generic_classes
 from conformance.contract.locating import ContractError
@@ -28,7 +28,7 @@ _SHOWN_MUTANTS = 8
 
 def _ids(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     return [
-        CompletionItem(id_, help=item.text) for id_, item in known(Contract.load()).items() if id_.startswith(begun)
+        CompletionItem(id_, help=item.text) for id_, item in ledger_of(Contract.load()).items() if id_.startswith(begun)
     ]
 
 
@@ -48,16 +48,16 @@ def explain(door: Any, /, requirement: str | None, pack: str, frameworks: tuple[
 
     REQUIREMENT is an id such as http/head. Without it, the command lists all requirements.
     """
-    contract = loaded(pack)
+    contract = load_pack(pack)
     if requirement is None:
         _list(contract)
         return
     try:
-        item = found(contract, requirement)
+        item = find(contract, requirement)
         # Imported here: it imports every check.
-        from conformance.cli.explanation import explained  # noqa: PLC0415
+        from conformance.cli.explanation import explanation_of  # noqa: PLC0415
 
-        explanation = explained(contract, item, door.mutants_of(contract))
+        explanation = explanation_of(contract, item, door.mutants_of(contract))
     except (UnknownRequirementError, ContractError) as error:
         raise click.UsageError(str(error)) from error
     if requirement != item.id:
@@ -67,7 +67,7 @@ def explain(door: Any, /, requirement: str | None, pack: str, frameworks: tuple[
 
 
 def _list(contract: Contract) -> None:
-    ledger = known(contract)
+    ledger = ledger_of(contract)
     topics = {id_: _topic(item) for id_, item in ledger.items()}
     width = max(map(len, ledger)) + 2
     for topic, question in QUESTIONS.items():
@@ -84,13 +84,13 @@ def _topic(item: Requirement) -> Topic:
 
 def _lines(explanation: Explanation, contract: Contract, frameworks: Iterable[str]) -> Iterator[str]:
     item = explanation.requirement
-    yield from (f"{item.id} ({item.level}, class {item.class_})", *_wrapped(item.text))
+    yield from (f"{item.id} ({item.level}, class {item.class_})", *_wrap(item.text))
     if explanation.why:
-        yield from ("", "Why it matters", *_wrapped(explanation.why))
+        yield from ("", "Why it matters", *_wrap(explanation.why))
     yield from ("", "Source", *_sources(explanation, contract))
     yield from ("", "How it is judged", *_judging(explanation))
     if explanation.topic:
-        yield from ("", f"How to fix it ({explanation.topic.title})", *_wrapped(explanation.topic.fix))
+        yield from ("", f"How to fix it ({explanation.topic.title})", *_wrap(explanation.topic.fix))
         for name in frameworks:
             if name in explanation.topic.code:
                 yield from ("", f"  {FRAMEWORKS[name][0]}:")
@@ -102,9 +102,9 @@ def _sources(explanation: Explanation, contract: Contract) -> Iterator[str]:
     for source in explanation.sources:
         section = contract.cited_sections.get(source.name.partition("#")[2])
         title = f"the contract, section “{section.title}”" if section else source.title
-        yield from _wrapped(f"{source.name}: {title}" if title else source.name)
+        yield from _wrap(f"{source.name}: {title}" if title else source.name)
         for clause, meaning in source.meanings.items():
-            yield from _wrapped(f"{clause}: {meaning}", "    ")
+            yield from _wrap(f"{clause}: {meaning}", "    ")
 
 
 def _judging(explanation: Explanation) -> Iterator[str]:
@@ -112,19 +112,19 @@ def _judging(explanation: Explanation) -> Iterator[str]:
 
     item = explanation.requirement
     if item.untestable:
-        yield from _wrapped(f"Not from outside: {item.untestable}")
+        yield from _wrap(f"Not from outside: {item.untestable}")
     for check in explanation.checks:
         does = " ".join(filter(None, (check.does, *(f"On the trace of: {text}" for text in check.scenarios))))
-        yield from _wrapped(f"{check.name}: {does}")
+        yield from _wrap(f"{check.name}: {does}")
     if item.needs:
-        yield from _wrapped(f"The run needs {'; '.join(NEEDS[need] for need in item.needs)}.")
-    yield from _wrapped(EFFORTS)
+        yield from _wrap(f"The run needs {'; '.join(NEEDS[need] for need in item.needs)}.")
+    yield from _wrap(EFFORTS)
     mutants = [f"{mutant.name} ({mutant.says})" for mutant in explanation.mutants[:_SHOWN_MUTANTS]]
     if mutants:
-        yield from _wrapped(f"Faulty devices that it must fail for, among others: {'; '.join(mutants)}")
+        yield from _wrap(f"Faulty devices that it must fail for, among others: {'; '.join(mutants)}")
 
 
-def _wrapped(text: str, indent: str = "  ") -> list[str]:
+def _wrap(text: str, indent: str = "  ") -> list[str]:
     return textwrap.wrap(text, _width(), initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from conformance.contract.classes import Prerequisite
 from conformance.contract.generic import generic_ledger
-from conformance.contract.ledger import Requirement, renamed
+from conformance.contract.ledger import Requirement, ids_by_alias
 from conformance.contract.pack import Contract
 from conformance.engine.collected_checks import Check, checks_of
 from conformance.explaining.advice import Source, Topic, sources_of, topic_of
@@ -53,7 +53,7 @@ class Explanation:
         return " ".join(filter(None, (self.requirement.breaks, self.topic.why if self.topic else None)))
 
 
-def explained(contract: Contract, requirement: Requirement, mutants: Iterable[Any] = ()) -> Explanation:
+def explanation_of(contract: Contract, requirement: Requirement, mutants: Iterable[Any] = ()) -> Explanation:
     """Return the explanation of a requirement, with those of a pack's mutants that it must kill.
 
     Raises:
@@ -75,7 +75,7 @@ class UnknownRequirementError(ValueError):
     """Raised for an id that no ledger has; the message names it and ids that look alike."""
 
 
-def known(contract: Contract) -> dict[str, Requirement]:
+def ledger_of(contract: Contract) -> dict[str, Requirement]:
     """Return the requirements of a pack and those that bind any web API, by id."""
     return {**generic_ledger(), **contract.ledger}
 
@@ -85,14 +85,14 @@ def page_of(id_: str) -> str:
     return f"requirements/{id_}"
 
 
-def found(contract: Contract, id_: str) -> Requirement:
+def find(contract: Contract, id_: str) -> Requirement:
     """Return the requirement with an id, or with an id that it had before.
 
     Raises:
         UnknownRequirementError: no ledger has it.
     """
-    ledger = known(contract)
-    aliases = renamed(ledger)
+    ledger = ledger_of(contract)
+    aliases = ids_by_alias(ledger)
     requirement = ledger.get(aliases.get(id_, id_))
     if requirement is None:
         names = [*ledger, *aliases]

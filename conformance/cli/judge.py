@@ -12,7 +12,7 @@ from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.engine.stored_result import MALFORMED, StoredResultError, not_well_made, read_result
 from conformance.statement.statement import StatementError, empty_statement, load_statement
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
     from conformance.engine.judge_stored import Judged
@@ -49,7 +49,7 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
     folder = result if result.is_dir() else result.parent
     try:
         document = read_result(result / "result.json" if result.is_dir() else result)
-        judged = _judged(document, folder, statement_file, pack, claimed=requirement is None)
+        judged = _judge_folder(document, folder, statement_file, pack, claimed=requirement is None)
     except (StoredResultError, StatementError) as error:
         raise click.UsageError(str(error)) from error
     except MALFORMED as error:
@@ -60,7 +60,7 @@ def judge(result: Path, requirement: str | None, statement_file: Path | None, pa
     for one in chosen:
         then = str(before.get(one.requirement.id, {}).get("verdict", "not judged"))
         if requirement or one.value in _BROKEN or then in _BROKEN:
-            click.echo(f"{one.value}: {one.requirement.id} ({counted(one.evidence.cases, 'case')}{_then(one, then)})")
+            click.echo(f"{one.value}: {one.requirement.id} ({count_of(one.evidence.cases, 'case')}{_then(one, then)})")
             for finding in one.evidence.findings.values():
                 click.echo(f"  {inert(finding.text)}")
     click.echo(_summary(judged, chosen))
@@ -82,16 +82,16 @@ def _then(one: "Verdict", then: str) -> str:
 
 
 def _summary(judged: "Judged", chosen: tuple["Verdict", ...]) -> str:
-    told = f"{counted(judged.requests, 'request')} in the history{'' if judged.ended else ', which was cut short'}"
+    told = f"{count_of(judged.requests, 'request')} in the history{'' if judged.ended else ', which was cut short'}"
     if not chosen:
         return f"nothing judged: {told}, and none of them and no trace shows it"
     values = Counter(str(verdict.value) for verdict in chosen)
     cases = sum(verdict.evidence.cases for verdict in chosen)
     kinds = ", ".join(f"{number} {value}" for value, number in sorted(values.items()))
-    return f"{kinds}, of {counted(len(chosen), 'requirement')} that this run shows ({counted(cases, 'case')}; {told})"
+    return f"{kinds}, of {count_of(len(chosen), 'requirement')} that this run shows ({count_of(cases, 'case')}; {told})"
 
 
-def _judged(
+def _judge_folder(
     document: dict[str, Any], folder: Path, statement_file: Path | None, pack: str | None, *, claimed: bool
 ) -> "Judged":
     """Judge the records in a folder, or only those for the classes that the run claimed.

@@ -22,7 +22,7 @@ from conformance.contract.pack import Contract
 from conformance.engine.stored_result import MALFORMED, StoredResultError, findings, not_well_made, read_result
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement, StatementError, api_of, load_statement
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
     from conformance.transport.client import Connection
@@ -134,7 +134,7 @@ def replay(  # noqa: C901 - one branch for each way to judge
         now = f"now {one.came}" if one.came else ""
         if one.sent:
             judged = f" (judged {one.told_by})" if one.told_by else ""
-            now += f", after {counted(one.sent, 'request')}{judged}"
+            now += f", after {count_of(one.sent, 'request')}{judged}"
         told = ". ".join(filter(None, (one.why, now, f"In the run: {one.message}")))
         click.echo(f"{one.outcome}: {inert(one.requirement)}: {inert(told)}")
     if acting:
@@ -178,7 +178,7 @@ def _judge_again(
         is_described = bool(api.openapi or api.wsdl)
         contract = contract_of(document, pack, folder) if pack or not is_described else None
         if contract is None and is_described:
-            statement, contract = _described(statement_file, given)
+            statement, contract = _describe(statement_file, given)
         elif contract is None:
             raise click.UsageError("the result is by a contract that is not at hand: name its pack with --contract")
         else:
@@ -199,7 +199,7 @@ def _judge_again(
     for item in judged["requirements"]:
         is_cut = item["verdict"] == "pass" and item["id"] in cut
         word = "not judged" if is_cut else _WORDS.get(item["verdict"], "not judged")
-        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({counted(item['cases'], 'case')})")
+        click.echo(f"{word}: {item['id']}: {inert(item['reason']) or 'passed'} ({count_of(item['cases'], 'case')})")
     verdicts = {item["verdict"] for item in judged["requirements"]}
     if verdicts & {"fail", "warn"}:
         return CommandResult(ExitCode.FAILED)
@@ -207,7 +207,7 @@ def _judge_again(
     return CommandResult(ExitCode.PASSED if gone else ExitCode.INCONCLUSIVE)
 
 
-def _described(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, Contract]:
+def _describe(statement_file: Path, given: dict[str, Any]) -> tuple[Statement, Contract]:
     """Return a statement, and the contract of its [api] description in its present form.
 
     Raises:

@@ -16,7 +16,7 @@ class SelectionError(ValueError):
     """Raised for a selection that selects nothing; the message names the pattern."""
 
 
-def selected(
+def select_ids(
     ledger: Mapping[str, Requirement],
     claims: Container[str],
     select: Iterable[str] = (),

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import columns, inert, wrapped
+from conformance.commandline.help_pages import columns, inert, wrap
 from conformance.contract.classes import QUESTIONS
-from conformance.verdict.finding import counted, listed
+from conformance.verdict.finding import count_of, few_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,7 +48,7 @@ def print_summary(outcome: Certification) -> None:
         mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
         # On a narrow terminal the reason gets lines of its own.
         below = (columns() or _WIDE) < _WIDE and reason
-        told = wrapped(inert(reason[:300]), " " * (_NARROW if below else _REASON))
+        told = wrap(inert(reason[:300]), " " * (_NARROW if below else _REASON))
         click.echo(
             f"  {name + view:<30} {mark}{blanks}{chr(10) if below else ''}{told if below else told.lstrip()}".rstrip()
         )
@@ -68,7 +68,7 @@ def print_summary(outcome: Certification) -> None:
                 _print_line(cause, requirement)
     _print_unjudged(document)
     if "web_server" in document:
-        click.echo(f"\nThe web server\n{wrapped(inert(document['web_server']['text']), '  ')}")
+        click.echo(f"\nThe web server\n{wrap(inert(document['web_server']['text']), '  ')}")
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
@@ -86,7 +86,7 @@ def print_summary(outcome: Certification) -> None:
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
     click.echo(
         f"\n{document['verdict_line']}{accepted}: {told}; "
-        f"{counted(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
+        f"{count_of(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
 
 
@@ -114,11 +114,11 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
     if faults:
         count = len({id_ for fault in faults for id_ in fault["requirements"]})
-        click.echo(f"\n{counted(count, 'requirement')} could not be judged because of an error in the suite:")
+        click.echo(f"\n{count_of(count, 'requirement')} could not be judged because of an error in the suite:")
     for fault in faults:
         click.echo(f"  {inert(fault['text'])}")
     if "left_out" in document:
-        click.echo(f"\nNot everything was tried\n{wrapped(inert(document['left_out']['text']), '  ')}")
+        click.echo(f"\nNot everything was tried\n{wrap(inert(document['left_out']['text']), '  ')}")
 
 
 def _print_unshown(rows: list[dict[str, Any]]) -> None:
@@ -127,10 +127,10 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
     if not unshown:
         return
     pronoun = "it" if len(unshown) == 1 else "them"
-    click.echo(f"\n{counted(len(unshown), 'operation')} never answered 2xx, so little of {pronoun} was judged:")
+    click.echo(f"\n{count_of(len(unshown), 'operation')} never answered 2xx, so little of {pronoun} was judged:")
     for row in unshown:
         statuses = (
-            ", ".join(f"{counted(count, 'time')} {code}" for code, count in row["statuses"].items()) or "no response"
+            ", ".join(f"{count_of(count, 'time')} {code}" for code, count in row["statuses"].items()) or "no response"
         )
         need = f"; needs {row['needs']}" if "needs" in row else ""
         click.echo(f"  {inert(row['operation'])}: {statuses}{need}")
@@ -155,7 +155,7 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
     said = f"{failure['subject']}: {failure['observed']}"
     said = said if len(said) <= _LINE else f"{said[:_LINE]}…"
     others = len(failure.get("operations", ())) - 1
-    more = f" … and {counted(others, 'more operation')}" if others > 0 else ""
+    more = f" … and {count_of(others, 'more operation')}" if others > 0 else ""
     click.echo(f"{cause['number']}. {requirement['verdict'].upper()} {requirement['id']}: {inert(said)}{more}")
 
 
@@ -163,13 +163,13 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
     """Print a finding, and the requirements that could not be tested because of it."""
     head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}")
-    click.echo(wrapped(requirement["text"], "  "))
-    click.echo(wrapped(inert(cause["text"]), "  "))
+    click.echo(wrap(requirement["text"], "  "))
+    click.echo(wrap(inert(cause["text"]), "  "))
     if "breaks" in requirement:
-        click.echo(wrapped(f"what breaks in practice: {requirement['breaks']}", "  "))
+        click.echo(wrap(f"what breaks in practice: {requirement['breaks']}", "  "))
     blocks = cause["blocks"]
     if blocks:
-        click.echo(f"  not tested because of it: {listed(blocks, _SHOWN_BLOCKED)}")
+        click.echo(f"  not tested because of it: {few_of(blocks, _SHOWN_BLOCKED)}")
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     if failure["request"]:
         click.echo(f"  replay: {inert(_command(failure['request']['curl'], cause['number'], folder))}")

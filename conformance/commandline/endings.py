@@ -38,7 +38,7 @@ def end_like_ctrl_c() -> None:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def ignore_signals() -> Iterator[None]:
     """Ignore signals during a block of bounded time, in which the robot is being stopped."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -92,6 +92,6 @@ class Started:
         self.at, self._began = dt.datetime.now(dt.UTC), time.monotonic()
 
     @property
-    def ended(self) -> dt.datetime:
+    def now(self) -> dt.datetime:
         """Return the present time, if the clock was right at the start."""
         return self.at + dt.timedelta(seconds=time.monotonic() - self._began)

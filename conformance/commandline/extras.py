@@ -21,7 +21,7 @@ def lacking(extra: str, user: str) -> str | None:
         user: what needs it, the subject of the sentence, such as "'roaas load'".
     """
     missing = next((name for name in EXTRAS[extra] if find_spec(name) is None), None)
-    return _told(user, missing, extra) if missing else None
+    return _missing_text(user, missing, extra) if missing else None
 
 
 def lacking_soap(interfaces: Iterable[str], user: str = "judging a SOAP service") -> str | None:
@@ -33,15 +33,15 @@ def lacking_ros(user: str) -> str | None:
     """Return the same where ROS is needed, which PyPI has for Linux on x86-64, and every system's packages."""
     if find_spec(_ROS) is not None:
         return None
-    return f"{_told(user, _ROS, 'ros')} (Linux x86-64), or source the setup.bash of a ROS 2 that is there"
+    return f"{_missing_text(user, _ROS, 'ros')} (Linux x86-64), or source the setup.bash of a ROS 2 that is there"
 
 
-def told(module: str | None, user: str) -> str | None:
+def missing_extra(module: str | None, user: str) -> str | None:
     """Return the message to a user about a module that could not be imported; None if no extra contains it."""
     top = (module or "").partition(".")[0]
     extra = next((extra for extra, modules in EXTRAS.items() if top in modules), None)
-    return _told(user, top, extra) if extra else None
+    return _missing_text(user, top, extra) if extra else None
 
 
-def _told(user: str, module: str, extra: str) -> str:
+def _missing_text(user: str, module: str, extra: str) -> str:
     return f"{user} needs the Python module {module!r}, which is not installed: pip install 'roaas[{extra}]'"

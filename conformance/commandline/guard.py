@@ -106,13 +106,13 @@ def report_failure(error: Exception) -> ExitCode:
         return ExitCode.INCONCLUSIVE
     text = inert(f"{type(error).__name__}: {error}")[:_SHOWN]
     click.echo(
-        f"error: the suite itself failed, and says nothing of the device: {text}. Please report this{_kept(error)}.",
+        f"error: the suite itself failed, and says nothing of the device: {text}. Please report this{_keep(error)}.",
         err=True,
     )
     return ExitCode.INCONCLUSIVE
 
 
-def _kept(error: Exception) -> str:
+def _keep(error: Exception) -> str:
     """Write the traceback to a file; return where it is, as the end of a sentence, or an empty text."""
     try:
         descriptor, path = tempfile.mkstemp(prefix="roaas-error-", suffix=".txt")

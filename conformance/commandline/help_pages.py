@@ -133,7 +133,7 @@ def columns() -> int | None:
     return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
 
 
-def wrapped(text: str, indent: str = "") -> str:
+def wrap(text: str, indent: str = "") -> str:
     """Return a text whose lines are as wide as the terminal.
 
     Args:

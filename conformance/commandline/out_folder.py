@@ -28,7 +28,7 @@ class FolderError(Exception):
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
+def hold(folder: Path) -> Iterator[None]:
     """Make a folder for results, and lock it against other runs before anything is sent.
 
     A run that is killed leaves its lock, which the next run takes over. On Windows there is no lock.
@@ -39,7 +39,7 @@ def held(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
-        descriptor = _locked(folder / LOCK_NAME)
+        descriptor = _lock(folder / LOCK_NAME)
     except OSError as error:
         raise FolderError(f"nothing can be written to this folder: {error.strerror or error}") from error
     try:
@@ -71,7 +71,7 @@ def _try_to_write(folder: Path) -> None:
         draft.unlink(missing_ok=True)
 
 
-def _locked(path: Path) -> int:
+def _lock(path: Path) -> int:
     """Return the descriptor of a locked file, which contains the owner's name.
 
     The lock ends with the process, however that ends.
@@ -145,7 +145,7 @@ def write_atomically(path: Path, text: str) -> Path:
     Raises:
         OSError: the file cannot be written; the old content is kept, and no temporary file remains.
     """
-    return _written(path, SECRETS.masked(text))
+    return _write(path, SECRETS.masked(text))
 
 
 def write_json(path: Path, value: Any, **options: Any) -> Path:
@@ -159,10 +159,10 @@ def write_json(path: Path, value: Any, **options: Any) -> Path:
     Raises:
         OSError: as above.
     """
-    return _written(path, json.dumps(SECRETS.masked_json(value), **options) + "\n")
+    return _write(path, json.dumps(SECRETS.masked_json(value), **options) + "\n")
 
 
-def _written(path: Path, text: str) -> Path:
+def _write(path: Path, text: str) -> Path:
     return write_octets(path, text.encode())
 
 

@@ -196,17 +196,17 @@ class Secrets:
 
     def masked_json(self, value: Any) -> Any:
         """Return JSON, which may have bytes in it, with variables in place of the secrets in texts, names and bytes."""
-        return self._walked(value) if self._known else value
+        return self._mask(value) if self._known else value
 
-    def _walked(self, value: Any) -> Any:
+    def _mask(self, value: Any) -> Any:
         if isinstance(value, str):
             return self.masked(value)
         if isinstance(value, bytes):
             return self.masked_bytes(value)
         if isinstance(value, dict):
-            return {self._walked(key): _without_cookie(key, self._walked(item)) for key, item in value.items()}
+            return {self._mask(key): _without_cookie(key, self._mask(item)) for key, item in value.items()}
         if isinstance(value, list | tuple):
-            items = [self._walked(item) for item in value]
+            items = [self._mask(item) for item in value]
             return [items[0], _without_cookie(*items)] if len(items) == 2 else items  # noqa: PLR2004 - name and value
         return value
 
@@ -217,7 +217,7 @@ class Secrets:
             lowered = "".join(small if len(small := char.lower()) == 1 else char for char in text)
         for forms, where in ((self._folded, lowered), (self._exact, text), (self._dumps, lowered)):
             for form in (form for form in forms if form.beginning in where):
-                yield from _found(form, where)
+                yield from _find(form, where)
         for cut in _ELLIPSIS.finditer(lowered):
             end = cut.start()
             for form, length in self._cuts.get(lowered[max(0, end - _SHORTEST_CUT) : end], ()):
@@ -225,7 +225,7 @@ class Secrets:
                     yield end - length, end, form.variable
                     break
         for unit in (_UNITS if depth == 0 else _UNITS[:1]) if depth < _DEPTH else ():
-            plain, places = _unescaped(unit, text)
+            plain, places = _unescape(unit, text)
             for begin, end, variable in self._spans(plain, depth + 1) if places else ():
                 yield _outer(begin, places)[0], _outer(end - 1, places)[1], variable
 
@@ -271,7 +271,7 @@ def _with(before: tuple[_Form, ...], forms: set[str], variable: str) -> tuple[_F
     return tuple(sorted({*before, *made}, key=lambda form: -len(form.whole)))
 
 
-def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
+def _find(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
     """Yield where a text has a form of a secret, or its beginning before a cut."""
     begin = text.find(form.beginning)
     while begin >= 0:
@@ -284,7 +284,7 @@ def _found(form: _Form, text: str) -> Iterator[tuple[int, int, str]]:
         begin = text.find(form.beginning, end)
 
 
-def _decoded(unit: re.Match[str]) -> str:
+def _decode(unit: re.Match[str]) -> str:
     """Return the character that an escape stands for."""
     kind, digits = unit.lastgroup, unit[unit.lastgroup] if unit.lastgroup else ""
     if kind is None:
@@ -298,11 +298,11 @@ def _decoded(unit: re.Match[str]) -> str:
     return chr(int(digits, {"decimal": 10, "octal": 8}.get(kind, 16)))
 
 
-def _unescaped(unit: re.Pattern[str], text: str) -> tuple[str, list[tuple[int, int, int, int]]]:
+def _unescape(unit: re.Pattern[str], text: str) -> tuple[str, list[tuple[int, int, int, int]]]:
     """Return a text without its escapes, and their places: begin and end in it, begin and end in the escaped text."""
     parts, places, last, at = list[str](), list[tuple[int, int, int, int]](), 0, 0
     for found in unit.finditer(text):
-        (begin, end), char = found.span(), _decoded(found)
+        (begin, end), char = found.span(), _decode(found)
         at += begin - last
         parts += (text[last:begin], char)
         places.append((at, at + len(char), begin, end))

@@ -67,7 +67,7 @@ def _json(text: str) -> Any:
     if sum(map(text.count, _MARKS_OF_VALUES)) > 4 * _MOST_NODES:
         raise ValueError(f"it holds more than {_MOST_NODES:,} values")
     try:
-        value = json.loads(text, parse_constant=_refused, parse_float=_real, parse_int=_whole)
+        value = json.loads(text, parse_constant=_refuse, parse_float=_real, parse_int=_whole)
     except RecursionError as error:
         raise ValueError(f"it is nested too deeply; the limit is {_DEEPEST} levels") from error
     # Each entry: a value, and the values that contain it, innermost first.
@@ -97,7 +97,7 @@ def _pointer(trail: Any) -> str:
     return "#/" + "/".join(names[: -_SHOWN - 1 : -1])
 
 
-def _refused(name: str) -> float:
+def _refuse(name: str) -> float:
     raise json.JSONDecodeError(f"{name} is no number of JSON", name, 0)
 
 
@@ -173,7 +173,7 @@ class _Reader:
                 raise ValueError(f"the alias *{event.anchor} of nothing, or of what holds it, at line {self._line}")
             value, nodes, octets = self._anchors[event.anchor]
             self._count(nodes, octets, depth)
-            return _copied(value)
+            return _copy(value)
         is_scalar = isinstance(event, yaml.ScalarEvent)
         self._count(1, len(event.value) if is_scalar else 0, depth)
         if event.anchor is not None:
@@ -264,10 +264,10 @@ def _tag_of(event: Any) -> str:
     return _PLAIN if event.implicit[0] else _TAG + "str"
 
 
-def _copied(value: Any) -> Any:
+def _copy(value: Any) -> Any:
     if isinstance(value, list):
-        return [_copied(item) for item in value]
-    return {key: _copied(item) for key, item in value.items()} if isinstance(value, dict) else value
+        return [_copy(item) for item in value]
+    return {key: _copy(item) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def _scalar(tag: str, text: str) -> Any:

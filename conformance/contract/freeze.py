@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.contract.requirement_sets import frozen, set_folder
+from conformance.contract.requirement_sets import frozen_form, set_folder
 
 
 def freeze(name: str, pack: str | Path = DEFAULT_PACK) -> None:
@@ -12,7 +12,7 @@ def freeze(name: str, pack: str | Path = DEFAULT_PACK) -> None:
     contract = Contract.load(pack)
     lines = [f"# The requirements of set {name}: level, and SHA-256 of the text. Frozen: written once, by freeze.py."]
     for id_, requirement in sorted(contract.ledger.items()):
-        item = frozen(requirement)
+        item = frozen_form(requirement)
         lines.append(f'requirements."{id_}" = {{ level = "{item.level}", text = "{item.text}" }}')
     set_folder(contract).mkdir(exist_ok=True)
     (set_folder(contract) / f"{name}.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -90,7 +90,7 @@ def expanded(ids: Iterable[str], ledger: Iterable[str]) -> tuple[str, ...]:
     )
 
 
-def renamed(ledger: Mapping[str, Requirement]) -> dict[str, str]:
+def ids_by_alias(ledger: Mapping[str, Requirement]) -> dict[str, str]:
     """Return the id that a requirement has now by each of its aliases."""
     return {alias: item.id for item in ledger.values() for alias in item.aliases}
 
@@ -102,7 +102,7 @@ def twins(ledger: Mapping[str, Requirement]) -> dict[str, str]:
 
 def classes_of(ledger: Mapping[str, Requirement], ids: Iterable[str]) -> tuple[str, ...]:
     """Return the conformance classes of some requirements, by their ids or aliases, which need not begin with them."""
-    names = renamed(ledger)
+    names = ids_by_alias(ledger)
     return tuple(dict.fromkeys(ledger[names.get(id_, id_)].class_ for id_ in ids))
 
 

@@ -24,7 +24,7 @@ from conformance.contract.classes import FULL, ConformanceClass, Interface, Topi
 from conformance.contract.described import DOCUMENT_NAME, ORIGINAL_NAME, UNRESOLVED_NAME
 from conformance.contract.document_text import parsed
 from conformance.contract.generic import LEDGER, ClassEntry, generic_classes, generic_ledger
-from conformance.contract.ledger import LedgerError, Requirement, load_ledger, renamed
+from conformance.contract.ledger import LedgerError, Requirement, ids_by_alias, load_ledger
 from conformance.contract.locating import GENERIC_RULES, MANIFEST, ContractError, folder_of, module_of
 from conformance.contract.toml_file import Text, read_toml
 
@@ -233,7 +233,7 @@ class Contract:
         return found
 
     @cached_property
-    def unresolved(self) -> tuple[str, ...]:
+    def dead_references(self) -> tuple[str, ...]:
         """The references of the description to other files that lead nowhere."""
         path = self.directory / UNRESOLVED_NAME
         return tuple(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else ()
@@ -245,24 +245,24 @@ class Contract:
         Raises:
             ContractError: a ledger cannot be read, an id occurs twice, or one of ``only`` is unknown.
         """
-        return {id_: item for id_, item in self._whole_ledger.items() if not self.only or id_ in self._chosen}
+        return {id_: item for id_, item in self._whole_ledger.items() if not self.only or id_ in self._only_ids}
 
     def demands(self, id_: str) -> bool:
         """Return whether the contract has a requirement, even if ``only`` leaves it out."""
         return id_ in self._whole_ledger
 
     @cached_property
-    def renamed(self) -> dict[str, str]:
+    def ids_by_alias(self) -> dict[str, str]:
         """The present id of a requirement by each of its aliases."""
-        return renamed(self._whole_ledger)
+        return ids_by_alias(self._whole_ledger)
 
     def requirement(self, id_: str) -> Requirement | None:
         """Return the requirement with an id or an alias, or None."""
-        return self.ledger.get(self.renamed.get(id_, id_))
+        return self.ledger.get(self.ids_by_alias.get(id_, id_))
 
     @property
-    def _chosen(self) -> frozenset[str]:
-        chosen = frozenset(self.renamed.get(id_, id_) for id_ in self.only)
+    def _only_ids(self) -> frozenset[str]:
+        chosen = frozenset(self.ids_by_alias.get(id_, id_) for id_ in self.only)
         if unknown := chosen - set(self._whole_ledger):
             raise ContractError(f"{self.name} has no requirement {min(unknown)!r}")
         return chosen
@@ -286,7 +286,7 @@ class Contract:
                 raise ContractError(str(error)) from error
         if twice := sorted(set(own) & set(generic)):
             raise ContractError(f"{path}: {twice[0]} is a requirement of the generic suite already")
-        both = [self._placed(item) for item in {**generic, **own}.values()]
+        both = [self._place(item) for item in {**generic, **own}.values()]
         names = [name for item in both for name in (item.id, *item.aliases)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ContractError(f"{path}: {twice[0]} names two requirements")
@@ -303,7 +303,7 @@ class Contract:
         ]
         return tuple(dict.fromkeys(name for name in homes if name in self.classes))
 
-    def _placed(self, item: Requirement) -> Requirement:
+    def _place(self, item: Requirement) -> Requirement:
         """Return a requirement in those classes of the pack that have it, with its topic."""
         own, *also = self._classes_of(item)
         return replace(item, class_=own, also=tuple(also), topic=item.topic or self.classes[own].topic)

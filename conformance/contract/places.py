@@ -36,14 +36,14 @@ def places(
     """
     own, generic = contract.directory / LEDGER, GENERIC_RULES / LEDGER
     return {
-        "statement": None if statement is None else {"file": _shown(statement), **_claim_lines(_text(statement))},
+        "statement": None if statement is None else {"file": _short_path(statement), **_claim_lines(_text(statement))},
         "ledger": _ledger(own if own.is_file() else generic, contract),
         "generic_ledger": _ledger(generic, contract),
-        **({} if description is None else {"description": _described(description, labels)}),
+        **({} if description is None else {"description": _lines_of(description, labels)}),
     }
 
 
-def _described(path: Path, labels: Iterable[str]) -> dict[str, Any]:
+def _lines_of(path: Path, labels: Iterable[str]) -> dict[str, Any]:
     """Return the line of each operation in a description, as JSON or YAML writes its keys on lines of their own."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -57,12 +57,12 @@ def _described(path: Path, labels: Iterable[str]) -> dict[str, Any]:
             place = key
         elif place and key in _METHODS:
             at.setdefault(f"{key.upper()} {place}", number)
-    return {"file": _shown(path), "lines": {label: at[label] for label in labels if label in at}}
+    return {"file": _short_path(path), "lines": {label: at[label] for label in labels if label in at}}
 
 
 def _ledger(path: Path, contract: Contract) -> dict[str, Any]:
     lines = {id_: line for id_, line in _ledger_lines(_text(path)).items() if id_ in contract.ledger}
-    return {"file": _shown(path), "lines": lines}
+    return {"file": _short_path(path), "lines": lines}
 
 
 def _ledger_lines(text: str) -> dict[str, int]:
@@ -88,7 +88,7 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def _shown(path: Path) -> str:
+def _short_path(path: Path) -> str:
     """Return a path relative to the working directory; of a file elsewhere, only folder and name."""
     try:
         return path.resolve().relative_to(Path.cwd()).as_posix()

@@ -58,7 +58,7 @@ class RequirementSet:
         return _digest("".join(f"{id_} {item.level} {item.text}\n" for id_, item in sorted(self.frozen_as.items())))
 
     @property
-    def told(self) -> dict[str, str]:
+    def facts(self) -> dict[str, str]:
         """Return name and digest, for a result."""
         return {"name": self.name, "digest": self.digest}
 
@@ -83,18 +83,18 @@ def load_set(contract: Contract, name: str) -> RequirementSet:
         there = ", ".join(names(contract)) or "none"
         raise RequirementSetError(f"{contract.name} has no set of requirements {name!r}; there are {there}")
     path = set_folder(contract) / f"{name}.toml"
-    return RequirementSet(name, read_toml(path, _File, RequirementSetError).requirements, contract.renamed)
+    return RequirementSet(name, read_toml(path, _File, RequirementSetError).requirements, contract.ids_by_alias)
 
 
 def current(contract: Contract, ledger: Mapping[str, Requirement]) -> RequirementSet:
     """Return a ledger as a set, with the name of the frozen set of the same content if there is one."""
-    requirements = {id_: frozen(item) for id_, item in ledger.items()}
+    requirements = {id_: frozen_form(item) for id_, item in ledger.items()}
     sets = (load_set(contract, name) for name in names(contract))
     same = next((set_ for set_ in sets if set_.requirements == requirements), None)
     return same or RequirementSet(_UNFROZEN, requirements)
 
 
-def frozen(requirement: Requirement) -> Frozen:
+def frozen_form(requirement: Requirement) -> Frozen:
     """Return a requirement in its form in a frozen set: level and digest of the text."""
     return Frozen(requirement.level, _digest(requirement.text))
 

@@ -73,7 +73,7 @@ def fit(table: dict[str, Any], shape: type[_Shape], where: str, error: type[Toml
     try:
         return msgspec.convert(table, shape, builtin_types=_DATES)
     except msgspec.ValidationError as problem:
-        raise error(f"{where}: {_explained(table, shape, str(problem))}") from problem
+        raise error(f"{where}: {_explain(table, shape, str(problem))}") from problem
 
 
 def basic_string(text: str) -> str:
@@ -81,7 +81,7 @@ def basic_string(text: str) -> str:
     return json.dumps(text).replace("\x7f", "\\u007f")
 
 
-def _explained(table: dict[str, Any], shape: type, said: str) -> str:
+def _explain(table: dict[str, Any], shape: type, said: str) -> str:
     """Return what is invalid, in words for the author of the file."""
     place = _PLACE.search(said)
     if place and "[...]" in place["path"]:  # msgspec does not name the key in a table whose keys the user chooses
@@ -104,7 +104,7 @@ def _explained(table: dict[str, Any], shape: type, said: str) -> str:
     if isinstance(value, dict) and isinstance(kind, inspect.StructType):
         return _wrong_keys(heading, value, kind) or heading + _PLACE.sub("", said)
     whole = f"{dotted}.{keys}" if dotted else keys
-    return f"{heading}{keys} = {value!r} must be {_wanted(kind, whole)}"
+    return f"{heading}{keys} = {value!r} must be {_type_text(kind, whole)}"
 
 
 def _wrong_keys(heading: str, value: dict[str, Any], kind: inspect.StructType) -> str:
@@ -134,7 +134,7 @@ def _bare(kind: inspect.Type) -> inspect.Type:
     return kind
 
 
-def _wanted(kind: inspect.Type, name: str) -> str:
+def _type_text(kind: inspect.Type, name: str) -> str:
     """Return a description of the values of this type; ``name`` is the key."""
     words = _WORDS.get(type(kind))
     return words(kind, name) if words else f"of type {type(kind).__name__.removesuffix('Type').lower()}"
@@ -143,7 +143,7 @@ def _wanted(kind: inspect.Type, name: str) -> str:
 def _list(kind: inspect.VarTupleType, name: str) -> str:
     if isinstance(kind.item_type, inspect.StructType):
         return f"an array of tables: write [[{name}]], with two brackets, for each"
-    return f"a list, each item {_wanted(kind.item_type, name)}"
+    return f"a list, each item {_type_text(kind.item_type, name)}"
 
 
 def _number(kind: inspect.IntType | inspect.FloatType, _: str) -> str:
@@ -183,5 +183,5 @@ _WORDS: dict[type[inspect.Type], Callable[[Any, str], str]] = {
     inspect.StructType: lambda _, name: f"a table: [{name}]",
     inspect.TupleType: lambda kind, _: f"{len(kind.item_types)} numbers",
     inspect.VarTupleType: _list,
-    inspect.UnionType: lambda kind, name: " or ".join(_wanted(item, name) for item in kind.types),
+    inspect.UnionType: lambda kind, name: " or ".join(_type_text(item, name) for item in kind.types),
 }

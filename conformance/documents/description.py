@@ -19,7 +19,7 @@ from urllib.parse import quote, urlsplit
 
 from conformance.commandline.device_options import advice
 from conformance.contract.document_text import parsed
-from conformance.documents.description_faults import misplaced, reason, unresolved, without_unreadable
+from conformance.documents.description_faults import dead_references, reason, type_faults, without_unreadable
 from conformance.documents.json_schema import Schema, UnresolvedError
 from conformance.documents.openapi import not_called, with_sent
 from conformance.documents.schema_budget import crowd_in, long_text_in
@@ -100,12 +100,12 @@ def read_description(source: str, load: Load, overlays: Iterable[str] = (), trus
 
 
 def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust) -> Description:
-    original = _parsed(source, load)
+    original = _parse(source, load)
     bundle = _Bundle(source, load)
     document = bundle.with_files(original)
     for overlay in overlays:
         try:
-            document = overlaid(document, _parsed(overlay, load))
+            document = overlaid(document, _parse(overlay, load))
         except OverlayError as error:
             raise DescriptionError(f"{overlay}: {error}") from error
     version = str(original.get("openapi") or original.get("swagger") or "")
@@ -113,7 +113,7 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         try:
             document = as_openapi_3(document)
         except (UnresolvedError, AttributeError, TypeError, KeyError) as error:
-            why = reason(error, misplaced(original), ())
+            why = reason(error, type_faults(original), ())
             raise DescriptionError(f"{source} is no usable Swagger 2.0 description: {why}") from error
     elif not version.startswith("3."):
         raise DescriptionError(f"{source} is no OpenAPI description: it has neither 'openapi: 3...' nor 'swagger: 2.0'")
@@ -121,7 +121,7 @@ def _description(source: str, load: Load, overlays: Iterable[str], trust: Trust)
         raise DescriptionError(f"{source} describes no operation: it has no 'paths'")
     if excess := crowd_in(document) or long_text_in(document):
         raise DescriptionError(f"{source} cannot be read with its overlays: {excess}")
-    broken = unresolved(document)
+    broken = dead_references(document)
     document = _without(document, frozenset(broken)) if broken else document
     uncalled: tuple[str, ...] = ()
     if version.startswith("2."):
@@ -157,7 +157,7 @@ def is_url(source: str, *, bridge: bool = False) -> bool:
     return source.lower().startswith(("http://", "https://", *(("ws://", "wss://") if bridge else ())))
 
 
-def _parsed(source: str, load: Load) -> Schema:
+def _parse(source: str, load: Load) -> Schema:
     """Return the object in a JSON or YAML file.
 
     Raises:
@@ -193,7 +193,7 @@ def _within_budget(load: Load) -> Load:
     """Return a function that loads as `load` does, until a description's files are too many octets or take too long."""
     left, until = _MOST_OCTETS, time.monotonic() + _MOST_S
 
-    def loaded(source: str) -> bytes:
+    def load_within(source: str) -> bytes:
         nonlocal left
         if left < 0 or time.monotonic() > until:
             limit = f"{_MOST_OCTETS:,} bytes" if left < 0 else f"{_MOST_S:g} s"
@@ -202,7 +202,7 @@ def _within_budget(load: Load) -> Load:
         left -= len(octets)
         return octets
 
-    return loaded
+    return load_within
 
 
 @dataclass
@@ -222,28 +222,28 @@ class _Bundle:
         plain = json.loads(json.dumps(document))
         self.anchors[self.source] = make_plain(plain, self.source)
         plain.pop("jsonSchemaDialect", None)  # a schema of any dialect is judged as JSON Schema 2020-12, OpenAPI's own
-        whole: Schema = self._walked(plain, self.source, "#")
+        whole: Schema = self._copy(plain, self.source, "#")
         return {**whole, FILES: self.files} if self.files else whole
 
-    def _walked(self, value: Any, location: str, root: str, *, by_name: bool = False) -> Any:
+    def _copy(self, value: Any, location: str, root: str, *, by_name: bool = False) -> Any:
         if isinstance(value, list):
-            return [self._walked(item, location, root) for item in value]
+            return [self._copy(item, location, root) for item in value]
         if not isinstance(value, dict):
             return value
         found = {
             key: item
             if key in DATA and key != "examples" and not by_name
-            else self._walked(item, location, root, by_name=key in _BY_NAME and not by_name)
+            else self._copy(item, location, root, by_name=key in _BY_NAME and not by_name)
             for key, item in value.items()
         }
         if isinstance(value.get("$ref"), str):
-            reference = self._moved(value["$ref"], location, root)
+            reference = self._moved_reference(value["$ref"], location, root)
             if reference is None:
                 return {}
             found["$ref"] = reference
         return found
 
-    def _moved(self, reference: str, location: str, root: str) -> str | None:
+    def _moved_reference(self, reference: str, location: str, root: str) -> str | None:
         """Return a reference to another file as one within the whole document; None if the file cannot be read."""
         file, _, pointer = reference.partition("#")
         if not file:
@@ -259,7 +259,7 @@ class _Bundle:
                 return None
             number = self.numbers[target] = str(len(self.numbers))
             try:
-                other = _parsed(target, self.load)
+                other = _parse(target, self.load)
             except DescriptionError as error:
                 if isinstance(error.__cause__, ElsewhereError):
                     self.refused.append(f"The reference {reference} is not followed: {error.__cause__}.")
@@ -268,7 +268,7 @@ class _Bundle:
             else:
                 self.files[number] = {}
                 self.anchors[target] = make_plain(other, target)
-                self.files[number] = self._walked(other, target, f"#/{FILES}/{number}")
+                self.files[number] = self._copy(other, target, f"#/{FILES}/{number}")
         if self.numbers[target] not in self.files:
             return None
         return f"#/{FILES}/{self.numbers[target]}{self._pointer(target, pointer)}"

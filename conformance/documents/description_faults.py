@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import jsonschema_rs
 
-from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed, resolved
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, resolved, target_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import PARAMETER, Operation, methods_of, read_operations, without_marked
 from conformance.documents.schema_budget import Growth
@@ -39,7 +39,7 @@ def invalid(original: Schema) -> list[str]:
     return [*foreign, *sorted(set(faults), key=len)[:20], *_path_parameters(original), *_schemas(original)]
 
 
-def misplaced(original: Schema) -> list[tuple[str, str]]:
+def type_faults(original: Schema) -> list[tuple[str, str]]:
     """Return members of a description that have another type than its version demands: places and explanations."""
     version = str(original.get("openapi") or original.get("swagger") or "")[:3]
     errors = map(_deepest, islice(validator(version).iter_errors(without_foreign_words(original)), _MOST_FAULTS))
@@ -158,7 +158,7 @@ def _every_schema(document: Schema) -> Iterator[tuple[str, Schema]]:
                     yield f"the schema of {method} {path}, {place}", media["schema"]
 
 
-def unresolved(document: Schema) -> list[str]:
+def dead_references(document: Schema) -> list[str]:
     """Return the references within the document that lead nowhere."""
     found: dict[str, None] = {}
     waiting: list[Any] = [document]
@@ -170,7 +170,7 @@ def unresolved(document: Schema) -> list[str]:
             reference = value.get("$ref")
             if isinstance(reference, str) and reference.startswith("#"):
                 try:
-                    pointed(document, reference)
+                    target_of(document, reference)
                 except UnresolvedError:
                     found[reference] = None
             waiting += [item for key, item in reversed(value.items()) if key == "examples" or key not in DATA]
@@ -218,7 +218,7 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
     for one in [*shared, *(declared if isinstance(declared, list) else [])]:
         if isinstance(one, dict) and isinstance(one.get("schema"), dict):
             place = f"the example of {one.get('in')} {one.get('name')}"
-            yield from ((place, one["schema"], (), value) for value in _named(one))
+            yield from ((place, one["schema"], (), value) for value in _examples_of(one))
             yield from _of_schema(f"{one.get('in')} {one.get('name')}", one["schema"])
     body = operation.get("requestBody", {})
     responses = operation.get("responses", {})
@@ -233,11 +233,11 @@ def _examples(operation: Schema, shared: list[Any]) -> Iterator[tuple[str, Schem
             if isinstance(media, dict) and isinstance(media.get("schema"), dict) and "json" in name:
                 # A request lacks readOnly members, and a response writeOnly members.
                 marks = ("readOnly" if one is body else "writeOnly",)
-                yield from ((f"the example of {place}", media["schema"], marks, value) for value in _named(media))
+                yield from ((f"the example of {place}", media["schema"], marks, value) for value in _examples_of(media))
                 yield from _of_schema(place, media["schema"])
 
 
-def _named(given: Schema) -> list[Any]:
+def _examples_of(given: Schema) -> list[Any]:
     examples = given.get("examples", {})
     named = (
         [example["value"] for example in examples.values() if isinstance(example, dict) and "value" in example]
@@ -312,7 +312,7 @@ def without_unreadable(document: Schema, original: Schema | None = None) -> tupl
     try:
         read_operations(bare)
     except _UNREADABLE:
-        found, more = _without_operations(document, bare, misplaced(original or document))
+        found, more = _without_operations(document, bare, type_faults(original or document))
         return found, _some([*lines, *more])
     return document, _some(lines)
 
@@ -381,8 +381,8 @@ def _without_operations(document: Schema, bare: Schema, faults: list[tuple[str, 
     lines, paths = [], {}
     for path, item in document["paths"].items():
         try:
-            whole = pointed(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
-            broken = dict(_broken(bare, path, faults)) if isinstance(whole, dict) else {"": "it is no object"}
+            whole = target_of(document, item["$ref"]) if isinstance(item, dict) and "$ref" in item else item
+            broken = dict(_unreadable(bare, path, faults)) if isinstance(whole, dict) else {"": "it is no object"}
         except _UNREADABLE as error:
             whole, broken = None, {"": reason(error, faults, ("paths", path), ("components",))}
         lines += [f"{f'{method} {path}'.strip()}: not judged: {why}" for method, why in broken.items()]
@@ -397,7 +397,7 @@ def _without_operations(document: Schema, bare: Schema, faults: list[tuple[str, 
     return {**document, "paths": paths}, lines
 
 
-def _broken(document: Schema, path: str, faults: list[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+def _unreadable(document: Schema, path: str, faults: list[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     """Yield the method of each operation of a path that cannot be read, and why."""
     item = resolved(document, document["paths"][path])
     for method, operation in methods_of(item).items():

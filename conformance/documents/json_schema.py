@@ -36,7 +36,7 @@ class UnresolvedError(Exception):
     """Raised for a $ref without a target; the message names it."""
 
 
-def pointed(document: Schema, reference: str) -> Any:
+def target_of(document: Schema, reference: str) -> Any:
     """Return the target of a local ``#/...`` reference.
 
     Raises:
@@ -86,17 +86,17 @@ class _Resolver:
         if not isinstance(value, dict):
             return value
         if isinstance(value.get("$ref"), str):
-            return self._referred(value, value["$ref"], trail)
+            return self._copy_target(value, value["$ref"], trail)
         # Values of enum and const are data, even if they look like schemas.
         return {
             key: item if key in _DATA and not names else self.copy(item, trail, names=key in _NAMING and not names)
             for key, item in value.items()
         }
 
-    def _referred(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
+    def _copy_target(self, value: Schema, reference: str, trail: tuple[str, ...]) -> Any:
         if reference.startswith(f"{LAZY_SCHEME}/"):
             return value  # a circular reference that was resolved before
-        found = pointed(self._document, reference)
+        found = target_of(self._document, reference)
         # OpenAPI 3.0 ignores keywords beside a $ref, but authors mean `nullable` there.
         beside = {
             key: self.copy(item, trail)
@@ -150,7 +150,7 @@ def changed_alike(schema: Schema, change: str) -> Schema:
 
 
 @lru_cache(maxsize=4096)
-def referred(uri: str) -> Any:
+def target_of_lazy(uri: str) -> Any:
     """Return the schema that the URI of a lazy reference leads to.
 
     Raises:
@@ -160,7 +160,7 @@ def referred(uri: str) -> Any:
         raise UnresolvedError(f"$ref {uri!r} is not local")
     number, *changes = uri.removeprefix(f"{LAZY_SCHEME}/").split(",")
     document, reference = _LAZY[int(number)]
-    schema = _Resolver(document, deepest=0).copy(pointed(document, reference), (reference,))
+    schema = _Resolver(document, deepest=0).copy(target_of(document, reference), (reference,))
     for change in changes:
         schema = CHANGES[change](schema)
     return schema
@@ -174,7 +174,7 @@ def whole(schema: Schema) -> Schema:
     seen: set[str] = set()
     while isinstance(reference, str) and reference.startswith(LAZY_SCHEME) and reference not in seen:
         seen.add(reference)
-        target = referred(reference)
+        target = target_of_lazy(reference)
         schema = {**target, **{key: item for key, item in schema.items() if key != "$ref"}}
         reference = schema.get("$ref")
     return schema
@@ -315,7 +315,7 @@ def bundled_into(value: Any, uris: list[str]) -> Any:
 def bundled_part(uri: str) -> tuple[Any, tuple[str, ...]]:
     """Return the schema of a lazy reference as `bundled` has it, and the URIs that it refers to; many share it."""
     uris: list[str] = []
-    return bundled_into(referred(uri), uris), tuple(uris)
+    return bundled_into(target_of_lazy(uri), uris), tuple(uris)
 
 
 def numbers_in(value: Any) -> Iterator[float]:

@@ -34,10 +34,10 @@ from conformance.documents.json_schema import (
     bundled_part,
     changed_alike,
     is_number,
-    pointed,
-    referred,
+    target_of,
+    target_of_lazy,
 )
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
@@ -73,12 +73,12 @@ def _naming() -> Any:
 
     types = Draft202012Validator.TYPE_CHECKER.redefine("number", lambda _, value: is_number(value))
     keywords = {
-        "$ref": _followed,
+        "$ref": _follow,
         "multipleOf": _multiple,
         "pattern": _pattern,
         "patternProperties": _members,
         "additionalProperties": _further,
-        "unevaluatedProperties": _unevaluated,
+        "unevaluatedProperties": _judge_unevaluated,
     }
     # jsonschema gives extend() no types.
     return cast("Any", extend)(Draft202012Validator, validators=keywords, type_checker=types)
@@ -93,7 +93,7 @@ class _Following(threading.local):
 _FOLLOWING: Final = _Following()
 
 
-def _followed(validator: Any, reference: str, instance: Any, schema: Schema) -> Iterator[ValidationError]:
+def _follow(validator: Any, reference: str, instance: Any, schema: Schema) -> Iterator[ValidationError]:
     """Find the violations behind a reference; beyond the budget, one that names only the place."""
     from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
     from jsonschema.exceptions import ValidationError  # noqa: PLC0415 - as above
@@ -145,7 +145,7 @@ def _further(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iter
             yield from validator.descend(instance[name], schema, path=name)
 
 
-def _unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
+def _judge_unevaluated(validator: Any, schema: Any, instance: Any, beside: Schema) -> Iterator[ValidationError]:
     """Judge as jsonschema does, if Python reads the patterns of names too; else members pass."""
     from jsonschema import Draft202012Validator  # noqa: PLC0415 - as above
 
@@ -322,7 +322,7 @@ class Shape:
             error = self._first_error(value)
         except RecursionError:
             return "the value is nested too deeply"
-        return _described(error, where) if error is not None else ""
+        return _fault_text(error, where) if error is not None else ""
 
     def holds(self, value: Any) -> bool:
         """Return whether ``value`` has no problem: quicker, because the problem is not looked for."""
@@ -387,7 +387,7 @@ def _misfit(errors: list[ValidationError]) -> tuple[bool, bool, int]:
     return is_another_type, any(error.validator in {"const", "enum"} for error in errors), len(errors)
 
 
-def _described(error: ValidationError, where: str) -> str:
+def _fault_text(error: ValidationError, where: str) -> str:
     place = where
     for part in error.absolute_path:
         place += f"[{part}]" if isinstance(part, int) else f".{part}" if place else str(part)
@@ -398,7 +398,7 @@ def _described(error: ValidationError, where: str) -> str:
         return f"{place}.{missing} is missing" if place else f"{missing} is missing"
     place = place or "the value"
     if error.validator == "type":
-        return f"{place} is {shown(value)}, not of type {rule}"
+        return f"{place} is {clip(value)}, not of type {rule}"
     if error.validator in {"minItems", "maxItems"}:
         return f"{place} has {len(value)} items"
     return f"{place}: {error.message[:300]}"
@@ -417,7 +417,7 @@ _JUDGED: Final[dict[tuple[str, bytes], bool]] = {}
 
 def _holds_by(uri: str, value: Any) -> bool:
     """Judge a part of a value by a lazy reference, once: alternatives that refer to each other ask again and again."""
-    schema = referred(uri)
+    schema = target_of_lazy(uri)
     if not isinstance(schema, dict):
         return schema is not False
     try:
@@ -485,7 +485,7 @@ def wrong_formats(schema: Schema, value: Any) -> list[tuple[Any, str, str]]:
     for error in validator.iter_errors(value) if validator is not None else ():
         rule: Any = root
         for step in error.schema_path[:-1]:
-            rule = pointed(root, rule["$ref"]) if step == "$ref" else rule[step]
+            rule = target_of(root, rule["$ref"]) if step == "$ref" else rule[step]
         place = "/".join("*" if isinstance(part, int) else part for part in error.instance_path)
         wanted = " or ".join(sorted(set(_NAME.findall(str(rule))))) or "value of the declared format"
         found.setdefault(place, (error.instance, place, wanted))
@@ -501,7 +501,7 @@ def _validator(schema: Schema, *, whole: bool = False) -> Any:
 
 
 def _holds_in_range_by(uri: str, value: Any) -> bool:
-    schema = referred(uri)
+    schema = target_of_lazy(uri)
     validator = _VALIDATORS.of(schema) if isinstance(schema, dict) else None
     return validator is None or bool(validator.is_valid(value))
 

@@ -115,7 +115,7 @@ def read_json(body: bytes) -> JsonText:
     return JsonText(value, malformed, encoding, reader.non_finite, reader.twice)
 
 
-def shown(value: Any) -> str:
+def clip(value: Any) -> str:
     """Return a value as JSON text, truncated if it is long."""
     try:
         text = json.dumps(value)

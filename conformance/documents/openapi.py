@@ -18,8 +18,8 @@ from conformance.documents.json_schema import (
     changed_alike,
     modern,
     opened,
-    pointed,
     resolved,
+    target_of,
 )
 from conformance.documents.parameters import (
     Encoding,
@@ -106,7 +106,7 @@ class Operation:
         """Return whether the operation only reads: its method is safe (RFC 9110 9.2.1), or the description says so."""
         return self.method in SAFE or self.reads
 
-    def declared(self, status: int) -> dict[str, Schema] | None:
+    def schemas_for(self, status: int) -> dict[str, Schema] | None:
         """Return the schemas by media type for a status; None if the status is not declared."""
         key = self.response_key(status)
         return None if key is None else self.responses[key]
@@ -258,18 +258,18 @@ def without_marked(schema: Any, mark: str) -> Any:
     result = changed_alike({key: without_marked(item, mark) for key, item in schema.items()}, mark)
     properties, required = result.get("properties"), result.get("required")
     if isinstance(properties, dict) and isinstance(required, list):
-        marked = _marked(properties, mark)
+        marked = _names_marked(properties, mark)
         result["required"] = [name for name in required if name not in marked]
     if isinstance(properties, dict) and mark == "readOnly":
         # A device ignores such a member in a request.
-        result["properties"] = {**properties, **{name: {"readOnly": True} for name in _marked(properties, mark)}}
+        result["properties"] = {**properties, **{name: {"readOnly": True} for name in _names_marked(properties, mark)}}
     return result
 
 
 CHANGES.update(readOnly=partial(without_marked, mark="readOnly"), writeOnly=partial(without_marked, mark="writeOnly"))
 
 
-def _marked(properties: dict[str, Any], mark: str) -> set[str]:
+def _names_marked(properties: dict[str, Any], mark: str) -> set[str]:
     return {name for name, part in properties.items() if isinstance(part, dict) and part.get(mark) is True}
 
 
@@ -406,7 +406,7 @@ def with_sent(value: Any, document: Schema, ignored: frozenset[str] = IGNORED) -
         return value
     found = {key: with_sent(item, document, ignored) for key, item in value.items()}
     if isinstance(value.get("parameters"), list):
-        found["parameters"] = [sent for one in found["parameters"] for sent in _sent(one, document, ignored)]
+        found["parameters"] = [sent for one in found["parameters"] for sent in _sent_parameters(one, document, ignored)]
         if _unwritten(value["parameters"], document):
             found["x-roaas-never"] = True
     return found
@@ -415,7 +415,7 @@ def with_sent(value: Any, document: Schema, ignored: frozenset[str] = IGNORED) -
 def _unwritten(parameters: Any, document: Schema) -> str:
     """Return the media type of a required query string that the suite does not write; empty if it writes all."""
     for given in parameters if isinstance(parameters, list) else ():
-        one = _followed(given, document)
+        one = _follow(given, document)
         if isinstance(one, dict) and one.get("in") == "querystring" and one.get("required") is True:
             content = one.get("content")
             names = " or ".join(content) if isinstance(content, dict) else ""
@@ -428,14 +428,14 @@ def not_called(document: Schema) -> tuple[str, ...]:
     return tuple(
         f"{method} {path} is not called: its query string is {unwritten}, which the suite does not write."
         for path, item in document["paths"].items()
-        if isinstance(whole := _followed(item, document), dict)
+        if isinstance(whole := _follow(item, document), dict)
         for method, one in methods_of(whole).items()
         if isinstance(one, dict) and (unwritten := _unwritten(one.get("parameters"), document))
     )
 
 
-def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
-    parameter = _followed(given, document)
+def _sent_parameters(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
+    parameter = _follow(given, document)
     if not isinstance(parameter, dict):
         return [given]
     if parameter.get("in") == "querystring":
@@ -451,8 +451,8 @@ def _sent(given: Any, document: Schema, ignored: frozenset[str]) -> list[Any]:
 def _in_query(parameter: Schema, document: Schema) -> list[Schema]:
     """Return the query parameters that a query string consists of (OpenAPI 3.2, 4.12); none if it is no form."""
     content = parameter.get("content")
-    media = _followed(content.get(_FORM_TYPE), document) if isinstance(content, dict) else None
-    schema = _followed(media.get("schema"), document) if isinstance(media, dict) else None
+    media = _follow(content.get(_FORM_TYPE), document) if isinstance(content, dict) else None
+    schema = _follow(media.get("schema"), document) if isinstance(media, dict) else None
     properties = schema.get("properties") if isinstance(schema, dict) else None
     required = schema.get("required", ()) if isinstance(schema, dict) and parameter.get("required") is True else ()
     given = media.get("encoding") if isinstance(media, dict) else None
@@ -469,5 +469,7 @@ def _in_query(parameter: Schema, document: Schema) -> list[Schema]:
     ]
 
 
-def _followed(given: Any, document: Schema) -> Any:
-    return pointed(document, given["$ref"]) if isinstance(given, dict) and isinstance(given.get("$ref"), str) else given
+def _follow(given: Any, document: Schema) -> Any:
+    return (
+        target_of(document, given["$ref"]) if isinstance(given, dict) and isinstance(given.get("$ref"), str) else given
+    )

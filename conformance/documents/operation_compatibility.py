@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from conformance.documents.json_schema import Schema, kinds_of, modern, pointed
+from conformance.documents.json_schema import Schema, kinds_of, modern, target_of
 from conformance.documents.openapi import IGNORED, PARAMETER, methods_of
 from conformance.documents.parameters import Parameter, by_media_type, read_encoding, read_parameter
 from conformance.documents.schema_compatibility import schema_changes
@@ -58,12 +58,12 @@ class Described:
     item: Schema
     operation: Schema
 
-    def followed(self, value: Any) -> Any:
+    def follow(self, value: Any) -> Any:
         """Return a value, or the target if it is a reference."""
         for _ in range(8):
             if not (isinstance(value, dict) and isinstance(value.get("$ref"), str)):
                 break
-            value = pointed(self.document, value["$ref"])
+            value = target_of(self.document, value["$ref"])
         return value if isinstance(value, dict) else {}
 
     def parameters(self) -> dict[tuple[str, str], tuple[Parameter, Any]]:
@@ -71,7 +71,7 @@ class Described:
         names = PARAMETER.findall(self.path)
         found: dict[tuple[str, str], tuple[Parameter, Any]] = {}
         for item in [*self.item.get("parameters", ()), *self.operation.get("parameters", ())]:
-            given = self.followed(item)
+            given = self.follow(item)
             parameter = read_parameter({**given, "schema": {}})
             name, where = parameter.name, parameter.where
             if (where == "header" and name.lower() in IGNORED) or (where == "path" and name not in names):
@@ -109,24 +109,24 @@ class _Comparison:
         for key, (one, _) in after.items():
             if key not in before and one.where == "path":
                 # The parameter always existed: only its description is new.
-                yield False, f"{_called(one)} is described now"
+                yield False, f"{_name_of(one)} is described now"
             elif key not in before:
                 needed = one.required and self.by_client
-                yield needed, f"{_called(one)} is new{', and required' if one.required else ''}"
+                yield needed, f"{_name_of(one)} is new{', and required' if one.required else ''}"
         for key, (one, schema) in before.items():
             if key not in after:
                 path = one.where == "path"
-                yield not path, f"{_called(one)} is {'no longer described' if path else 'gone'}"
+                yield not path, f"{_name_of(one)} is {'no longer described' if path else 'gone'}"
                 continue
             other, its_schema = after[key]
             if one.required != other.required:
                 word = "required" if other.required else "optional"
-                yield other.required == self.by_client, f"{_called(one)} is {word} now"
-            yield from self._written(one, other, schema, its_schema)
+                yield other.required == self.by_client, f"{_name_of(one)} is {word} now"
+            yield from self._compare_style(one, other, schema, its_schema)
             for breaks, text in self.both.schema_changes(schema, its_schema, request=self.by_client):
-                yield breaks, f"{_called(one)}{text}"
+                yield breaks, f"{_name_of(one)}{text}"
 
-    def _written(self, one: Parameter, other: Parameter, schema: Any, its_schema: Any) -> Iterator[Found]:
+    def _compare_style(self, one: Parameter, other: Parameter, schema: Any, its_schema: Any) -> Iterator[Found]:
         """Yield changes of how a parameter is written. A single value is written alike in most styles."""
         kinds = _kinds(schema, self.old) | _kinds(its_schema, self.new)
         composed = not kinds or bool(kinds & {"array", "object"})
@@ -137,18 +137,16 @@ class _Comparison:
             for each in (one, other)
         ]
         if ways[0] != ways[1]:
-            yield True, f"{_called(one)} is written in another way (style, explode or content)"
+            yield True, f"{_name_of(one)} is written in another way (style, explode or content)"
         for word, had, has in (
             ("reserved characters", one.reserved, other.reserved),
             ("no value", one.empty, other.empty),
         ):
             if had != has:
-                yield has != self.by_client, f"{_called(one)} may {'now' if has else 'no longer'} have {word}"
+                yield has != self.by_client, f"{_name_of(one)} may {'now' if has else 'no longer'} have {word}"
 
     def body(self) -> Iterator[Found]:
-        before, after = (
-            operation.followed(operation.operation.get("requestBody")) for operation in (self.old, self.new)
-        )
+        before, after = (operation.follow(operation.operation.get("requestBody")) for operation in (self.old, self.new))
         old, new = by_media_type(before), by_media_type(after)
         word = "takes" if self.by_client else "has"
         needed, needs = (bool(item.get("required", False)) for item in (before, after))
@@ -165,7 +163,7 @@ class _Comparison:
 
     def responses(self) -> Iterator[Found]:
         before, after = (
-            {str(key).upper().replace("DEFAULT", "default"): operation.followed(value) for key, value in given.items()}
+            {str(key).upper().replace("DEFAULT", "default"): operation.follow(value) for key, value in given.items()}
             for operation in (self.old, self.new)
             for given in (operation.operation.get("responses") or {},)
         )
@@ -189,7 +187,7 @@ class _Comparison:
     def _headers(self, what: str, before: Schema, after: Schema) -> Iterator[Found]:
         old, new = (
             {
-                name.lower(): described.followed(header)
+                name.lower(): described.follow(header)
                 for name, header in response.get("headers", {}).items()
                 if name.lower() != "content-type"
             }
@@ -279,11 +277,11 @@ def _of_text(schema: Any, media_type: str) -> Any:
 
 
 def _kinds(schema: Any, described: Described) -> frozenset[str]:
-    found = modern(described.followed(schema) if isinstance(schema, dict) else {})
+    found = modern(described.follow(schema) if isinstance(schema, dict) else {})
     return kinds_of(found)
 
 
-def _called(parameter: Parameter) -> str:
+def _name_of(parameter: Parameter) -> str:
     return f"{_KINDS.get(parameter.where, parameter.where)} {parameter.name}"
 
 
@@ -313,7 +311,7 @@ def _suffices(had: _Alternative, needed: _Alternative) -> bool:
     return all(scheme in had and scopes <= had[scheme] for scheme, scopes in needed.items())
 
 
-def _demanded(document: Schema, operation: Schema) -> list[Schema]:
+def _security_of(document: Schema, operation: Schema) -> list[Schema]:
     """Return the alternatives of an operation: without one, no credentials are needed."""
     return operation.get("security", document.get("security")) or [{}]
 
@@ -326,12 +324,12 @@ def _schemes(document: Schema) -> Schema:
 def _alternatives(document: Schema, operation: Schema) -> list[_Alternative]:
     schemes = _schemes(document)
     return [
-        {_known(name, schemes.get(name)): frozenset(scopes) for name, scopes in item.items()}
-        for item in _demanded(document, operation)
+        {_scheme_of(name, schemes.get(name)): frozenset(scopes) for name, scopes in item.items()}
+        for item in _security_of(document, operation)
     ]
 
 
-def _known(name: str, scheme: Any) -> tuple[str, ...]:
+def _scheme_of(name: str, scheme: Any) -> tuple[str, ...]:
     """Return a security scheme as a client sees it, whatever its name; the name if it is not described."""
     kind = scheme.get("type") if isinstance(scheme, dict) else None
     if kind not in {*_KNOWN, "oauth2", "mutualTLS"}:
@@ -367,7 +365,7 @@ def _text(document: Schema, operation: Schema) -> str:
     return " or ".join(
         " with ".join(f"{name} ({', '.join(scopes)})" if scopes else name for name, scopes in item.items())
         or "no credentials"
-        for item in _demanded(document, operation)
+        for item in _security_of(document, operation)
     )
 
 
@@ -446,7 +444,7 @@ def _operations(document: Schema, section: str) -> dict[_Key, Described]:
     for path, given in (document.get(section) or {}).items():
         if not isinstance(given, dict):
             raise TypeError(f"the path {path} has no object")
-        item = whole.followed(given)
+        item = whole.follow(given)
         for method, operation in methods_of(item).items():
             servers = operation.get("servers") or item.get("servers") or document.get("servers")
             bases = [_base(server) for server in servers or [Schema()]] if section == "paths" else [""]
@@ -459,9 +457,9 @@ def _callbacks(described: Described) -> dict[_Key, Described]:
     return {
         (method, str(expression)): Described(described.document, str(expression), item, operation)
         for callback in described.operation.get("callbacks", {}).values()
-        for expression, given in described.followed(callback).items()
+        for expression, given in described.follow(callback).items()
         if not str(expression).startswith("x-")
-        for item in (described.followed(given),)
+        for item in (described.follow(given),)
         for method, operation in methods_of(item).items()
     }
 

@@ -57,7 +57,7 @@ def decoded_query(text: str) -> str:
     Raises:
         ValueError: it is not percent-encoded UTF-8.
     """
-    return _decoded(text, unquote_plus)
+    return _decode(text, unquote_plus)
 
 
 def decoded_path(text: str) -> str:
@@ -66,16 +66,16 @@ def decoded_path(text: str) -> str:
     Raises:
         ValueError: it is not percent-encoded UTF-8.
     """
-    return _decoded(text, unquote)
+    return _decode(text, unquote)
 
 
-def _decoded(text: str, decode: Callable[..., str]) -> str:
+def _decode(text: str, decode: Callable[..., str]) -> str:
     if _ENCODED.search(text):
         raise ValueError("a percent sign without two digits")
     return decode(text, errors="strict")
 
 
-def judged(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str] = str) -> str:
+def judge_texts(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str] = str) -> str:
     """Return whether texts of a parameter are a valid value.
 
     Args:
@@ -91,9 +91,9 @@ def judged(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], s
         if kinds & {"array", "object"} and list(texts) == [""]:
             return UNCLEAR  # nothing, an empty array, or an array with an empty text
         if "array" in kinds:
-            said.append(_agreed(parameter.schema, _arrays(parameter, texts, decode)))
+            said.append(_agreement(parameter.schema, _arrays(parameter, texts, decode)))
         if "object" in kinds:
-            said.append(_agreed(parameter.schema, _objects(parameter, texts, decode)))
+            said.append(_agreement(parameter.schema, _objects(parameter, texts, decode)))
     except ValueError:
         return UNCLEAR
     if VALID in said:
@@ -106,7 +106,7 @@ def judged_value(schema: Schema, reading: Reading) -> str:
     shape = shape_of(schema)
     said = set()
     for alternative in _alternatives(schema):
-        value, sure = _typed(alternative, reading.value)
+        value, sure = _convert(alternative, reading.value)
         if shape.holds(value):
             return VALID if reading.sure and has_formats(schema, value) else UNCLEAR
         said.add(sure)
@@ -125,7 +125,7 @@ def _of_content(parameter: Parameter, texts: Sequence[str], decode: Callable[[st
 
 
 def _of_scalar(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> str:
-    text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
+    text = _without_prefix(parameter, texts[0], decode) if len(texts) == 1 else None
     if text is None or (text == "" and (parameter.empty or not parameter.required)):
         return UNCLEAR  # some servers treat an optional parameter without a value as absent
     return judged_text(parameter.schema, decode(text))
@@ -189,7 +189,7 @@ def _scalars(schema: Schema, text: str) -> tuple[list[Any], bool]:
     return readings, sure
 
 
-def _typed(schema: Schema, value: Any) -> tuple[Any, bool]:
+def _convert(schema: Schema, value: Any) -> tuple[Any, bool]:
     """Return a value whose texts are converted to the types of their schemas, and whether every reader agrees."""
     if isinstance(value, list):
         prefix, rest = schema.get("prefixItems", []), schema.get("items")
@@ -208,7 +208,7 @@ def _typed(schema: Schema, value: Any) -> tuple[Any, bool]:
 
 
 def _typed_part(schema: Any, value: Any) -> tuple[Any, bool]:
-    return _typed(flat(schema) if isinstance(schema, dict) else {}, value)
+    return _convert(flat(schema) if isinstance(schema, dict) else {}, value)
 
 
 def _alternatives(schema: Schema) -> Iterator[Schema]:
@@ -220,13 +220,13 @@ def _alternatives(schema: Schema) -> Iterator[Schema]:
         yield flat(schema)
 
 
-def _agreed(schema: Schema, readings: Iterator[Reading]) -> str:
+def _agreement(schema: Schema, readings: Iterator[Reading]) -> str:
     """Return the verdict on a value that readers may take in several ways: unclear if it depends on the way."""
     said = {judged_value(schema, reading) for reading in readings}
     return said.pop() if len(said) == 1 else UNCLEAR
 
 
-def _unprefixed(parameter: Parameter, text: str, decode: Callable[[str], str]) -> str | None:
+def _without_prefix(parameter: Parameter, text: str, decode: Callable[[str], str]) -> str | None:
     """Return a text without the prefix of the styles label and matrix; None if the prefix is missing."""
     if parameter.style == "label":
         return text[1:] if text.startswith(".") else None
@@ -262,7 +262,7 @@ def _objects(parameter: Parameter, texts: Sequence[str], decode: Callable[[str],
 
 def _split(parameter: Parameter, texts: Sequence[str], decode: Callable[[str], str]) -> Iterator[Reading]:
     """Yield the parts of one text, each decoded unless they are pairs, by each separator that the style may have."""
-    text = _unprefixed(parameter, texts[0], decode) if len(texts) == 1 else None
+    text = _without_prefix(parameter, texts[0], decode) if len(texts) == 1 else None
     if parameter.style == "matrix" and parameter.explode:
         text = texts[0][1:] if len(texts) == 1 and texts[0].startswith(";") else None
     if text is None:
@@ -347,7 +347,7 @@ def _query_verdict(
     if not texts:
         missing = (INVALID, f"no parameter {item.name}", True) if item.required and not _may_be_nothing(item) else None
         return {item.name}, missing or (VALID, "", False)
-    said = judged(item, texts, decoded_query)
+    said = judge_texts(item, texts, decoded_query)
     return {item.name}, (said, f"{texts[0][:40]!r} at query {item.name}", False)
 
 
@@ -406,7 +406,7 @@ def _text_field(name: str, schema: Schema, how: Encoding | None, texts: Sequence
     item = Parameter(
         name, "form", required=False, schema=schema, style=given.style, explode=given.explode, media_type=media_type
     )
-    return judged(item, texts, decoded_query)
+    return judge_texts(item, texts, decoded_query)
 
 
 def multipart_verdict(body: bytes, content_type: str, form: Body) -> Said:

@@ -67,7 +67,7 @@ def matches(pattern: str, text: str) -> bool:
     plain = _native(pattern)
     if plain is not None:
         return bool(plain.is_valid(text))
-    regex, source, flags = _compiled(pattern)
+    regex, source, flags = _compile(pattern)
     if _steps(pattern, len(text)) <= _MOST_STEPS:
         return regex.find(text) is not None
     return _matches_in_time(pattern, source, flags, text)
@@ -85,7 +85,7 @@ def check(pattern: str) -> None:
         PatternError: it is no regular expression of ECMA-262.
     """
     if not is_plain(pattern):
-        _compiled(pattern)
+        _compile(pattern)
 
 
 @lru_cache(maxsize=4096)
@@ -99,7 +99,7 @@ def _native(pattern: str) -> Any:
 
 
 @lru_cache(maxsize=4096)
-def _compiled(pattern: str) -> tuple[regress.Regex, str, str]:
+def _compile(pattern: str) -> tuple[regress.Regex, str, str]:
     r"""Return a compiled pattern, its text for the engine, and its flags.
 
     JSON Schema asks for the flag u. Authors who do not know of it write ``\-`` outside of classes, which it forbids.
@@ -240,12 +240,12 @@ class _Writer:
                 written += rf"\{part}"
                 in_class = False
                 continue
-            written += self._written(part, in_class=in_class)
+            written += self._write(part, in_class=in_class)
             if part in {"[", "]"}:
                 in_class = part == "["
         return written
 
-    def _written(self, part: str, *, in_class: bool) -> str:
+    def _write(self, part: str, *, in_class: bool) -> str:
         if part in _OTHERS and not in_class:
             return _OTHERS[part]
         if part in _CLASSES or part[:2] in {r"\p", r"\P"}:

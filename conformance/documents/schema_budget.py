@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from conformance.documents.json_schema import Schema, UnresolvedError, pointed
+from conformance.documents.json_schema import Schema, UnresolvedError, target_of
 
 # Most schemas that may apply to one value, by allOf, anyOf, oneOf, not, if, then, else and references.
 _MOST_AT_ONCE: Final = 5_000
@@ -90,7 +90,7 @@ class Growth:
 
     def _pattern_fault(self, pattern: str) -> str:
         if pattern not in self._patterns:
-            states, repeats = _unrolled(pattern) if len(pattern) <= _LONGEST_PATTERN else (0, 0)
+            states, repeats = _unrolled_size(pattern) if len(pattern) <= _LONGEST_PATTERN else (0, 0)
             self._states += min(states, _STATES_OF_ONE)
             fault = f"a pattern of {len(pattern):,} characters" if len(pattern) > _LONGEST_PATTERN else ""
             if repeats > _MOST_REPEATS:
@@ -103,7 +103,7 @@ class Growth:
     def _target(self, schema: Schema) -> Any:
         """Return the target of a schema's reference, or None."""
         try:
-            return pointed(self._document, schema["$ref"]) if isinstance(schema.get("$ref"), str) else None
+            return target_of(self._document, schema["$ref"]) if isinstance(schema.get("$ref"), str) else None
         except UnresolvedError:
             return None
 
@@ -209,7 +209,7 @@ def _list(schema: Schema, word: str) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-def _unrolled(pattern: str) -> tuple[int, int]:
+def _unrolled_size(pattern: str) -> tuple[int, int]:
     """Return how many states a pattern has with its quantifiers unrolled, and how often nested ones repeat."""
     # For each open group, its parts: their states, repeats, and depth of nested quantifiers.
     groups: list[list[tuple[int, int, int]]] = [[]]
@@ -272,7 +272,7 @@ def unrolls(document: Schema, value: Any) -> bool:
         seen += 1
         if isinstance(part, dict) and isinstance(part.get("$ref"), str) and depth < _UNROLLED_DEEPEST:
             try:
-                waiting.append((pointed(document, part["$ref"]), depth + 1))
+                waiting.append((target_of(document, part["$ref"]), depth + 1))
             except UnresolvedError:
                 continue
         inner = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()

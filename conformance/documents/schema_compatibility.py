@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.documents.json_schema import Schema
-from conformance.documents.schema_containment import Placed, apart, are_apart, introduced, is_covered, witness
+from conformance.documents.schema_containment import Placed, apart, are_apart, is_covered, new_members, witness
 from conformance.documents.schema_sides import (
     OPAQUE,
     UNSENT,
@@ -83,7 +83,7 @@ class _Comparison:
         if key not in self.found:
             self.open[key] = False
             known = set(self.found)
-            result = self._compared(before, after)
+            result = self._compare(before, after)
             if self.open.pop(key) and any(finding.breaks is not False for finding in result):
                 # Discard results that assumed that this pair is compatible.
                 for other in self.found.keys() - known:
@@ -92,23 +92,23 @@ class _Comparison:
         return self.found[key]
 
     def _is_covered(self, old: Any, new: Any, within: tuple[Any, Any] | None = None) -> bool:
-        return is_covered(*self._placed(old, new), self._barred(*within or (old, new)))
+        return is_covered(*self._placed_pair(old, new), self._new_members(*within or (old, new)))
 
     def _witness(self, old: Any, new: Any, within: tuple[Any, Any] | None = None) -> str | None:
-        return witness(*self._placed(old, new), self._barred(*within or (old, new)))
+        return witness(*self._placed_pair(old, new), self._new_members(*within or (old, new)))
 
-    def _barred(self, old: Any, new: Any) -> frozenset[str] | None:
-        return introduced(*self._placed(old, new)) if self.request else None
+    def _new_members(self, old: Any, new: Any) -> frozenset[str] | None:
+        return new_members(*self._placed_pair(old, new)) if self.request else None
 
-    def _placed(self, old: Any, new: Any) -> tuple[Placed, Placed]:
-        one, other = self._ordered((old, self.old), (new, self.new))
+    def _placed_pair(self, old: Any, new: Any) -> tuple[Placed, Placed]:
+        one, other = self._order((old, self.old), (new, self.new))
         return one, other
 
-    def _ordered(self, old: Any, new: Any) -> tuple[Any, Any]:
+    def _order(self, old: Any, new: Any) -> tuple[Any, Any]:
         """Return the schema of the sent values, and that of the values that the receiver accepts."""
         return (old, new) if self.request else (new, old)
 
-    def _compared(self, old: Any, new: Any) -> list[Finding]:
+    def _compare(self, old: Any, new: Any) -> list[Finding]:
         if is_same(old, new, self.old, self.new, set()):
             return []
         before, after = alternatives(old, self.old), alternatives(new, self.new)
@@ -140,9 +140,9 @@ class _Comparison:
 
     def _by_alternative(self, old: Any, new: Any, before: list[Any], after: list[Any]) -> Iterator[Finding]:
         """Yield changes where a value may have several shapes: each that is sent must be one that is taken."""
-        sent, taken = self._ordered(before, after)
-        whole, side = self._ordered(old, new)[1], self._ordered(self.old, self.new)[1]
-        sender = self._ordered(old, new)[0]
+        sent, taken = self._order(before, after)
+        whole, side = self._order(old, new)[1], self._order(self.old, self.new)[1]
+        sender = self._order(old, new)[0]
         sure = (
             not _has(whole, "oneOf")
             or self._may_overlap(sender, taken)
@@ -150,17 +150,17 @@ class _Comparison:
         )
         for item in sent:
             if len(sent) > 1:
-                yield from self._gone(item, taken)
+                yield from self._lost_members(item, taken)
             # Compare each value that may be sent in this form with all values that are accepted.
-            if self._is_covered(*self._ordered(item, whole)):
+            if self._is_covered(*self._order(item, whole)):
                 continue
             like = [
                 other for other in taken if kind_in(item) == kind_in(other) or "" in (kind_in(item), kind_in(other))
             ]
-            found = [self.findings(*self._ordered(item, other)) for other in like]
+            found = [self.findings(*self._order(item, other)) for other in like]
             if sure and any(all(change.breaks is False for change in changes) for changes in found):
                 continue
-            example = self._witness(*self._ordered(item, whole))
+            example = self._witness(*self._order(item, whole))
             if example is None:
                 yield Finding(None, f": not compared: {differing(old, new) or 'alternatives'}")
             elif len(found) == 1 and any(change.breaks for change in found[0]):
@@ -177,11 +177,11 @@ class _Comparison:
         """Return whether a client takes an object that fits several alternatives, as both schemas have oneOf."""
         return not self.request and _has(sender, "oneOf") and all(kind_in(item) == "object" for item in taken)
 
-    def _gone(self, one: Any, taken: list[Any]) -> Iterator[Finding]:
+    def _lost_members(self, one: Any, taken: list[Any]) -> Iterator[Finding]:
         """Yield the members that are gone from the one shape that has values of a shape that is sent."""
-        same = [other for other in taken if not apart(*self._placed(*self._ordered(one, other)))]
+        same = [other for other in taken if not apart(*self._placed_pair(*self._order(one, other)))]
         if len(same) == 1:
-            yield from (change for change in self.findings(*self._ordered(one, same[0])) if change.always)
+            yield from (change for change in self.findings(*self._order(one, same[0])) if change.always)
 
     def _by_word(self, old: Any, new: Any) -> Iterator[Finding]:
         """Yield the changes between two schemas without alternatives."""
@@ -229,7 +229,7 @@ class _Comparison:
         within = old, new
         if self._is_covered(one, other, within):
             breaks: bool | None = False
-            sent, taken = self._placed(one, other)
+            sent, taken = self._placed_pair(one, other)
             if is_covered(taken, sent, frozenset()):
                 return
         elif self._witness(one, other, within) is not None or words == ("format",):
@@ -325,7 +325,7 @@ def name_of(schema: Any, example: str = "") -> str:
     if not isinstance(schema, dict):
         return example or "anything"
     if "const" in schema or "enum" in schema:
-        return _shown(schema.get("enum", [schema.get("const")]))
+        return _words(schema.get("enum", [schema.get("const")]))
     kind = str(schema.get("type") or "anything")
     return f"{kind}, for example {cut(example)}" if example and kind in {"object", "array"} else kind
 
@@ -350,7 +350,7 @@ def change_text(word: str, old: Schema, new: Schema, *, request: bool) -> str:
     if word == "uniqueItems":
         return f": items must {'' if after else 'not '}differ"
     if all(item is None or isinstance(item, _SIMPLE) for item in (before, after)):
-        return f": {word} {_shown(before)} → {_shown(after)}"
+        return f": {word} {_words(before)} → {_words(after)}"
     return f": {word} is {'new' if before is None else 'gone' if after is None else 'another'}"
 
 
@@ -360,11 +360,11 @@ def _values(old: Schema, new: Schema, *, request: bool) -> str:
         # the schema `false`
         return f": {'no value is' if after == [] else 'values are'} allowed now"
     if before is None or after is None:
-        return f": values {_shown(before)} → {_shown(after)}"
+        return f": values {_words(before)} → {_words(after)}"
     fewer = [item for item in before if item not in after]
     more = [item for item in after if item not in before]
     # Breaking changes come first.
-    texts = [f"may no longer be {_shown(fewer)}" if fewer else "", f"may now be {_shown(more)}" if more else ""]
+    texts = [f"may no longer be {_words(fewer)}" if fewer else "", f"may now be {_words(more)}" if more else ""]
     return " " + ", and ".join(text for text in (texts if request else texts[::-1]) if text)
 
 
@@ -375,7 +375,7 @@ def below(name: str, text: str) -> str:
     return f", member {name}{text}"
 
 
-def _shown(value: Any) -> str:
+def _words(value: Any) -> str:
     if value is None:
         return _WITHOUT
     values = value if isinstance(value, list) else [value]

@@ -86,14 +86,14 @@ def _options() -> dict[str, Any]:
     return {"draft": jsonschema_rs.Draft202012, "validate_formats": True, "offline": True}
 
 
-def introduced(inner: Placed, outer: Placed) -> frozenset[str]:
+def new_members(inner: Placed, outer: Placed) -> frozenset[str]:
     """Return the names of members that only the outer schema describes."""
     return frozenset(_members(_whole(*outer)) - _members(_whole(*inner)))
 
 
 def _pair(inner: Placed, outer: Placed, barred: frozenset[str] | None) -> tuple[Any, Any]:
     small, large = _whole(*inner), _whole(*outer)
-    return (small, _opened(large)) if barred is None else (_barred(small, barred), large)
+    return (small, _open(large)) if barred is None else (_without(small, barred), large)
 
 
 def _whole(schema: Any, side: Side) -> Any:
@@ -140,14 +140,14 @@ def _members(schema: Any) -> set[str]:
     return set(schema.get("properties", ())).union(*map(_members, _parts(schema)))
 
 
-def _barred(schema: Any, names: frozenset[str]) -> Any:
+def _without(schema: Any, names: frozenset[str]) -> Any:
     """Return a schema whose objects lack these members, unless a schema for undescribed members covers them."""
     if not names or not isinstance(schema, dict):
         return schema
     found: Schema = {
-        key: _barred(value, names) if key in ONE and key not in {"not", "if"}
-        else [_barred(part, names) for part in value] if key in MANY
-        else {name: _barred(part, names) for name, part in value.items()} if key in NAMED or key == "$defs"
+        key: _without(value, names) if key in ONE and key not in {"not", "if"}
+        else [_without(part, names) for part in value] if key in MANY
+        else {name: _without(part, names) for name, part in value.items()} if key in NAMED or key == "$defs"
         else value
         for key, value in schema.items()
     }  # fmt: skip
@@ -157,7 +157,7 @@ def _barred(schema: Any, names: frozenset[str]) -> Any:
     return found
 
 
-def _opened(schema: Any) -> Any:
+def _open(schema: Any) -> Any:
     """Return a schema that allows members that are not described; alternatives that were apart may then overlap."""
     found = opened(schema)
     return schema if found == schema else _any_of(found)
@@ -252,7 +252,7 @@ class Witnesses:
         parts += [given[key] for key in ("if", "then", "else", "not") if key in given]
         inner = [list(islice(self.of(part, whole, depth + 1), _MOST)) for part in parts]
         yield from (value for values in inner for value in values)
-        yield from _joined(inner)
+        yield from _join(inner)
         yield from self._by_type(given, whole, depth)
 
     def _by_type(self, given: dict[str, Any], whole: Any, depth: int) -> Iterator[Any]:
@@ -331,7 +331,7 @@ class Witnesses:
         return list(found.values())
 
 
-def _joined(parts: list[list[Any]]) -> Iterator[Any]:
+def _join(parts: list[list[Any]]) -> Iterator[Any]:
     """Yield objects that join those of several schemas."""
     objects = [[value for value in values if isinstance(value, dict)][:_FEW] for values in parts]
     found: list[dict[str, Any]] = [{}]

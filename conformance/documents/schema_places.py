@@ -175,7 +175,7 @@ _PLACES: Final = 20
 def foreign_words(document: Schema) -> list[str]:
     """Return each word of another version in the schemas of a document, with the places where it stands."""
     places: dict[str, list[str]] = {}
-    for _, _, told, pointer in _found(document):
+    for _, _, told, pointer in _find(document):
         places.setdefault(told, []).append(pointer)
     version, other = ("3.0 or 2.0", "3.1") if _is_old(document) else ("3.1 or later", "3.0")
     return [
@@ -187,11 +187,11 @@ def foreign_words(document: Schema) -> list[str]:
 
 def without_foreign_words(document: Schema) -> Schema:
     """Return a document without these keywords, so that its other faults can be found."""
-    found = list(_found(document))
+    found = list(_find(document))
     if not found:
         return document
     plain: Schema = deepcopy(document)
-    for holder, key, _, _ in list(_found(plain)):
+    for holder, key, _, _ in list(_find(plain)):
         if isinstance(holder, dict) and not isinstance(holder[key], bool):
             del holder[key]
         else:
@@ -204,7 +204,7 @@ def in_one_version(document: Schema) -> Schema:
 
     Each word keeps its meaning, because its author means that.
     """
-    if next(_found(document), None) is None:
+    if next(_find(document), None) is None:
         return document
     found: Schema = deepcopy(document)
     is_old = _is_old(found)
@@ -225,7 +225,7 @@ def _is_old(document: Schema) -> bool:
     return str(document.get("openapi") or document.get("swagger"))[:3] in {"2.0", "3.0"}
 
 
-def _found(document: Schema) -> Iterator[tuple[Holder, Any, str, str]]:
+def _find(document: Schema) -> Iterator[tuple[Holder, Any, str, str]]:
     """Yield the holder of each such keyword, its key, its name in messages, and the JSON pointer of its schema."""
     is_old = _is_old(document)
     others = [] if _is_2020(document.get("jsonSchemaDialect")) else [""]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from conformance.documents.json_schema import Schema, UnresolvedError, modern, pointed
+from conformance.documents.json_schema import Schema, UnresolvedError, modern, target_of
 
 #: Keywords with one schema; below, those with several schemas, and with several by name.
 ONE: Final = (
@@ -60,7 +60,7 @@ class Side:
 
     def schema(self, given: Any) -> Any:
         """Return a schema of the document, prepared."""
-        return self._prepared(modern(given), frozenset())
+        return self._prepare(modern(given), frozenset())
 
     def target(self, schema: Any) -> Any:
         """Return the schema that a prepared schema refers to; itself, if it is no plain reference."""
@@ -70,7 +70,7 @@ class Side:
             schema = self.definitions[schema["$ref"]]
         return {} if isinstance(schema, dict) and schema.get("$ref") in trail else schema
 
-    def _prepared(self, given: Any, unsent: frozenset[str], *, base: bool = False) -> Any:
+    def _prepare(self, given: Any, unsent: frozenset[str], *, base: bool = False) -> Any:
         if isinstance(given, bool):
             return given
         if not isinstance(given, dict):
@@ -79,26 +79,24 @@ class Side:
         if isinstance(reference, str):
             pointer = {"$ref": self._definition(reference, unsent, base=base)}
             beside = {key: value for key, value in given.items() if key not in {"$ref", "$dynamicRef"}}
-            return pointer if self._alone else {**self._prepared(beside, unsent), **pointer}
+            return pointer if self._alone else {**self._prepare(beside, unsent), **pointer}
         unsent |= self._unsent(given)
         found = {key: value for key, value in given.items() if key in _PLAIN or key in self._opaque}
-        found |= {
-            key: self._prepared(given[key], frozenset()) for key in ONE if isinstance(given.get(key), dict | bool)
-        }
+        found |= {key: self._prepare(given[key], frozenset()) for key in ONE if isinstance(given.get(key), dict | bool)}
         for key in MANY:
             inner = unsent if key != "prefixItems" else frozenset[str]()
             if isinstance(given.get(key), list):
-                found[key] = [self._prepared(part, inner, base=key == "allOf") for part in given[key]]
+                found[key] = [self._prepare(part, inner, base=key == "allOf") for part in given[key]]
         for key in NAMED:
             if isinstance(given.get(key), dict):
-                found[key] = {name: self._prepared(part, frozenset()) for name, part in given[key].items()}
-        self._chosen(found, given)
+                found[key] = {name: self._prepare(part, frozenset()) for name, part in given[key].items()}
+        self._limit_choices(found, given)
         return self._plain(found, given, unsent)
 
     def _plain(self, found: Schema, given: Schema, unsent: frozenset[str]) -> Schema:
         """Return a schema in which words of older drafts have their new form, and nothing unsent is demanded."""
         if isinstance(given.get("items"), list):
-            found["prefixItems"] = [self._prepared(part, frozenset()) for part in given["items"]]
+            found["prefixItems"] = [self._prepare(part, frozenset()) for part in given["items"]]
         required = found.get("required")
         if "required" in found:
             found["required"] = sorted(set(required) - unsent) if isinstance(required, list) else []
@@ -126,7 +124,7 @@ class Side:
 
     def _unsent(self, given: Any, depth: int = 0) -> frozenset[str]:
         """Return the members that are not sent in this direction (OpenAPI 3.0, 4.7.24.2)."""
-        given = self._followed(given)
+        given = self._follow(given)
         if not isinstance(given, dict) or depth > 8:  # noqa: PLR2004 - a chain of inheritance that is longer is a circle
             return frozenset()
         properties, parts = given.get("properties"), given.get("allOf")
@@ -137,13 +135,13 @@ class Side:
     def _is_unsent(self, part: Any) -> bool:
         if not isinstance(part, dict):
             return False
-        target = self._followed(part)
+        target = self._follow(part)
         inner = [*(part.get("allOf") or ()), target] + (target.get("allOf") or [] if isinstance(target, dict) else [])
         return any(
-            isinstance(item, dict) and item.get(self._absent) is True for item in (part, *map(self._followed, inner))
+            isinstance(item, dict) and item.get(self._absent) is True for item in (part, *map(self._follow, inner))
         )
 
-    def _followed(self, value: Any) -> Any:
+    def _follow(self, value: Any) -> Any:
         for _ in range(8):
             if not (isinstance(value, dict) and isinstance(value.get("$ref"), str)):
                 return value
@@ -152,10 +150,10 @@ class Side:
 
     def _raw(self, reference: str) -> Any:
         try:
-            return pointed(self.document, reference)
+            return target_of(self.document, reference)
         except UnresolvedError:
             name = reference.rpartition("#")[2] or reference
-            return next(_named(self.document, name), {})
+            return next(_schemas_named(self.document, name), {})
 
     def _definition(self, reference: str, unsent: frozenset[str], *, base: bool) -> str:
         """Return the reference to a prepared target. With ``base``, a child refers to the schema it inherits from."""
@@ -166,11 +164,11 @@ class Side:
             target = modern(self._raw(reference))
             heirs = [] if base else self._heirs(reference, target)
             self.definitions[name] = (
-                {"anyOf": heirs} if heirs else self._prepared(target, unsent, base=base and "$ref" in (target or ()))
+                {"anyOf": heirs} if heirs else self._prepare(target, unsent, base=base and "$ref" in (target or ()))
             )
         return self._names[key]
 
-    def _chosen(self, found: Schema, given: Schema) -> None:
+    def _limit_choices(self, found: Schema, given: Schema) -> None:
         """Let each alternative have only the values of the discriminator that choose it (OpenAPI 3.1, 4.8.25)."""
         one = given.get("discriminator")
         if not isinstance(one, dict) or not isinstance(one.get("propertyName"), str):
@@ -229,16 +227,16 @@ def _choice(discriminator: Schema, reference: str) -> Schema:
     return {"type": "object", "required": [member], "properties": {member: {"enum": named or [name]}}}
 
 
-def _named(value: Any, name: str) -> Iterator[Any]:
+def _schemas_named(value: Any, name: str) -> Iterator[Any]:
     """Yield the schemas that have a name by $anchor, $dynamicAnchor or $id."""
     if isinstance(value, dict):
         if name in (value.get("$anchor"), value.get("$dynamicAnchor"), value.get("$id")):
             yield value
         for part in value.values():
-            yield from _named(part, name)
+            yield from _schemas_named(part, name)
     elif isinstance(value, list):
         for part in value:
-            yield from _named(part, name)
+            yield from _schemas_named(part, name)
 
 
 _DEPTH: Final = 8
@@ -280,13 +278,13 @@ def plain(schema: Any, side: Side, depth: int = 0) -> Any:
     base: Any = {key: value for key, value in schema.items() if key not in {"allOf", "$ref"}}
     parts = [*schema.get("allOf", ()), *([{"$ref": schema["$ref"]}] if "$ref" in schema else ())]
     for part in parts:
-        base = _merged(base, plain(part, side, depth + 1))
+        base = _merge(base, plain(part, side, depth + 1))
         if base is None:
             return schema
     return base
 
 
-def _merged(one: Any, other: Any) -> Any:
+def _merge(one: Any, other: Any) -> Any:
     """Return a schema that demands what both do; None if they cannot be merged."""
     if one in (True, {}) or other in (True, {}):
         return other if one in (True, {}) else one

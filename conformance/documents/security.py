@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from typing import Any, Final
 
-from conformance.documents.json_schema import Schema, UnresolvedError, pointed
+from conformance.documents.json_schema import Schema, UnresolvedError, target_of
 from conformance.documents.openapi import Operation, methods_of, with_methods
 
 #: Where a credential is sent (header, query, cookie), and its name there; header names are in lower case.
@@ -26,7 +26,7 @@ def schemes_of(document: Schema) -> dict[str, Schema]:
     schemes = components.get("securitySchemes") if isinstance(components, dict) else None
     found = {}
     for name, scheme in schemes.items() if isinstance(schemes, dict) else ():
-        read = _followed(document, scheme)
+        read = _follow(document, scheme)
         if isinstance(read, dict):
             found[str(name)] = read
     return found
@@ -65,7 +65,7 @@ def without_credentials(document: Schema, given: Collection[Place] = ()) -> Sche
         return document
     shared = document.get("security", [])
 
-    def kept(given: Any, taken: Collection[Place]) -> Any:
+    def drop(given: Any, taken: Collection[Place]) -> Any:
         if not isinstance(given, dict) or not isinstance(given.get("parameters"), list):
             return given
         return {**given, "parameters": [item for item in given["parameters"] if _place(document, item) not in taken]}
@@ -79,8 +79,8 @@ def without_credentials(document: Schema, given: Collection[Place] = ()) -> Sche
             if isinstance(one, dict)
         }
         # A parameter of the path is dropped if all its operations treat it as a credential.
-        changed = kept(item, set.intersection(*taken.values())) if taken else item
-        found[path] = with_methods(changed, {method: kept(operations[method], taken[method]) for method in taken})
+        changed = drop(item, set.intersection(*taken.values())) if taken else item
+        found[path] = with_methods(changed, {method: drop(operations[method], taken[method]) for method in taken})
     return {**document, "paths": found}
 
 
@@ -96,12 +96,12 @@ def _places(schemes: dict[str, Schema], security: Any) -> Iterator[Place]:
 
 
 def _place(document: Schema, parameter: Any) -> Place | None:
-    read = _followed(document, parameter)
+    read = _follow(document, parameter)
     return place_of(str(read.get("in", "")), str(read.get("name", ""))) if isinstance(read, dict) else None
 
 
-def _followed(document: Schema, value: Any) -> Any:
+def _follow(document: Schema, value: Any) -> Any:
     try:
-        return pointed(document, value["$ref"]) if isinstance(value, dict) and "$ref" in value else value
+        return target_of(document, value["$ref"]) if isinstance(value, dict) and "$ref" in value else value
     except (UnresolvedError, AttributeError):
         return None

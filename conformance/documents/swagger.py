@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from conformance.documents.json_schema import Schema, pointed
+from conformance.documents.json_schema import Schema, target_of
 
 _METHODS = ("get", "put", "post", "delete", "patch", "head", "options")
 _FORM = "application/x-www-form-urlencoded"
@@ -41,7 +41,7 @@ def as_openapi_3(document: Schema) -> Schema:
     """
     schemes = document.get("securityDefinitions", {})
     components = {
-        "schemas": _renamed(document.get("definitions", {})),
+        "schemas": _as_openapi_3(document.get("definitions", {})),
         "securitySchemes": {name: _scheme(scheme) for name, scheme in schemes.items()},
     }
     found: Schema = {"openapi": "3.0.3", "info": document.get("info", {}), "components": components}
@@ -51,7 +51,7 @@ def as_openapi_3(document: Schema) -> Schema:
     found["paths"] = {
         path: _path_item(document, item) for path, item in document.get("paths", {}).items() if path.startswith("/")
     }
-    return found | {key: _renamed(value) for key, value in document.items() if key.startswith("x-")}
+    return found | {key: _as_openapi_3(value) for key, value in document.items() if key.startswith("x-")}
 
 
 def _servers(document: Schema) -> list[Schema]:
@@ -70,8 +70,8 @@ def _scheme(given: Schema) -> Schema:
 
 
 def _path_item(document: Schema, item: Schema) -> Schema:
-    item = _followed(document, item)
-    shared = [_followed(document, one) for one in item.get("parameters", [])]
+    item = _follow(document, item)
+    shared = [_follow(document, one) for one in item.get("parameters", [])]
     found = {key: value for key, value in item.items() if key.startswith("x-")}
     for method in _METHODS:
         if method in item:
@@ -79,13 +79,13 @@ def _path_item(document: Schema, item: Schema) -> Schema:
     return found
 
 
-def _followed(document: Schema, value: Schema) -> Schema:
-    found: Schema = pointed(document, value["$ref"]) if "$ref" in value else value
+def _follow(document: Schema, value: Schema) -> Schema:
+    found: Schema = target_of(document, value["$ref"]) if "$ref" in value else value
     return found
 
 
 def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
-    own = [_followed(document, item) for item in given.get("parameters", [])]
+    own = [_follow(document, item) for item in given.get("parameters", [])]
     names = {(item["name"], item["in"]) for item in own}
     parameters = [item for item in shared if (item["name"], item["in"]) not in names] + own
     consumes = given.get("consumes", document.get("consumes", _JSON))
@@ -99,12 +99,12 @@ def _operation(document: Schema, given: Schema, shared: list[Schema]) -> Schema:
     body = next((parameter for parameter in parameters if parameter["in"] == "body"), None)
     form = [parameter for parameter in parameters if parameter["in"] == "formData"]
     if body is not None:
-        content = {name: {"schema": _renamed(body.get("schema", {}))} for name in consumes or _JSON}
+        content = {name: {"schema": _as_openapi_3(body.get("schema", {}))} for name in consumes or _JSON}
         found["requestBody"] = {"required": body.get("required", False), "content": content}
     elif form:
         found["requestBody"] = _form(form, consumes)
     found["responses"] = {
-        str(status): _response(_followed(document, response), produces)
+        str(status): _response(_follow(document, response), produces)
         for status, response in given.get("responses", {}).items()
         if not str(status).startswith("x-")
     }
@@ -116,7 +116,7 @@ def _schema_of(given: Schema) -> Schema:
     schema = {key: value for key, value in given.items() if key in _OF_SCHEMA}
     if schema.get("type") == "file":
         schema |= {"type": "string", "format": "binary"}
-    renamed: Schema = _renamed(schema)
+    renamed: Schema = _as_openapi_3(schema)
     return renamed
 
 
@@ -162,7 +162,7 @@ def _response(given: Schema, produces: Any) -> Schema:
     if "schema" in given:
         schema = given["schema"]
         is_file = schema.get("type") == "file"
-        plain = {"type": "string", "format": "binary"} if is_file else _renamed(schema)
+        plain = {"type": "string", "format": "binary"} if is_file else _as_openapi_3(schema)
         examples = given.get("examples", {})
         found["content"] = {
             name: {"schema": plain, **({"example": examples[name]} if name in examples else {})}
@@ -172,13 +172,13 @@ def _response(given: Schema, produces: Any) -> Schema:
     return found
 
 
-def _renamed(value: Any) -> Any:
+def _as_openapi_3(value: Any) -> Any:
     """Return a schema with references to where OpenAPI 3 keeps their targets, and ``nullable``."""
     if isinstance(value, list):
-        return [_renamed(item) for item in value]
+        return [_as_openapi_3(item) for item in value]
     if not isinstance(value, dict):
         return value
-    found = {key: _renamed(item) for key, item in value.items()}
+    found = {key: _as_openapi_3(item) for key, item in value.items()}
     if isinstance(found.get("$ref"), str):
         for old, new in _MOVED.items():
             found["$ref"] = found["$ref"].replace(old, new, 1)

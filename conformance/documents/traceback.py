@@ -54,14 +54,14 @@ def _first(pattern: re.Pattern[bytes], exchange: Exchange) -> str:
     """Return the first match in a response that does not repeat a part of its request, or empty."""
     sent = None
     for found in pattern.finditer(exchange.response.body[:_LOOKED_THROUGH]):
-        sent = sent if sent is not None else _sent(exchange.request)
+        sent = sent if sent is not None else _sent_text(exchange.request)
         text = found[0].decode("utf-8", "replace")
         if _plain(text).strip(_END) not in sent:
             return text[:_SHOWN]
     return ""
 
 
-def _sent(request: Request) -> str:
+def _sent_text(request: Request) -> str:
     """Return all texts of a request as a response may repeat them, in lower case."""
     given = [request.url, *(value for _, value in request.headers), request.body.decode("utf-8", "replace")]
     given += [request.raw.decode("utf-8", "replace")] if request.raw else []

@@ -43,7 +43,7 @@ def _of_resource(
         if local_name(child) == "resource":
             found += _of_resource(child, path.rstrip("/"), parameters, root)
         elif local_name(child) == "method":
-            method = _referred(child, root)
+            method = _method_of(child, root)
             own = parameters
             for request in method.findall(f"{{{WADL}}}request"):
                 own |= _parameters(request)
@@ -52,7 +52,7 @@ def _of_resource(
     return found
 
 
-def _referred(method: etree._Element, root: etree._Element) -> etree._Element:
+def _method_of(method: etree._Element, root: etree._Element) -> etree._Element:
     """Return a method element, or the element that its ``href="#id"`` names."""
     name = method.get("href", "").lstrip("#")
     return next((item for item in root.iter(f"{{{WADL}}}method") if name and item.get("id") == name), method)

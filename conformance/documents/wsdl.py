@@ -198,7 +198,7 @@ class Wsdl:
             SchemaError: they do not compile.
         """
         _ = self.ports, self._reader.ports  # which make wrappers
-        return Types.compiled([*self.schemas, *self._reader.wrappers])
+        return Types.compile([*self.schemas, *self._reader.wrappers])
 
     def shape(self, tag: str) -> Element | None:
         """Return the global element with a tag, or None.
@@ -215,16 +215,16 @@ class Wsdl:
     @property
     def faults(self) -> tuple[str, ...]:
         """Return the faults of the WSDL itself: missing documents, references without a target."""
-        return () if self.foreign else self._judged[0]
+        return () if self.foreign else self._faults_and_notes[0]
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Parts of the WSDL that the suite does not support, which is no fault of the device."""
-        faults, notes = self._judged
+        faults, notes = self._faults_and_notes
         return (*notes, *(faults if self.foreign else ()))
 
     @cached_property
-    def _judged(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    def _faults_and_notes(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         calls = [
             (f"{operation.name} of port {port.name}", operation) for port in self.ports for operation in port.operations
         ]
@@ -251,7 +251,7 @@ class _Reader:
             }
         return self._by_name[path].get(qname(reference, reference.get(attribute)) or "")
 
-    def _named(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
+    def _target(self, path: str, reference: etree._Element, attribute: str) -> etree._Element | None:
         """Return the element that a QName in an attribute names; record a fault if there is none."""
         found = self.find(path, reference, attribute)
         if found is None:
@@ -287,12 +287,12 @@ class _Reader:
             url = address.get("location", "").strip()
             if url.startswith("http") and not is_http(url):
                 self.faults.append(f"the address of port {port.get('name')} is no URL: {url}")
-            binding = self._named("w:binding", port, "binding")
+            binding = self._target("w:binding", port, "binding")
             if binding is not None:
                 yield from self._port(binding, port, url)
 
     def _port(self, binding: etree._Element, port: etree._Element | None = None, url: str = "") -> Iterator[SoapPort]:
-        soap, kind = _soap(binding, "binding"), self._named("w:portType", binding, "type")
+        soap, kind = _soap(binding, "binding"), self._target("w:portType", binding, "type")
         if soap is not None and kind is not None:
             operations = tuple(self._operations(binding, soap, kind))
             places = [binding, *([] if port is None else [port])]
@@ -329,7 +329,7 @@ class _Reader:
             if given is None:
                 continue
             actions[way] = next((given.get(key) for key in _ACTIONS if given.get(key)), None)
-            message = self._named("w:message", given, "message")
+            message = self._target("w:message", given, "message")
             messages += [] if message is None else [message]
             part = bound.find(clark(WSDL, way))
             body = _soap(part, "body") if part is not None else None
@@ -360,7 +360,7 @@ class _Reader:
 
     def _faults(self, declared: etree._Element) -> Iterator[str]:
         for given in declared.iterfind(clark(WSDL, "fault")):
-            message = self._named("w:message", given, "message")
+            message = self._target("w:message", given, "message")
             for part in message.iterfind(clark(WSDL, "part")) if message is not None else ():
                 yield qname(part, part.get("element")) or ""
 
@@ -371,7 +371,7 @@ class _Reader:
             for space in _SPACES
             for element in bound.iterfind(f"{clark(WSDL, 'input')}/{clark(space, 'header')}")
         ]:
-            message = self._named("w:message", block, "message")
+            message = self._target("w:message", block, "message")
             for part in message.iterfind(clark(WSDL, "part")) if message is not None else ():
                 tag = qname(part, part.get("element"))
                 if part.get("name") == block.get("part") and tag:
@@ -527,10 +527,10 @@ def wants_addressing(places: Sequence[etree._Element], policies: Sequence[etree.
     }
     named = [element for element in policies if set(element.attrib.values()) & wanted]
     marks = (clark(WSAW, "UsingAddressing"), clark(WSAM, "Addressing"))
-    return any(_required(mark) for place in (*places, *named) for mark in place.iter(*marks))
+    return any(_is_required(mark) for place in (*places, *named) for mark in place.iter(*marks))
 
 
-def _required(mark: etree._Element) -> bool:
+def _is_required(mark: etree._Element) -> bool:
     """Return whether an extension or a policy assertion on WS-Addressing demands it of each message.
 
     An extension does where `wsdl:required` says so; an assertion does unless it is optional.

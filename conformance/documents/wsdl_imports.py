@@ -14,7 +14,7 @@ from lxml import etree
 from conformance.commandline.device_options import advice
 from conformance.documents.xml import WSDL, XSD, NotXmlError, clark, namespace, parse
 from conformance.documents.xsd import Types
-from conformance.documents.xsd_assembly import SchemaDocument, resolved
+from conformance.documents.xsd_assembly import SchemaDocument, location_of
 
 # Function that returns a document by its resolved location. It raises OSError or ValueError with the reason.
 Fetch = Callable[[str], bytes]
@@ -117,7 +117,7 @@ def _take(found: Collected, place: str, root: etree._Element) -> list[str]:
     if root.tag == clark(WSDL, "definitions"):
         found.definitions.append(root)
         references = [element.get("location") for element in root.findall(clark(WSDL, "import"))]
-        targets += [resolved(place, reference) for reference in references if reference]
+        targets += [location_of(place, reference) for reference in references if reference]
         for number, schema in enumerate(root.iterfind(f"{clark(WSDL, 'types')}/{clark(XSD, 'schema')}")):
             found.schemas.append(SchemaDocument(f"{place}#{number}", schema, inline=True))
             targets += _schema_references(found)
@@ -137,7 +137,7 @@ def _schema_references(found: Collected) -> Iterator[str]:
         *(clark(XSD, name) for name in ("import", "include", "redefine", "override"))
     ):
         reference = element.get("schemaLocation") or ""
-        target = resolved(schema.location, reference) if reference else ""
+        target = location_of(schema.location, reference) if reference else ""
         if element.tag == clark(XSD, "import"):
             space = element.get("namespace") or ""
             found.imported[space] = found.imported.get(space) or target

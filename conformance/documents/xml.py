@@ -170,7 +170,7 @@ class Node:
             found += [(index, *path) for path in child.paths()]
         return found
 
-    def written(self) -> bytes:
+    def serialize(self) -> bytes:
         """Return the document in UTF-8, with all namespaces declared at the root."""
         spaces = sorted(_namespaces(self))
         # Use common prefixes where they exist, because people read findings.
@@ -188,12 +188,12 @@ def _namespaces(node: Node) -> set[str]:
 
 
 def _text(node: Node, prefixes: dict[str, str], bindings: str = "") -> str:
-    def named(tag: str) -> str:
+    def with_prefix(tag: str) -> str:
         space = namespace(tag)
         return f"{prefixes[space]}:{local(tag)}" if space else tag
 
-    values = [(named(name), named(value) if name == _TYPE else value) for name, value in node.attributes]
+    values = [(with_prefix(name), with_prefix(value) if name == _TYPE else value) for name, value in node.attributes]
     attributes = "".join(f" {name}={quoteattr(value)}" for name, value in values)
     inside = escape(node.text) + "".join(_text(child, prefixes) for child in node.children)
-    tag = named(node.tag)
+    tag = with_prefix(node.tag)
     return f"<{tag}{bindings}{attributes}>{inside}</{tag}>" if inside else f"<{tag}{bindings}{attributes}/>"

@@ -83,7 +83,7 @@ class Types:
             raise SchemaError("; ".join(self.problems))
 
     @classmethod
-    def compiled(cls, documents: Sequence[SchemaDocument]) -> Types:
+    def compile(cls, documents: Sequence[SchemaDocument]) -> Types:
         """Return the compiled schemas, cached per process, because compiling takes 0.1 s.
 
         Raises:
@@ -211,14 +211,14 @@ def beyond_compilers(documents: Sequence[SchemaDocument]) -> str:
                 found.setdefault(component, whole)
                 uses.setdefault(component, []).extend(references(whole, document.namespace))
     return (
-        next(filter(None, (_unrolled(one.root) for one in documents)), "")
+        next(filter(None, (_repeat_fault(one.root) for one in documents)), "")
         or _patterns(documents)
         or _chain(uses)
         or _sizes(found)
     )
 
 
-def _unrolled(root: etree._Element) -> str:
+def _repeat_fault(root: etree._Element) -> str:
     for model in root.iter(*_MODELS):
         around = [model]
         for outer in model.iterancestors():  # only up to the type, which has an automaton of its own

@@ -56,7 +56,7 @@ class SchemaDocument:
         """Yield the locations that its references of some kinds name."""
         for reference in self.root.iterchildren(*tags):
             if reference.get("schemaLocation"):
-                yield resolved(self.location, reference.get("schemaLocation", ""))
+                yield location_of(self.location, reference.get("schemaLocation", ""))
 
 
 @dataclass
@@ -74,7 +74,7 @@ class Assembly:
     twice: list[Component] = field(default_factory=list)
 
 
-def resolved(place: str, reference: str) -> str:
+def location_of(place: str, reference: str) -> str:
     """Return a reference in a document as a location, without "." and ".."."""
     if "://" in reference or "://" in place:
         return joined(place, reference)
@@ -85,7 +85,7 @@ def assemble(documents: Sequence[SchemaDocument], folder: Path) -> Assembly:
     """Write documents into a folder, with an entry document that imports them all."""
     made = Assembly(folder / "entry.xsd")
     documents = [one for one in documents if not _only_imports(one)]
-    spaces, inner = _spaces(documents), _redefined(documents)
+    spaces, inner = _spaces(documents), _redefined_ones(documents)
     # Write and parse the inline schema again: a copy would lose the prefixes that the WSDL around it declares.
     roots = [etree.fromstring(etree.tostring(one.root, with_tail=False)) for one in documents]
     names = {one.location: f"document{number}.xsd" for number, one in enumerate(documents)}
@@ -140,7 +140,7 @@ def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
                     found[target] |= new
                     changed = True
     imported = {
-        resolved(one.location, reference.get("schemaLocation", ""))
+        location_of(one.location, reference.get("schemaLocation", ""))
         for one in documents
         for reference in one.root.iterchildren(_IMPORT)
         if not reference.get("namespace") and reference.get("schemaLocation")
@@ -151,7 +151,7 @@ def _spaces(documents: Sequence[SchemaDocument]) -> dict[str, set[str]]:
     return found
 
 
-def _redefined(documents: Sequence[SchemaDocument]) -> set[str]:
+def _redefined_ones(documents: Sequence[SchemaDocument]) -> set[str]:
     """Return the documents that others redefine, with those they include: no other document may include them."""
     by_place = {document.location: document for document in documents}
     waiting = [target for document in documents for target in document.targets(*_REDEFINE)]
@@ -217,7 +217,7 @@ def _relocate(
 ) -> None:
     """Let a document's references name the written files; without includes, unless they are kept."""
     for reference in [*root.iterchildren(_IMPORT, _INCLUDE, *_REDEFINE)]:
-        place = resolved(document.location, reference.get("schemaLocation", ""))
+        place = location_of(document.location, reference.get("schemaLocation", ""))
         if reference.tag == _IMPORT:
             reference.attrib.pop("schemaLocation", "")
             if name := collected.get(reference.get("namespace") or ""):

@@ -143,7 +143,7 @@ class _Reader:
             unknown = Complex(wildcard=True, unknown=True)
             return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
         own = self._type(declared.type)
-        own = _fixed(own, declared) if isinstance(own, Simple) else own
+        own = _with_fixed(own, declared) if isinstance(own, Simple) else own
         return Element(tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable)
 
     def _type(self, declared: Any) -> Simple | Complex:
@@ -155,7 +155,7 @@ class _Reader:
         if self.path.count(id(declared)) > 1 or self.left < 0:
             return Complex()
         attributes = tuple(
-            (str(name), _fixed(_simple(attribute.type), attribute), attribute.use == "required")
+            (str(name), _with_fixed(_simple(attribute.type), attribute), attribute.use == "required")
             for name, attribute in declared.attributes.items()
             if name is not None and attribute.use != "prohibited"
         )
@@ -164,13 +164,13 @@ class _Reader:
             return Complex(None, _simple(declared.content), attributes, wildcard)
         self.path.append(id(declared))
         content = self._group(declared.content)
-        others = [one for one in self._derived(declared) if self.left > 0]
+        others = [one for one in self._subtypes(declared) if self.left > 0]
         derived = tuple((str(one.name), kind) for one in others if isinstance(kind := self._type(one), Complex))
         self.path.pop()
         wildcard = wildcard or any(map(_is_any, declared.content.iter_elements()))
         return Complex(content, None, attributes, wildcard, derived=derived)
 
-    def _derived(self, declared: Any) -> list[Any]:
+    def _subtypes(self, declared: Any) -> list[Any]:
         """Return the global types that are derived from a type directly and have a content of elements."""
         if self.by_base is None:
             self.by_base = {}
@@ -215,7 +215,7 @@ def _is_any(declared: Any) -> bool:
     return type(declared).__name__.endswith("AnyElement")
 
 
-def _fixed(simple: Simple, declared: Any) -> Simple:
+def _with_fixed(simple: Simple, declared: Any) -> Simple:
     """Return a type with the default of a declaration, or with only its fixed value, if it has one."""
     if declared.fixed is None:
         return replace(simple, default=declared.default) if declared.default else simple
@@ -239,7 +239,7 @@ def _simple(declared: Any) -> Simple:
     patterns = None if builtin is declared else getattr(declared, "patterns", None)
     return Simple(
         str(builtin.name).rpartition("}")[2] if builtin is not None else "string",
-        tuple(_written(value) for value in getattr(declared, "enumeration", None) or ()),
+        tuple(_lexical(value) for value in getattr(declared, "enumeration", None) or ()),
         _decimal(getattr(declared, "min_value", None)),
         _decimal(getattr(declared, "max_value", None)),
         getattr(declared, "min_length", None),
@@ -252,7 +252,7 @@ def _simple(declared: Any) -> Simple:
 _FRACTION: Final = clark(XSD, "fractionDigits")
 
 
-def _written(value: object) -> str:
+def _lexical(value: object) -> str:
     return ("true" if value else "false") if isinstance(value, bool) else str(value)
 
 

@@ -18,7 +18,7 @@ from conformance.commandline.secrecy import SECRETS
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
-from conformance.engine.interruption import remembered
+from conformance.engine.interruption import note_signals
 from conformance.engine.motion_answers import answers
 from conformance.engine.planning import conftests, pytest_options
 from conformance.engine.progress import Progress
@@ -93,14 +93,14 @@ def certify(
     """
     run, started = robot.run, Started()
     remarks, recordings, reached = list(notes), Recordings(), True
-    with remembered(run) as interruption:
+    with note_signals(run) as interruption:
         try:
             with suppress(OSError):  # reported at the end
-                write_result(_unfinished(robot, started, command, notes), out)
+                write_result(_draft_result(robot, started, command, notes), out)
             robot.keep_history(HistoryWriter(out, suite_version(), rfc3339(started.at)))
             run.limit.begin()
             robot.connect(progress)
-            reached = robot.reached
+            reached = robot.was_reached
             if reached:
                 # If the robot was never reached, its findings only hide that.
                 if progress is not None:
@@ -116,10 +116,10 @@ def certify(
             interruption.only_record()
             robot.leave_at_rest()
             remarks += robot.end_history()
-        return _concluded(robot, out, remarks, recordings, baseline, started, command, reached=reached)
+        return _conclude(robot, out, remarks, recordings, baseline, started, command, reached=reached)
 
 
-def _unfinished(robot: RobotUnderTest, started: Started, command: str, notes: Iterable[str]) -> dict[str, Any]:
+def _draft_result(robot: RobotUnderTest, started: Started, command: str, notes: Iterable[str]) -> dict[str, Any]:
     """Return the content of result.json for a run that has not ended, which remains if the process is killed."""
     run = replace(robot.run, interrupted=True, aborted="the run has not ended")
     told = [
@@ -142,7 +142,7 @@ def _unfinished(robot: RobotUnderTest, started: Started, command: str, notes: It
     )
 
 
-def _concluded(
+def _conclude(
     robot: RobotUnderTest,
     out: Path,
     remarks: list[str],
@@ -171,8 +171,8 @@ def _concluded(
     remarks += [item["text"] for item in left_out(robot).values()]
     remarks += SECRETS.notes
     mask((cause.finding for cause in causes), robot.connection.credentials)
-    if run.requirement_set is not None and run.scored is not None:
-        seen = score(seen, run.scored, f"requirement set {run.requirement_set.name}")
+    if run.requirement_set is not None and run.scored_ids is not None:
+        seen = score(seen, run.scored_ids, f"requirement set {run.requirement_set.name}")
     verdicts = apply_baseline(seen, baseline, dt.datetime.now(dt.UTC).date())
     stale = stale_entries(seen, baseline)
     remarks += [f"The baseline expects {id_} to fail, and it passes: delete the entry." for id_ in stale]
@@ -195,7 +195,7 @@ def _concluded(
         classes if failed else accepted,
         accepted=Accepted(until, stale),
         started=started.at,
-        finished=started.ended,
+        finished=started.now,
         command=command,
         notes=remarks,
         interrupted=run.interrupted,
@@ -203,14 +203,14 @@ def _concluded(
     if found := answers(run.statement.motion_map, verdicts, recordings):
         document["motion"] = found
     document = SECRETS.masked_json(document)
-    path, unwritten = _written(document, recordings, out)
+    path, unwritten = _write(document, recordings, out)
     if run.interrupted or unwritten:
         code = ExitCode.INTERRUPTED if run.interrupted else ExitCode.INCONCLUSIVE
         return Certification(code, document, path, unwritten)
-    code = OF_VERDICT[overall(accepted, enough=run.decided)] if reached else ExitCode.UNREACHABLE
+    code = OF_VERDICT[overall(accepted, enough=run.is_decided)] if reached else ExitCode.UNREACHABLE
     if stale and code in {ExitCode.PASSED, ExitCode.INCONCLUSIVE}:
         code = ExitCode.FAILED
-    if narrowed and code == ExitCode.INCONCLUSIVE and run.decided and _all_hold(verdicts, run.selection):
+    if narrowed and code == ExitCode.INCONCLUSIVE and run.is_decided and _all_hold(verdicts, run.selection):
         code = ExitCode.PASSED
     return Certification(code, document, path)
 
@@ -229,7 +229,7 @@ def _deciding(
     return {name: value for name, value in class_verdicts(verdicts, claims).items() if name not in beside}
 
 
-def _written(document: dict[str, Any], recordings: Recordings, out: Path) -> tuple[Path, str]:
+def _write(document: dict[str, Any], recordings: Recordings, out: Path) -> tuple[Path, str]:
     """Write the result and its traces, into a temporary folder if ``out`` does not take them.
 
     Returns:
@@ -256,8 +256,8 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             # A check judges several requirements: discard what it recorded on unselected ones.
             judge.evidence[requirement.id] = Evidence(skips=[UNSELECTED])
         elif run.aborted and not (evidence.cases or evidence.skips or evidence.errors):
-            judge.stopped(requirement.id, run.aborted)
-    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
+            judge.note_stopped(requirement.id, run.aborted)
+    seen, causes = by_cause(judge.evidence, run.contract.ledger, run.claims, run.scored_ids, run.beside)
     if not run.contract.is_claimed:
         # Declaring a map claims its class, and a WSDL claims that its operations answer.
         _leave_out(
@@ -266,7 +266,7 @@ def draw_verdicts(run: Run) -> tuple[list[Verdict], list[Cause]]:
             if item.class_ not in {MOTION, ROS} and (not id_.startswith(f"{SOAP}/") or Prerequisite.SEEN in item.needs)
         )
     verdicts = [
-        verdict_of(requirement, seen[requirement.id], run.claims, run.statement.undeclared)
+        verdict_of(requirement, seen[requirement.id], run.claims, run.statement.why_not_tested)
         for requirement in run.contract.ledger.values()
     ]
     return verdicts, causes

@@ -16,7 +16,7 @@ from conformance.contract.classes import Interface, Level
 from conformance.contract.ledger import expanded
 from conformance.contract.pack import Contract
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.scenarios.plan import Step, ordered
+from conformance.scenarios.plan import Step, order_steps
 from conformance.scenarios.scenario import Recordings
 from conformance.scenarios.stage import STAGES, Stage
 from conformance.statement.statement import Statement
@@ -73,7 +73,7 @@ class ChecksPlugin:
 
     def ids_of(self, item: pytest.Item) -> tuple[str, ...]:
         """Return the ids of the requirements that a check judges."""
-        renamed = self._robot().run.contract.renamed
+        renamed = self._robot().run.contract.ids_by_alias
         return tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in self.parts_of(item)))
 
     def parts_of(self, item: pytest.Item) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ class ChecksPlugin:
         for item in kept:
             run.judge.announce(self.parts_of(item))
         steps = [(self.step_of(item), item) for item in kept]
-        turns = {id(step): number for number, step in enumerate(ordered([step for step, _ in steps], ledger))}
+        turns = {id(step): number for number, step in enumerate(order_steps([step for step, _ in steps], ledger))}
         items[:] = [item for _, item in sorted(steps, key=lambda pair: turns[id(pair[0])])]
 
     @pytest.hookimpl(tryfirst=True)
@@ -166,7 +166,7 @@ class ChecksPlugin:
         if not self._robot().has(name):
             reason = _NO_ADDRESS.format(name)
             for id_ in ids if name not in run.contract.interfaces else ():
-                run.judge.unclaimed(id_, reason)
+                run.judge.note_unclaimed(id_, reason)
             pytest.skip(reason)
         if name in run.unreachable:
             pytest.skip(f"the robot's {name} interface does not answer: {run.unreachable[name]}")
@@ -185,7 +185,7 @@ class ChecksPlugin:
         judged, recent = judge.counts(ids), robot.connection.recent
         before = recent[-1] if recent else None
         try:
-            with robot.run.limit.lifted(when=item.get_closest_marker("motion") is not None):
+            with robot.run.limit.lift(when=item.get_closest_marker("motion") is not None):
                 result: object = yield
         except Exception as error:  # noqa: BLE001 - whatever a robot makes of a check has to become a verdict
             record_exception(robot.run, robot.alive, ids, judged, error)
@@ -227,7 +227,7 @@ class ChecksPlugin:
         if ids and report.skipped and call.excinfo is not None:
             run = self._robot().run
             reason = str(getattr(call.excinfo.value, "msg", call.excinfo.value))
-            say = run.judge.stopped if run.aborted else run.judge.skip
+            say = run.judge.note_stopped if run.aborted else run.judge.skip
             for id_ in ids:
                 say(id_, reason)
         return report

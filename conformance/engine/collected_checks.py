@@ -36,7 +36,7 @@ class _Checks:
 
     def __init__(self, contract: Contract) -> None:
         self._ledger, self._everywhere = contract.ledger, contract.name == DEFAULT_PACK
-        self._renamed = contract.renamed
+        self._renamed = contract.ids_by_alias
         self.found: dict[str, dict[str, Check]] = defaultdict(dict)
         self.broken = ""
 
@@ -48,7 +48,7 @@ class _Checks:
         for part in expanded(marked, self._ledger):
             id_ = self._renamed.get(part, part)
             if own or id_ in self._ledger:
-                check = _described(item)
+                check = _describe(item)
                 earlier = self.found[id_].get(check.name, check)
                 self.found[id_][check.name] = replace(
                     check, scenarios=tuple(dict.fromkeys([*earlier.scenarios, *check.scenarios]))
@@ -60,7 +60,7 @@ class _Checks:
             self.broken = f"{report.nodeid} cannot be imported: {report.longrepr}"
 
 
-def _described(item: pytest.Item) -> Check:
+def _describe(item: pytest.Item) -> Check:
     """Return a collected check; for a rule, only its combination with this scenario."""
     name = f"{item.path.stem}::{item.name.partition('[')[0]}"
     mark = item.get_closest_marker("rule")

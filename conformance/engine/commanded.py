@@ -76,7 +76,7 @@ class Commanded:
     operation: str = ""
 
     @property
-    def declared(self) -> tuple[float, float] | None:
+    def bounds(self) -> tuple[float, float] | None:
         """The least and the greatest value by the schema; None: it does not declare both."""
         found = bounds_of(self.schema)
         return (-found[1], found[1]) if found and self.direction else found
@@ -84,11 +84,11 @@ class Commanded:
     @property
     def has_unit(self) -> bool:
         """Whether it is known in which unit it is: a share of the greatest, percent and counts are in none."""
-        if self.declared and self.declared[1] in _SHARES:
+        if self.bounds and self.bounds[1] in _SHARES:
             return bool(unit_of(self.place, {}))
         if unit_of(self.place, self.schema) or _TWIST.search(self.place):
             return True
-        return bool(self.declared) and self.schema.get("type") != "integer"
+        return bool(self.bounds) and self.schema.get("type") != "integer"
 
     @property
     def is_relative(self) -> bool:
@@ -108,17 +108,17 @@ class Commanded:
     def little(self) -> float:
         """A small change of the number: a tenth of the declared range, or 0.05 m/s or 0.1 rad/s."""
         usual = _TURN if self.turns else _WAY
-        if self.declared is None:
+        if self.bounds is None:
             return usual
-        part = _PART * max(map(abs, self.declared))
+        part = _PART * max(map(abs, self.bounds))
         return max(1.0, part) if self.schema.get("type") == "integer" else part
 
     @property
     def limits(self) -> tuple[float, float]:
         """Its limits in a map: those declared, or twice a little."""
-        if self.declared is None:
+        if self.bounds is None:
             return -2 * self.little, 2 * self.little
-        return self.declared
+        return self.bounds
 
 
 def bounds_of(schema: Schema) -> tuple[float, float] | None:
@@ -277,7 +277,7 @@ def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: i
         depth: so deep at most.
     """
     made: dict[str, Any] = {}
-    for part in _chosen(schema, names, at) if depth else ():
+    for part in _choose_parts(schema, names, at) if depth else ():
         required = part.get("required", ())
         for name, member in part.get("properties", {}).items():
             place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
@@ -298,18 +298,18 @@ def _is_object(schema: Schema) -> bool:
     return any("properties" in part for part in parts_of(schema))
 
 
-def _chosen(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:
+def _choose_parts(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:
     """Yield a schema's parts, with the alternative that has the most of the places."""
     yield schema
     for part in schema.get("allOf", ()):
-        yield from _chosen(part, names, at)
+        yield from _choose_parts(part, names, at)
     for key in ("anyOf", "oneOf"):
         ranked = sorted(
             (part for part in schema.get(key, ()) if isinstance(part, dict)),
             key=lambda part: sum(place in names for place, _ in numbers_in(part, at)),
         )
         if ranked:
-            yield from _chosen(ranked[-1], names, at)
+            yield from _choose_parts(ranked[-1], names, at)
 
 
 def usual_value(schema: Schema) -> Any:

@@ -10,7 +10,7 @@ from conformance.target.describing import FOLDER, fetch_description
 from conformance.transport.client import Connection
 
 
-def compared(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
+def compare(old: str, new: str, *, allow_files: bool = False) -> list[Change]:
     """Return the changes between the descriptions at two URLs or in two files.
 
     With ``allow_files``, they may refer to files outside their folders.

@@ -37,7 +37,7 @@ from conformance.measures.samples import SEVERAL, Sample
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.preparing import Preparation
-from conformance.scenarios.motion.templates import NoValueError, filled
+from conformance.scenarios.motion.templates import NoValueError, fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_calls import named_by, names_operation
 from conformance.transport.exchange import Exchange, Outgoing
@@ -85,18 +85,18 @@ class Plan:
     preparing: Preparing = NOTHING
     is_prepared: bool = False
 
-    def told(self) -> Iterator[str]:
+    def lines(self) -> Iterator[str]:
         """Yield the planned steps as lines for the user."""
         yield f"{self.drive.label} commands, by its description:"
         for command in self.numbers:
             declared = (
-                f"{command.declared[0]:g} to {command.declared[1]:g}, as declared"
-                if command.declared
+                f"{command.bounds[0]:g} to {command.bounds[1]:g}, as declared"
+                if command.bounds
                 else "no limits declared"
             )
             yield f"  {command.name:<16} {declared}; tried at {command.little:g}"
         yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
-        yield from self.preparing.told(at_once=self.is_prepared)
+        yield from self.preparing.announce(at_once=self.is_prepared)
         far = max(abs(end) for command in self.numbers for end in command.limits)
         room = max(ROOM_M, ROOM_S * far)
         driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
@@ -126,7 +126,7 @@ def plan_of(
     Raises:
         NotPossibleError: it says too little; the message says what.
     """
-    named = _named(operations, drive, "--drive")
+    named = _operation_named(operations, drive, "--drive")
     if is_excluded(named, rules):
         raise NotPossibleError(f"{named.label} must never be called: the description or --never says so")
     chosen, values = _with_values(named, drive)
@@ -144,7 +144,7 @@ def plan_of(
             f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}, "
             f"as in {drive.replace(f'{{{missing[0]}}}', '1')!r}"
         )
-    reads = [_with_values(_named(operations, read, "--read"), read)[0]] if read else []
+    reads = [_with_values(_operation_named(operations, read, "--read"), read)[0]] if read else []
     # A position is read by its name; a number called as a velocity may only repeat what was commanded.
     drives = is_velocity(chosen, numbers)
     named_alike = () if drives else numbers
@@ -181,7 +181,7 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
     return None
 
 
-def _named(operations: Sequence[Operation], label: str, option: str) -> Operation:
+def _operation_named(operations: Sequence[Operation], label: str, option: str) -> Operation:
     labels = named_by([label.strip()], [operation.label for operation in operations])
     found = next(
         (operation for operation in operations if operation.label in labels or operation.id == label.strip()), None
@@ -255,7 +255,7 @@ class Finder(ABC):
     def _begin(self) -> None:
         self._looks, self._turn, self._reads, self._found = Looks(), 0, list(self._plan.reads), Found()
 
-    def found(self) -> Found:
+    def find(self) -> Found:
         """Return the map of the device, which is made ready first if it wants that, and left as it was.
 
         Raises:
@@ -392,7 +392,7 @@ class Finder(ABC):
 
     def _send(self, call: str, body: Any) -> Exchange:
         self._ready.keep()
-        return self._exchange(self._ready.with_lease(self._binding.made(call, body)))
+        return self._exchange(self._ready.with_lease(self._binding.make(call, body)))
 
     def _exchange(self, made: Outgoing) -> Exchange:
         return self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
@@ -410,7 +410,7 @@ class Finder(ABC):
         while True:
             written["lease"] = self._ready.lease
             try:
-                exchange = self._send(filled(self._plan.drive.label, written), filled(self._body, written))
+                exchange = self._send(fill(self._plan.drive.label, written), fill(self._body, written))
             except NoValueError as error:
                 raise NotPossibleError(str(error)) from error
             self._is_accepted = self._is_accepted or exchange.response.ok

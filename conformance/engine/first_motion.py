@@ -63,14 +63,14 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     yield "[motion.state.axes]  # limits and units: yours"
     for at, name in axes.items():
         number = goes.places.get(at) if goes else None
-        least, most = (number and not number.is_relative and number.declared) or bounds_of(schemas[at]) or (-0.1, 0.1)
+        least, most = (number and not number.is_relative and number.bounds) or bounds_of(schemas[at]) or (-0.1, 0.1)
         own = "" if goes else ", tolerance = 0.05"
         unit = basic_string(unit_of(at, schemas[at]))
         yield f"{key(name)} = {{ at = {basic_string(at)}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
     if goes:
         yield ""
         yield "[motion.goto]"
-        yield from _sent(goes)
+        yield from _sending_lines(goes)
         if any(command.is_relative for command in goes.places.values()):
             yield "relative = true"
         yield "tolerance = 0.05"
@@ -78,13 +78,13 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     if drives:
         yield ""
         yield "[motion.velocity]"
-        yield from _sent(drives)
+        yield from _sending_lines(drives)
         yield "tolerance = 0.05"
         yield "# hold_s = 0.5  # so long after the last command it goes on"
         yield ""
         yield "[motion.velocity.axes]  # of: the axis that it changes, by scale at velocity 1"
         for at, one in drives.places.items():
-            least, most = one.declared or (-0.1, 0.1)
+            least, most = one.bounds or (-0.1, 0.1)
             where = f"of = {basic_string(axes[at])}" if at in axes else f"at = {basic_string(at)}"
             yield f"{key(one.name)} = {{ limits = [{least:g}, {most:g}], {where} }}"
 
@@ -103,7 +103,7 @@ def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
         yield f"{operation.label}: no GET tells numbers called {named}; {way}."
 
 
-def _sent(pair: _Pair) -> Iterator[str]:
+def _sending_lines(pair: _Pair) -> Iterator[str]:
     """Yield how an operation is sent."""
     yield f"send = {basic_string(pair.sent.label)}"
     schema, numbers = body_schema(pair.sent), list(pair.places.values())

@@ -123,7 +123,7 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
     robot = Robot(domain_id, "roaas_init")
     try:
         robot.await_ready()
-        told = _settled(robot)
+        told = _settled_graph(robot)
         topics = {name: one["types"] for name, one in told["topics"].items()}
         topics, services, actions = (
             {name: types[0] for name, types in named.items() if types and not _COMMON.search(name)}
@@ -135,7 +135,7 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
         robot.close()
 
 
-def _settled(robot: Robot) -> dict[str, Any]:
+def _settled_graph(robot: Robot) -> dict[str, Any]:
     """Return the ROS graph once other nodes were found and no more appear."""
     until, seen = WALL_CLOCK.now() + _DISCOVERY_S, robot.tell("graph")
     while True:
@@ -217,7 +217,7 @@ def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = N
     reads = one.method == "GET"
     fits = graph.fitting(one.shape if reads else body_schema(one), graph.topics)
     # Partial matches of fields count only if the operation's name also fits.
-    fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared(one, name)}
+    fits = {name: fit for name, fit in fits.items() if not fit.lacks or _shared_words(one, name)}
     name, guess = _best(one, fits, written if reads else ())
     if not name:
         return None
@@ -231,7 +231,7 @@ def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -
     """Return the graph's end that an operation fits best, and why that is a guess; empty if there is none."""
 
     def rank(name: str) -> tuple[bool, bool, int, float]:
-        return name not in written, not fits[name].lacks, fits[name].size, _shared(one, name)
+        return name not in written, not fits[name].lacks, fits[name].size, _shared_words(one, name)
 
     name, *others = sorted(fits, key=rank, reverse=True) or [""]
     equal = [other for other in others if rank(other) == rank(name)]
@@ -240,7 +240,7 @@ def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -
     if name in written:
         return name, "another operation publishes on this topic."
     alike = any(fits[other].size == fits[name].size for other in others)
-    if name and not _shared(one, name) and (alike or fits[name].size < _FEW):
+    if name and not _shared_words(one, name) and (alike or fits[name].size < _FEW):
         return name, "the fields agree, but not the name."
     return name, ""
 
@@ -311,7 +311,7 @@ def _lists(one: Operation, graph: Graph, read: Any) -> _Proposal | None:
     return None
 
 
-def _shared(one: Operation, name: str) -> float:
+def _shared_words(one: Operation, name: str) -> float:
     """Return the share of the words in a ROS name that an operation's path or id has; "vel" is "velocity"."""
     own = re.findall("[a-z]+", name.lower())
     web = re.findall("[a-z]+", re.sub("([a-z])([A-Z])", r"\1 \2", f"{one.template} {one.id}").lower())

@@ -51,7 +51,7 @@ def write_first_statement(path: Path, known: Statement, contract: Contract) -> s
     """
     robot = RobotUnderTest(Run(known, contract), connection_of(known.endpoints))
     robot.connect(sys.stderr)
-    if not robot.reached:
+    if not robot.was_reached:
         return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
     info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}
     info = info if isinstance(info, dict) else {}
@@ -61,8 +61,8 @@ def write_first_statement(path: Path, known: Statement, contract: Contract) -> s
         path,
         _TEMPLATE.format(
             file=path.name,
-            name=_quoted(info.get("title", "")),
-            version=_quoted(info.get("version", "")),
+            name=_quote(info.get("title", "")),
+            version=_quote(info.get("version", "")),
             endpoints="\n".join(_endpoints(robot)),
             claims="".join(f"{line}\n" for line in lines),
         )
@@ -71,7 +71,7 @@ def write_first_statement(path: Path, known: Statement, contract: Contract) -> s
     return ""
 
 
-def _quoted(text: Any) -> str:
+def _quote(text: Any) -> str:
     return basic_string(str(text)[:200])
 
 
@@ -96,11 +96,11 @@ def _endpoints(robot: RobotUnderTest) -> list[str]:
     ):
         why = inert(robot.run.unreachable.get(interface, ""))
         remark = f"  # did not answer: {why}" if why else ""
-        lines.append(f"{key} = {_quoted(value)}{remark}" if value else f'# {key} = ""')
+        lines.append(f"{key} = {_quote(value)}{remark}" if value else f'# {key} = ""')
     return lines
 
 
-def _undescribed(robot: RobotUnderTest) -> list[str]:
+def _descriptions_missing(robot: RobotUnderTest) -> list[str]:
     """Return the names of the descriptions that the robot does not serve."""
     asked: list[tuple[HttpClient, str, str]] = []
     if robot.rest:
@@ -130,7 +130,7 @@ def _doubts(robot: RobotUnderTest) -> dict[str, str]:
             doubts.setdefault(name, f"{' and '.join(silent)} did not answer")
     doubts = {**robot.device.doubts, **doubts}
     if "describe" not in doubts:
-        missing = _undescribed(robot)
+        missing = _descriptions_missing(robot)
         if missing:
             doubts["describe"] = f"the robot serves no {' and no '.join(missing)}"
     if robot.rest and "rest-formats" not in doubts:

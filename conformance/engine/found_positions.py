@@ -12,7 +12,7 @@ from conformance.engine.driven_numbers import ANGLE
 from conformance.engine.finding import AT_REST, ECHO, REFUSED, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise, slope
-from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 
@@ -80,7 +80,7 @@ class PositionFinder(Finder):
                 if number.name in start and self._clock.now() > until:
                     self._found.notes.append(f"{number.name} stays where it is: {_BUDGET_S:g} s were over.")
                 elif number.name in start:
-                    found = self._followed(number, counts[read], start)
+                    found = self._try_axis(number, counts[read], start)
                     if found is not None:
                         moved[number.name] = found
         finally:
@@ -120,18 +120,18 @@ class PositionFinder(Finder):
                 found[number.name] = same[0]
         return found
 
-    def _followed(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
+    def _try_axis(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
         """Move one axis a little to each side, less far if it does not arrive; return how it followed, or None."""
         found, why = None, "its limits leave no room"
         # With declared limits, a part of them is safe; without, start with the smallest move.
-        for part in _PARTS[1:] if number.declared else _PARTS:
+        for part in _PARTS[1:] if number.bounds else _PARTS:
             little = part * number.little
             tries: list[Moved] = []
             for way in (little, -little) if part == _PARTS[-1] else (little,):
                 limits = self._limits(number)
                 if limits and not limits[0] <= start[number.name] + way <= limits[1]:
                     continue
-                one = self._moved(number, places, start, way)
+                one = self._move_axis(number, places, start, way)
                 if isinstance(one, str):
                     why = one
                     tries.clear()
@@ -153,7 +153,7 @@ class PositionFinder(Finder):
 
     def _limits(self, number: Commanded) -> tuple[float, float] | None:
         """Return the limits of a position that are declared, where it is read or where it is commanded; or None."""
-        return bounds_of(self._schemas[number.name]) or (None if self._relative else number.declared)
+        return bounds_of(self._schemas[number.name]) or (None if self._relative else number.bounds)
 
     def _sent_by(self, start: Mapping[str, float], name: str, way: float) -> Exchange:
         """Send one axis farther by a way; a device that is still busy with its last move gets time to end that."""
@@ -165,7 +165,7 @@ class PositionFinder(Finder):
                 return exchange
             self._look()
 
-    def _moved(
+    def _move_axis(
         self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float], way: float
     ) -> Moved | str:
         """Send one axis a little farther, and back; return how it followed, or why it counts as no axis of its own."""
@@ -235,7 +235,7 @@ class PositionFinder(Finder):
         yield f"send = {string(template)}"
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in moved}
-            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': '{seconds}', 'lease': '{lease}'}))}"
+            yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': '{seconds}', 'lease': '{lease}'}))}"
         if self._relative:
             yield "relative = true"
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'

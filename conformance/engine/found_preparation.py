@@ -20,7 +20,7 @@ from conformance.documents.openapi import Operation
 from conformance.engine.commanded import body_schema, commanded_by, parts_of, template_of
 from conformance.engine.map_text import inline
 from conformance.scenarios.motion.preparing import WANTS_LEASE
-from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_calls import NAME, names_operation
 from conformance.statement.motion_map import Lease, Step
@@ -86,7 +86,7 @@ class Preparing:
         found = (*held, *(step.send for step in (*self.before, *self.after)))
         return tuple(filter(None, found))
 
-    def told(self, *, at_once: bool) -> Iterator[str]:
+    def announce(self, *, at_once: bool) -> Iterator[str]:
         """Yield what may be sent before the device moves, or is sent ``at_once``, as lines for the user."""
         first = [*([self.lease.acquire] if self.lease else []), *(step.send for step in self.before)]
         last = [step.send for step in self.after]
@@ -263,17 +263,17 @@ def _body(operation: Operation, *, on: bool | None = None) -> Any:
     schema = body_schema(operation)
     if schema is None:
         return None
-    made = filled(template_of(schema, {}), {"seconds": _ASKED_S})
+    made = fill(template_of(schema, {}), {"seconds": _ASKED_S})
     for part in parts_of(schema):
         for name, member in part.get("properties", {}).items():
-            if on is not None and _SWITCHES.fullmatch(name) and (said := _switched(member, on=on)) is not None:
+            if on is not None and _SWITCHES.fullmatch(name) and (said := _switch_value(member, on=on)) is not None:
                 made[name] = said
             elif made.get(name) == "":
                 made[name] = _STRANGER
     return made
 
 
-def _switched(member: Any, *, on: bool) -> Any:
+def _switch_value(member: Any, *, on: bool) -> Any:
     """Return the value of a member that switches something on or off; None: it has none."""
     for part in parts_of(member):
         if part.get("type") == "boolean":

@@ -24,9 +24,9 @@ from conformance.engine.commanded import (
 from conformance.engine.driven_numbers import ANGLE, HEADING
 from conformance.engine.finding import AT_REST, ECHO, REFUSED, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
-from conformance.measures.responses import Response, agreed, response_to, rests_from
+from conformance.measures.responses import Response, agreement, response_to, rests_from
 from conformance.measures.samples import SEVERAL, Sample, slope
-from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 
 # _DRIVEN_S: duration of a drive. _KEPT_S: interval of commands. _BEFORE_S, _AFTER_S: how long the device is watched, s.
@@ -57,7 +57,7 @@ class VelocityFinder(Finder):
     def _find(self) -> None:
         try:
             responses = self._responses()
-            shown = self._measured(responses)
+            shown = self._measures(responses)
             name, (place, response) = next(iter(shown.items()))
             settle_s = self._settle_s
             hold_s = self._hold_s(
@@ -230,7 +230,7 @@ class VelocityFinder(Finder):
                 named = place.rpartition("/")[2].partition(ANGLE)[0]
                 if ECHO.search(f"{operation} {place}") or not is_axis(named or "value"):
                     continue
-                if (response := agreed(seen)) is not None:
+                if (response := agreement(seen)) is not None:
                     found[operation, place] = response
                 if all(one is not None and one.is_position for one in seen) and any(
                     one.ratio < 0 for one in seen if one
@@ -238,7 +238,7 @@ class VelocityFinder(Finder):
                     self._other_way[f"{place} of {operation}"] = None
         return found
 
-    def _measured(self, responses: Mapping[str, Mapping[tuple[str, str], Response]]) -> dict[str, tuple[str, Response]]:
+    def _measures(self, responses: Mapping[str, Mapping[tuple[str, str], Response]]) -> dict[str, tuple[str, Response]]:
         """Return, for each commanded number, the place in one operation's response that measures it.
 
         Raises:
@@ -253,7 +253,7 @@ class VelocityFinder(Finder):
             tried = ", ".join(f"{command.name} at {command.little:g}" for command in self._plan.numbers)
             raise NotPossibleError(
                 f"{self._plan.drive.label} was accepted ({tried}), and no number of {', '.join(counts)} changed with it"
-                f"{self._reversed}"
+                f"{self._reversed_text}"
             )
         self._reads = [one for one in self._reads if one.label == read]
         own = {
@@ -262,7 +262,8 @@ class VelocityFinder(Finder):
         }
         turns = {command.name for command in self._plan.numbers if command.turns and own[command.name]}
         shown = {
-            command.name: self._shown(command, own[command.name], turning=bool(turns)) for command in self._plan.numbers
+            command.name: self._choose(command, own[command.name], turning=bool(turns))
+            for command in self._plan.numbers
         }
         if turns and not any(shown[name] for name in shown.keys() - turns):
             # A drive shows one direction only: without turning, the direction ahead.
@@ -279,16 +280,16 @@ class VelocityFinder(Finder):
         found = {name: one for name, one in shown.items() if one}
         if not found:
             raise NotPossibleError(
-                f"{read} changes when the device is driven, but no number of it is an axis' own{self._reversed}"
+                f"{read} changes when the device is driven, but no number of it is an axis' own{self._reversed_text}"
             )
         return found
 
     @property
-    def _reversed(self) -> str:
+    def _reversed_text(self) -> str:
         """What is said of numbers that moved against the sign of a velocity; empty: none did."""
         return f"; against the sign that was commanded moved {', '.join(self._other_way)}" if self._other_way else ""
 
-    def _shown(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
+    def _choose(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
         velocities = {place: one for place, one in own.items() if not one.is_position and 1 / _NEAR < one.ratio < _NEAR}
         position = self._shown_as_position(own)
         # A joint is called as what commands it. Once a device has turned, x and y change otherwise.
@@ -407,7 +408,7 @@ class VelocityFinder(Finder):
         still = {command.name: 0 for command in self._plan.numbers if command.name not in shown}
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in shown}
-            yield f"body = {inline(filled(self._body, {**named, **still, 'seconds': 1, 'lease': '{lease}'}))}"
+            yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': 1, 'lease': '{lease}'}))}"
             yield from (direction_line(numbers[name]) for name in shown if numbers[name].direction)
         widest = {name: max(map(abs, numbers[name].limits)) for name in shown}
         off = {name: _OFF if numbers[name].has_unit else _OFF_WITHOUT_UNIT for name in shown}
@@ -419,7 +420,7 @@ class VelocityFinder(Finder):
         else:
             yield f"hold_s = {_DEMANDED_S:g}  # the suite's: none was seen in {self._found.drives_on_s:.1f} s"
             yield "# If the robot by design holds a velocity until it is told otherwise, take out the line above."
-        refuses = bool(REFUSED & self._plan.drive.responses.keys()) and all(numbers[name].declared for name in shown)
+        refuses = bool(REFUSED & self._plan.drive.responses.keys()) and all(numbers[name].bounds for name in shown)
         if refuses:
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
         yield ""
@@ -437,7 +438,7 @@ class VelocityFinder(Finder):
             given["tolerance"] = round(
                 max(off[name] * widest[name], 8 * (0 if response.is_position else response.sigma)), 4
             )
-            source = "limits as declared" if number.declared else "limits: the suite's, as none are declared"
+            source = "limits as declared" if number.bounds else "limits: the suite's, as none are declared"
             yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
 
     def _rest(self, place: str, response: Response, fastest: float) -> float:

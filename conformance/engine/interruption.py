@@ -47,7 +47,7 @@ class Interruption:
 
 
 @contextmanager
-def remembered(run: Run) -> Iterator[Interruption]:
+def note_signals(run: Run) -> Iterator[Interruption]:
     """Set ``run.interrupted`` on a signal and raise KeyboardInterrupt as usual.
 
     Ctrl-Z does not suspend a run that may move the robot: nothing would watch the robot then. Outside the main thread,

@@ -14,7 +14,7 @@ from conformance.checkers.soap_memory import SoapMemory
 from conformance.contract.classes import Interface
 from conformance.documents.wsdl_pack import services_of
 from conformance.engine.certification import draw_verdicts
-from conformance.engine.planning import collected
+from conformance.engine.planning import collect_checks
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.history.events import Began, Ended, HistoryError, Sent, Span, Withdrawn, read_history
 from conformance.history.writing import HISTORY_NAME
@@ -63,7 +63,7 @@ def judge_stored(robot: RobotUnderTest, result: Mapping[str, Any], folder: Path)
     """
     run, requests, ended = robot.run, 0, True
     there = {name for name in (HISTORY_NAME, TRACES_NAME) if (folder / name).exists()}
-    marks = (item.get_closest_marker("rule") for item in collected(robot)) if TRACES_NAME in there else ()
+    marks = (item.get_closest_marker("rule") for item in collect_checks(robot)) if TRACES_NAME in there else ()
     rules = [mark.args for mark in marks if mark is not None]
     known = [scenario for _, scenario in rules]
     traces = read_traces(folder / TRACES_NAME, known, run.judge.fault) if known else Recordings()
@@ -104,12 +104,12 @@ def _is_heard(event: Sent, outcome: Attempt) -> bool:
 
 
 def _tell(judge: Judge, listeners: list[Listener], outcome: Attempt) -> None:
-    judge.sent(outcome)
+    judge.note_sent(outcome)
     for listener in listeners:
         if isinstance(outcome, Exchange):
-            listener.answered(outcome)
+            listener.on_response(outcome)
         else:
-            listener.unanswered(outcome)
+            listener.on_no_response(outcome)
 
 
 def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Listener]:

@@ -96,7 +96,7 @@ class LostDevice:
         sent, kind = _suspects(recent)
         requirement = self._requirement(kind) if sent else ""
         if sent:
-            self._tell(f"the device stopped responding after {_named(sent[-1])}; waiting for it to come back")
+            self._tell(f"the device stopped responding after {_request_text(sent[-1])}; waiting for it to come back")
         self._is_back = self._comes_back()
         if self._is_back:
             # The device may continue what it did when it was lost.
@@ -106,10 +106,10 @@ class LostDevice:
                 run.aborted = "the robot stopped responding"
             return self._is_back
         run.losses += 1
-        found = self._found(sent)
+        found = self._find(sent)
         if kind in OF_GATEWAY.values() and not found.sure and (self._is_back or kind is NoAnswer.UNAVAILABLE):
-            seen = f"a gateway responded {kind} to {_named(sent[-1])} and to requests after it"
-            why = f"cannot tell: {seen}. {self._told(sent, found)}"
+            seen = f"a gateway responded {kind} to {_request_text(sent[-1])} and to requests after it"
+            why = f"cannot tell: {seen}. {self._what_is_known(sent, found)}"
             run.judge.skip(requirement, why)
             run.aborted = "" if self._is_back else why
             return self._is_back
@@ -118,7 +118,7 @@ class LostDevice:
             self._tell("the device responds again; the run goes on")
             return True
         again = f", the {run.losses}th time" if self._is_back else ""
-        run.aborted = f"the device stopped responding after {_named(found.requests[-1])}{again}"
+        run.aborted = f"the device stopped responding after {_request_text(found.requests[-1])}{again}"
         return False
 
     def _requirement(self, kind: NoAnswer | None) -> str:
@@ -156,7 +156,7 @@ class LostDevice:
         """How long the device is waited for, s."""
         return self._run.wait_s or (_RESTART_S if self._run.restart_command else _RETURN_S)
 
-    def _found(self, sent: Sequence[Request]) -> _Found:
+    def _find(self, sent: Sequence[Request]) -> _Found:
         """Return the smallest sequence of requests after which the device is lost again."""
         last = sent[-1]
         self._sends, self._until = _SENDS, time.monotonic() + _LOOKING_S
@@ -231,7 +231,7 @@ class LostDevice:
             False,  # noqa: FBT003 - the condition of check()
             Unanswered(last, problem, kind or NoAnswer.CLOSED),
             "a response, and a device that responds afterwards",
-            found=f"{problem}, and no response to any request since. {self._told(sent, found)}",
+            found=f"{problem}, and no response to any request since. {self._what_is_known(sent, found)}",
             cause=f"{operation or last.endpoint} {'hang' if kind in _HANGS else 'closed'}",
             subject=operation,
             operations=[Showing(operation, 1, last)] if operation else [],
@@ -241,14 +241,14 @@ class LostDevice:
             finding.sequence = tuple(Sent(0.0, request) for request in found.requests)
         judge.ended_by = finding
 
-    def _told(self, sent: Sequence[Request], found: _Found) -> str:
+    def _what_is_known(self, sent: Sequence[Request], found: _Found) -> str:
         """Return, in sentences, what is known about the requests that the device did not survive."""
-        before = [_named(request) for request in reversed(sent[:-1])][:_NAMED]
+        before = [_request_text(request) for request in reversed(sent[:-1])][:_NAMED]
         newest = f" The requests before it, newest first: {', '.join(before)}" if before else ""
         if found.alone:
             return "The same request, sent alone after the device had come back, did it again"
         if found.sure:
-            named = ", ".join(map(_named, found.requests[:-1]))
+            named = ", ".join(map(_request_text, found.requests[:-1]))
             return f"It does so after {named}, and did it again when these requests were repeated"
         if not self._is_back:
             return f"The device did not come back within {self._return_s:g} s, so nothing more was sent.{newest}"
@@ -270,5 +270,5 @@ def _suspects(recent: Sequence[Sending]) -> tuple[list[Request], NoAnswer | None
     return [sending.request for sending in recent[: end + 1]], recent[end].kind
 
 
-def _named(request: Request) -> str:
+def _request_text(request: Request) -> str:
     return f"`{request.method} {request.target[:120]}`"

@@ -10,7 +10,7 @@ from typing import Any
 from conformance.api.rest.validity import INVALID, validity
 from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.motion.binding import JsonBinding
-from conformance.scenarios.motion.templates import NoValueError, filled, quaternion_of
+from conformance.scenarios.motion.templates import NoValueError, fill, quaternion_of
 from conformance.statement.motion_map import MotionMap, Velocity
 from conformance.statement.statement import StatementError
 from conformance.verdict.run import Run
@@ -31,7 +31,7 @@ def check_map(run: Run, statement: Path | None) -> None:
         return
     binding = JsonBinding.of(run.contract)
     for table, call, body, media_type, root in _commands(motion):
-        made = binding.made(call, body, *((media_type, root) if root or media_type else ()))
+        made = binding.make(call, body, *((media_type, root) if root or media_type else ()))
         said = validity(run.contract, made.method, made.target, made.content_type, made.body)
         if said.verdict == INVALID:
             where = _place(statement, table)
@@ -65,10 +65,10 @@ def _commands(motion: MotionMap) -> Iterator[_Command]:
     if motion.velocity:
         yield from _velocities(motion.velocity)
     if motion.stop:
-        yield from _filled("motion.stop", motion.stop.send, motion.stop.body, {})
+        yield from _fill("motion.stop", motion.stop.send, motion.stop.body, {})
     for name, switch in motion.switches.items():
         for value in switch.values:
-            yield from _filled(f"motion.switches.{name}", switch.send, switch.body, {"value": value})
+            yield from _fill(f"motion.switches.{name}", switch.send, switch.body, {"value": value})
 
 
 def _moves(motion: MotionMap) -> Iterator[_Command]:
@@ -80,23 +80,23 @@ def _moves(motion: MotionMap) -> Iterator[_Command]:
         values: dict[str, Any] = {**middle, name: limit, "seconds": goto.seconds}
         for one, turned in axes.items():
             values |= quaternion_of(one, values[one], turned)
-        yield from _filled("motion.goto", goto.send, goto.body, values)
+        yield from _fill("motion.goto", goto.send, goto.body, values)
 
 
 def _velocities(velocity: Velocity) -> Iterator[_Command]:
     for name, speed in velocity.axes.items():
         for value in (*speed.limits, 0.0):
             values = {**dict.fromkeys(velocity.axes, 0.0), name: value}
-            yield from _filled("motion.velocity", velocity.send, velocity.body, values)
+            yield from _fill("motion.velocity", velocity.send, velocity.body, values)
             for way in velocity.ways:
-                yield from _filled("motion.velocity.ways", way.send, way.body, values, way.media_type, way.root)
+                yield from _fill("motion.velocity.ways", way.send, way.body, values, way.media_type, way.root)
 
 
-def _filled(
+def _fill(
     table: str, call: str, body: Any, values: Mapping[str, Any], media_type: str = "", root: str = ""
 ) -> Iterator[_Command]:
     """Yield a command with its values, unless it needs values that only the device knows."""
     try:
-        yield table, filled(call, values), filled(body, values), media_type, root
+        yield table, fill(call, values), fill(body, values), media_type, root
     except NoValueError:
         return

@@ -8,13 +8,13 @@ from typing import Any, Final
 from conformance.contract.described import MOTION
 from conformance.measures.samples import SEVERAL, Sample, slope
 from conformance.scenarios.motion.attempts import attempts_at_rest
-from conformance.scenarios.motion.measuring import end_of_travel, measured
+from conformance.scenarios.motion.measuring import end_of_travel, speed_in
 from conformance.scenarios.motion.moves import clamped_targets, stops, targets
 from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
 from conformance.scenarios.motion.velocities import WAYS, clamped_velocities, let_go, vanishing, velocities
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.statement.motion_map import MotionMap
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 from conformance.verdict.verdicts import Value, Verdict
 
 #: By question: the requirements that answer it.
@@ -95,17 +95,17 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     count, drives = 0, _drives(recordings, velocities)
     so_far = [reading for drive in drives for reading in drive.readings]
     for drive in drives:
-        begun = drive.settled(motion.velocity.settle_s if motion.velocity else 0.0)
+        begun = drive.settled_at(motion.velocity.settle_s if motion.velocity else 0.0)
         seen = [reading for reading in drive.under_way if reading.sent >= begun]
         for name, wanted in drive.wanted.items():
-            found = measured(seen, name, motion) if wanted else None
+            found = speed_in(seen, name, motion) if wanted else None
             # The rule does not judge a drive that ended at an end of travel either.
             if found is not None and end_of_travel(drive.under_way, name, wanted, motion, so_far) is None:
                 count += 1
                 said = f"{name} {found:.3g} in place of {wanted:.3g} per second"
                 worst = max(worst or (-1.0, "", ""), (abs(found - wanted), said, drive.what))
     if worst:
-        return f"{worst[1]} is the farthest off of {counted(count, 'velocity')}".replace(
+        return f"{worst[1]} is the farthest off of {count_of(count, 'velocity')}".replace(
             "velocitys", "velocities"
         ), worst[2]
     for leg in (one for one in _parts(recordings, targets) if isinstance(one, Leg) and one.readings):
@@ -116,7 +116,7 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
             worst = max(
                 worst or (-1.0, "", ""), (off, f"{name} {last[0].values[name]:.3g} in place of {wanted:.3g}", leg.what)
             )
-    return (f"{worst[1]} is the farthest off of {counted(count, 'target')}", worst[2]) if worst else ("", "")
+    return (f"{worst[1]} is the farthest off of {count_of(count, 'target')}", worst[2]) if worst else ("", "")
 
 
 def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
@@ -126,11 +126,11 @@ def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     if took:
         longest, what = max(took)
         return (
-            f"it went on for {max(0.0, longest):.2f} s after velocity 0 at most, in {counted(len(took), 'drive')}",
+            f"it went on for {max(0.0, longest):.2f} s after velocity 0 at most, in {count_of(len(took), 'drive')}",
             what,
         )
     stopped = [leg for leg in _parts(recordings, stops) if isinstance(leg, Leg)]
-    return (f"stopped under way {counted(len(stopped), 'time')}", stopped[0].what) if stopped else ("", "")
+    return (f"stopped under way {count_of(len(stopped), 'time')}", stopped[0].what) if stopped else ("", "")
 
 
 def _vanishes(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
@@ -149,7 +149,7 @@ def _vanishes(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
         return on, picture
     if not said:
         gone = _drives(recordings, let_go)
-        return (f"let go {counted(len(gone), 'time')}", gone[0].what) if gone else ("", "")
+        return (f"let go {count_of(len(gone), 'time')}", gone[0].what) if gone else ("", "")
     return f"it went on for {', '.join(said)}", picture
 
 
@@ -157,7 +157,7 @@ def _drives_on(drive: Drive, motion: MotionMap) -> bool:
     """Return whether the last readings of a drive show it at half of its velocity or more."""
     last = list(drive.after)[-2 * SEVERAL - 1 :]
     for name, wanted in drive.wanted.items():
-        found = measured(last, name, motion) if wanted else None
+        found = speed_in(last, name, motion) if wanted else None
         if found is not None and found * wanted > 0 and abs(found) >= _DRIVES_ON * abs(wanted):
             return True
     return False

@@ -96,7 +96,7 @@ def _only_reads(request: Request, permission: Permission | None) -> bool:
     Raw bytes never do: each server reads them in its own way.
     """
     target = urlsplit(request.url)
-    path, query = _decoded(target.path), _decoded(target.query)
+    path, query = _decode(target.path), _decode(target.query)
     parts = (query, *(part for pair in request.headers for part in pair))
     alters = any(map(_OVERRIDES.search, parts)) or any(_ALTERS.search(name) for name, _ in request.headers)
     if request.raw is not None or alters:
@@ -109,7 +109,7 @@ def _only_reads(request: Request, permission: Permission | None) -> bool:
     return request.method in SAFE_METHODS and not request.body and not warns and allowed
 
 
-def _decoded(text: str) -> str:
+def _decode(text: str) -> str:
     """Return a part of a target without percent-encoding, however often it was encoded."""
     for _ in range(_MOST_DECODINGS):
         before, text = text, unquote(text)

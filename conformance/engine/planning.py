@@ -10,8 +10,8 @@ from conformance.contract.locating import GENERIC_RULES, module_of
 from conformance.contract.pack import Contract
 from conformance.engine.checks_plugin import ChecksPlugin, is_check
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.scenarios.plan import Step, told
-from conformance.verdict.finding import counted
+from conformance.scenarios.plan import Step, plan_lines
+from conformance.verdict.finding import count_of
 
 _SUITE = Path(__file__).parents[1]
 _UNUSED = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
@@ -37,7 +37,7 @@ def conftests(contract: Contract) -> list[ModuleType]:
     return [module_of(path) for path in sorted(own)]
 
 
-def collected(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
+def collect_checks(robot: RobotUnderTest, plugin: ChecksPlugin | None = None) -> list[pytest.Item]:
     """Return the checks of a run in their order; the robot need not be connected."""
     seen: list[pytest.Item] = []
 
@@ -64,10 +64,10 @@ def collect(robot: RobotUnderTest, *plugins: object) -> None:
 def plan_of(robot: RobotUnderTest) -> list[str]:
     """Return the plan of a run as lines of text; the robot need not be connected."""
     plugin = ChecksPlugin(lambda: robot, lambda: robot.run.contract)
-    seen: list[Step] = [plugin.step_of(item) for item in collected(robot, plugin)]
+    seen: list[Step] = [plugin.step_of(item) for item in collect_checks(robot, plugin)]
     scenarios = {step.scenario.name for step in seen if step.scenario}
     moving = sum(step.moves for step in seen)
-    counts = counted(len(seen), "check"), counted(len(scenarios), "scenario"), counted(moving, "check")
+    counts = count_of(len(seen), "check"), count_of(len(scenarios), "scenario"), count_of(moving, "check")
     first = "{}, {}; {} may move the device.".format(*counts)
     motion = "" if robot.run.allow_motion else " They are skipped without --allow-motion."
-    return [first + motion, *filter(None, [robot.estimate(measured=False)]), *told(seen)]
+    return [first + motion, *filter(None, [robot.estimate(measured=False)]), *plan_lines(seen)]

@@ -14,7 +14,7 @@ from conformance.contract.classes import Level
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.scenarios.stage import STAGES
 from conformance.verdict.causes import by_cause
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
     from click._termui_impl import ProgressBar
@@ -54,7 +54,7 @@ class Progress:
         self._total = len(session.items)
         if self._drawn:
             self._bar = click.progressbar(
-                length=self._total, file=self._out, show_eta=False, show_pos=True, width=_BAR, item_show_func=_fitted
+                length=self._total, file=self._out, show_eta=False, show_pos=True, width=_BAR, item_show_func=_fit
             )
 
     @pytest.hookimpl(wrapper=True)
@@ -86,19 +86,21 @@ class Progress:
     def _so_far(self) -> str:
         """Return the requests and the requirements that fail or warn, in the words and numbers of the summary."""
         run = self._robot.run
-        failures = sum(run.judge.refuted().values())
+        failures = sum(run.judge.failure_counts().values())
         if failures != self._failures:
             # One cause counts as one finding, under the first requirement that reports it.
             self._failures = failures
-            _, causes = by_cause(run.judge.evidence, run.contract.ledger, run.claims, run.scored, run.beside)
+            _, causes = by_cause(run.judge.evidence, run.contract.ledger, run.claims, run.scored_ids, run.beside)
             broken = {cause.finding.requirement for cause in causes if run.selection.has(cause.finding.requirement)}
             levels = Counter(
-                Level.SHOULD if run.scored is not None and id_ not in run.scored else run.contract.ledger[id_].level
+                Level.SHOULD
+                if run.scored_ids is not None and id_ not in run.scored_ids
+                else run.contract.ledger[id_].level
                 for id_ in broken
                 if run.contract.ledger[id_].class_ not in run.beside
             )
             self._found = "".join(f", {levels[level]} {word}" for level, word in _WORDS.items() if levels[level])
-        return f"{counted(self._robot.connection.sent, 'request')}{self._found}"
+        return f"{count_of(self._robot.connection.sent, 'request')}{self._found}"
 
     def _write(self, text: str) -> None:
         if self._out is None:
@@ -110,6 +112,6 @@ class Progress:
         self._out.flush()
 
 
-def _fitted(text: str | None) -> str:
+def _fit(text: str | None) -> str:
     """Return as much of a text as fits behind the bar: a line that wraps could not be drawn over."""
     return (text or "")[: max(0, shutil.get_terminal_size().columns - _BEFORE_TEXT)]

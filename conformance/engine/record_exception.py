@@ -30,7 +30,7 @@ def record_exception(
     if isinstance(error, NotPossibleError | NotPermittedError) or unmade:
         # A note becomes the reason for a skip if nothing was judged; it changes nothing otherwise.
         tell = run.judge.note if isinstance(error, NoOccasionError) else run.judge.skip
-        tell = run.judge.unclaimed if isinstance(error, NotDeclaredError) else tell
+        tell = run.judge.note_unclaimed if isinstance(error, NotDeclaredError) else tell
         tell = run.judge.not_seen if isinstance(error, NotSeenError) else tell
         for id_ in ids:
             tell(id_, str(error))
@@ -59,11 +59,11 @@ def _no_answer(
         # The loss of the device is reported as a finding of its own, or blamed on a gateway.
         for id_ in open_ids:
             if run.aborted or run.judge.ended_by:
-                run.judge.stopped(id_, run.aborted)
+                run.judge.note_stopped(id_, run.aborted)
             else:
                 run.judge.skip(id_, str(error))
     elif goes_on:
-        for id_ in dict.fromkeys(run.contract.renamed.get(id_, id_) for id_ in open_ids):
+        for id_ in dict.fromkeys(run.contract.ids_by_alias.get(id_, id_) for id_ in open_ids):
             run.judge.check(id_, False, error.unanswered, "a response")  # noqa: FBT003 - the condition of check()
         run.judge.silent(error.unanswered)
         for finding in run.judge.met:
@@ -71,10 +71,10 @@ def _no_answer(
             if finding.exchange is error.unanswered and finding.seen == 1:
                 finding.among = len(open_ids)
     else:
-        _gone(run, known, open_ids, error)
+        _record_gone(run, known, open_ids, error)
 
 
-def _gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswerError) -> None:
+def _record_gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswerError) -> None:
     """Record that the robot is gone, where the contract has no requirement on that itself."""
     request = error.unanswered.request
     risked = [id_ for id_ in known if id_ in run.judge.at_risk]
@@ -86,7 +86,7 @@ def _gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswerError)
             "a robot that still responds after this request",
             found=f"{error.unanswered.problem}, and no response to any request since",
         )
-    risks = {run.contract.renamed.get(id_, id_) for id_ in risked}
+    risks = {run.contract.ids_by_alias.get(id_, id_) for id_ in risked}
     ended = [finding for finding in run.judge.met if finding.requirement in risks and _ends_with(finding, error)]
     for finding in ended:
         finding.alone = True
@@ -94,7 +94,7 @@ def _gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswerError)
     run.aborted = f"the robot stopped responding ({error.unanswered.problem}, at {request.method} {request.url[:200]})"
     for id_ in open_ids:
         if id_ not in risked:
-            run.judge.stopped(id_, run.aborted)
+            run.judge.note_stopped(id_, run.aborted)
 
 
 def _is_claimed(run: Run, finding: Finding) -> bool:

@@ -17,7 +17,7 @@ from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.credentials import is_shown
 from conformance.transport.exchange import Exchange, Listener, NoAnswerError, Request
-from conformance.verdict.finding import Finding, counted
+from conformance.verdict.finding import Finding, count_of
 from conformance.verdict.run import Run
 
 # Codes of a SOAP fault for wrong credentials (WS-Security 12, ONVIF Core 5.11.2.2).
@@ -76,7 +76,7 @@ class RefusalListener(Listener):
     _usual: Request | None = None
     _looks: bool = False
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Count a response.
 
         Raises:
@@ -160,7 +160,7 @@ class RefusalListener(Listener):
         challenge = f" (WWW-Authenticate: {self.challenge})" if self.challenge else ""
         if self.expired:
             return (
-                f"The device accepted the credentials of {counted(self.accepted, 'request')} and then answered "
+                f"The device accepted the credentials of {count_of(self.accepted, 'request')} and then answered "
                 f"{statuses}{challenge}: what came after was not judged. Give credentials that last as long as the run."
             )
         whole = "" if not self.open else " for what demands credentials"

@@ -17,7 +17,7 @@ from conformance.api.rest.guard import Guard
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import UNDELIVERED, stop_device
 from conformance.checkers.rest import RestCheckers
-from conformance.commandline.endings import undisturbed
+from conformance.commandline.endings import ignore_signals
 from conformance.contract.described import MOTION
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
@@ -162,7 +162,7 @@ def replay_and_stop(
             found.append(replay(id_, failure, connection, rest if contract else None, contract, until))
     finally:
         if stop is not None:
-            with undisturbed():
+            with ignore_signals():
                 unstopped = stop.send()
     return found, unstopped
 
@@ -292,6 +292,8 @@ def _observed_to_fail(contract: Contract, base_url: str, requirement: str, excha
     run = Run(empty_statement(contract), contract)
     with closing(HttpClient(base_url, Connection())) as client:
         api = RestInterface(run, client)
-        CheckerListener(run.judge, [RestCheckers(contract, base_url), *api.device.checkers(api, ())]).answered(exchange)
+        CheckerListener(run.judge, [RestCheckers(contract, base_url), *api.device.checkers(api, ())]).on_response(
+            exchange
+        )
     evidence = run.judge.of(requirement)
     return bool(evidence and evidence.failures)

@@ -61,16 +61,16 @@ class SentListener(Listener):
     def __init__(self, judge: Judge) -> None:
         self._judge = judge
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Report a request with its response."""
-        self._judge.sent(exchange)
+        self._judge.note_sent(exchange)
 
-    def unanswered(self, request: Unanswered) -> None:
+    def on_no_response(self, request: Unanswered) -> None:
         """Report a request without a response."""
-        self._judge.sent(request)
+        self._judge.note_sent(request)
 
 
-def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
+def as_json(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
     """Return a sequence of requests as JSON; ``at_s`` is the time since the first request, s."""
     return [
         {
@@ -78,8 +78,8 @@ def written(sequence: Sequence[Sent]) -> list[dict[str, Any]]:
             "method": sent.request.method,
             "url": sent.request.url,
             "headers": [list(pair) for pair in sent.request.headers],
-            "body": _packed(sent.request.body),
-            "raw": None if sent.request.raw is None else _packed(sent.request.raw),
+            "body": _pack(sent.request.body),
+            "raw": None if sent.request.raw is None else _pack(sent.request.raw),
         }
         for sent in sequence
     ]
@@ -90,7 +90,7 @@ def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
     if not SECRETS:
         return
 
-    def masked(request: Request) -> Request:
+    def mask_one(request: Request) -> Request:
         body = SECRETS.masked_bytes(credentials.hidden_bytes(request.body))
         octets = None if request.raw is None else SECRETS.masked_bytes(request.raw)
         return request if (body, octets) == (request.body, request.raw) else replace(request, body=body, raw=octets)
@@ -99,12 +99,12 @@ def mask(findings: Iterable[Finding], credentials: Credentials) -> None:
         if isinstance(finding.exchange, Exchange):
             response = finding.exchange.response
             response = replace(response, octets=SECRETS.masked_bytes(response.octets))
-            finding.exchange = replace(finding.exchange, request=masked(finding.exchange.request), response=response)
+            finding.exchange = replace(finding.exchange, request=mask_one(finding.exchange.request), response=response)
         elif finding.exchange is not None:
-            finding.exchange = finding.exchange._replace(request=masked(finding.exchange.request))
-        finding.sequence = tuple(message._replace(request=masked(message.request)) for message in finding.sequence)
+            finding.exchange = finding.exchange._replace(request=mask_one(finding.exchange.request))
+        finding.sequence = tuple(message._replace(request=mask_one(message.request)) for message in finding.sequence)
         for label, one in finding.operations.items():
-            finding.operations[label] = one._replace(request=one.request and masked(one.request))
+            finding.operations[label] = one._replace(request=one.request and mask_one(one.request))
 
 
 def read_request(item: dict[str, Any]) -> Request | None:
@@ -113,7 +113,7 @@ def read_request(item: dict[str, Any]) -> Request | None:
     Raises:
         ValueError, KeyError, TypeError: the JSON is malformed.
     """
-    body, octets = _unpacked(item["body"]), None if item["raw"] is None else _unpacked(item["raw"])
+    body, octets = _unpack(item["body"]), None if item["raw"] is None else _unpack(item["raw"])
     if body is None or (item["raw"] is not None and octets is None):
         return None
     headers = tuple((str(name), str(value)) for name, value in item["headers"])
@@ -156,7 +156,7 @@ def send_again(request: Request, connection: Connection) -> Attempt:
             if request.raw is not None:
                 if connection.credentials.awaits_challenge:
                     client.send("GET", where.path)
-                octets = connection.credentials.revealed(request.raw)
+                octets = connection.credentials.reveal(request.raw)
                 return raw.read_one(client, octets, raw.talk(client, octets, answers=1), request.method)[0]
             fields = [pair for pair in request.headers if pair[0].lower() not in _OF_THE_CLIENT]
             own = [(name, value) for name, value in fields if not is_shown(value)]
@@ -168,7 +168,7 @@ def send_again(request: Request, connection: Connection) -> Attempt:
                 request.method,
                 target,
                 headers=own,
-                body=connection.credentials.revealed(request.body),
+                body=connection.credentials.reveal(request.body),
                 fresh=True,
                 authorized=authorized,
             )
@@ -252,13 +252,13 @@ def _fails_again(run: Run, finding: Finding, exchange: Exchange, connection: Con
     )
 
 
-def _packed(octets: bytes) -> str | None:
+def _pack(octets: bytes) -> str | None:
     """Return bytes compressed (RFC 1950) in base64, or None if that is still too large."""
     packed = zlib.compress(octets) if octets else b""
     return base64.b64encode(packed).decode() if len(packed) <= _MOST and len(octets) <= _MOST_SENT else None
 
 
-def _unpacked(text: str | None) -> bytes | None:
+def _unpack(text: str | None) -> bytes | None:
     """Return the original bytes; decompression stops at the size that a run writes, as the result may be hostile."""
     if not text:
         return None if text is None else b""

@@ -13,9 +13,9 @@ from msgspec.json import encode
 from conformance.commandline.out_folder import without_folders, write_json
 from conformance.contract.classes import Interface
 from conformance.documents.openapi import operations_of
-from conformance.engine.resending import written
+from conformance.engine.resending import as_json
 from conformance.engine.robot_under_test import RobotUnderTest
-from conformance.engine.suite import contract_digests, installed, suite_digest, suite_version
+from conformance.engine.suite import contract_digests, suite_digest, suite_version, version_of
 from conformance.engine.web_server import web_server
 from conformance.explaining.advice import topic_of
 from conformance.transport.exchange import Attempt, Unanswered
@@ -58,7 +58,7 @@ def result_document(
     verdicts = [one for one in verdicts if one not in aside]
     ids = {one.requirement.id for one in verdicts}
     causes = [cause for cause in causes if cause.finding.requirement in ids]
-    value = overall(classes, enough=run.decided)
+    value = overall(classes, enough=run.is_decided)
     return {
         "format": RESULT_FORMAT,
         "verdict": value,
@@ -69,7 +69,7 @@ def result_document(
         "interrupted": interrupted,
         "suite": {"version": suite_version(), "contract": run.contract.label, "digest": run.digests["suite"]},
         "pack": {"name": run.contract.name, "version": run.contract.version, "title": run.contract.title},
-        "requirement_set": run.requirement_set.told if run.requirement_set else None,
+        "requirement_set": run.requirement_set.facts if run.requirement_set else None,
         "digests": {
             "statement": run.given.statement,
             "contract": run.digests["contract"],
@@ -84,7 +84,9 @@ def result_document(
         "statement": {
             "robot": statement.robot,
             "endpoints": {
-                key: _shown(value) for key, value in to_builtins(statement.endpoints).items() if value is not None
+                key: _without_folders(value)
+                for key, value in to_builtins(statement.endpoints).items()
+                if value is not None
             },
             "claims": list(run.claims),
             **statement.figures,
@@ -107,7 +109,7 @@ def result_document(
         "environment": {
             "python": platform.python_version(),
             "platform": platform.platform(),
-            "libraries": {name: installed(name) for name in _LIBRARIES},
+            "libraries": {name: version_of(name) for name in _LIBRARIES},
         },
         "classes": {name: value for name, (value, _) in classes.items()},
         "class_titles": {name: run.contract.classes[name].title for name in classes},
@@ -164,10 +166,10 @@ def _beside(robot: RobotUnderTest, aside: list[Verdict]) -> dict[str, Any]:
     return {"web_server": {**found, "requirements": [_requirement(verdict) for verdict in aside]}} if found else {}
 
 
-def _shown(value: Any) -> Any:
+def _without_folders(value: Any) -> Any:
     """Return a statement's values without the folders of its files."""
     if isinstance(value, dict):
-        return {key: _shown(inner) for key, inner in value.items()}
+        return {key: _without_folders(inner) for key, inner in value.items()}
     return without_folders(value) if isinstance(value, str) else value
 
 
@@ -251,7 +253,7 @@ def _failure(finding: Finding) -> dict[str, Any]:
         "request": _request(finding.exchange) if finding.exchange else None,
         "response": _response(finding.exchange) if finding.exchange else None,
         **({"again": {"came_back": finding.again.came_back, "sent": finding.again.sent}} if finding.again else {}),
-        "sequence": written(finding.sequence),
+        "sequence": as_json(finding.sequence),
     }
 
 

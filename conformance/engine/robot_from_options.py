@@ -45,7 +45,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
     effort = config.getoption("robot_effort")
     if effort not in EFFORTS:
         raise pytest.UsageError(f"--robot-effort {effort}: there are {', '.join(EFFORTS)}")
-    claims = statement.claimed(contract)
+    claims = statement.claims_of(contract)
     if statement.claims is None:
         # A pytest test passes or fails, so classes beside the verdict are left out.
         claims = tuple(name for name in claims if not contract.classes[name].beside)
@@ -60,7 +60,7 @@ def robot_from_options(config: pytest.Config) -> RobotUnderTest:
     robot = RobotUnderTest(run, connection_of(where))
     end_like_ctrl_c()  # pytest ends its session, which stops the robot
     robot.connect()
-    if not robot.reached:
+    if not robot.was_reached:
         raise pytest.UsageError(f"the robot cannot be reached: {run.unreachable}")
     return robot
 

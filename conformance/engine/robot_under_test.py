@@ -132,7 +132,7 @@ class RobotUnderTest:
         self._connect_soap()
         kinds = [sending.kind for sending in self.connection.recent]
         # The robot was there, and one of the first requests was too much for it.
-        lost = not self.reached and NoAnswer.CLOSED in kinds and kinds[-1] is NoAnswer.REFUSED
+        lost = not self.was_reached and NoAnswer.CLOSED in kinds and kinds[-1] is NoAnswer.REFUSED
         if lost and self.alive():
             self.run.unreachable.clear()
 
@@ -159,11 +159,11 @@ class RobotUnderTest:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
-            self.run.judge.concerned = lambda request: sorted(self.log.concerned(request)) if self.log else ()
+            self.run.judge.concerned = lambda request: sorted(self.log.labels_of(request)) if self.log else ()
             if self.run.ros and self.run.statement.ros_map is not None:
                 self.ros_ends = RosEnds(self.run.statement.ros_map, self.run.judge.concerned)
-                self.run.judge.judged = self.ros_ends.judged
-        with self._told(Interface.REST, where.rest):
+                self.run.judge.judged = self.ros_ends.count
+        with self._tell_if_slow(Interface.REST, where.rest):
             self._look(Interface.REST, self.rest.client, self.rest.path)
 
     def _connect_soap(self) -> None:
@@ -178,7 +178,7 @@ class RobotUnderTest:
         ):
             url = wsdl or endpoint
             if url:
-                with self._told(name, url):
+                with self._tell_if_slow(name, url):
                     services[name] = open_service(name, wsdl, endpoint, self.connection, path, self.device.messages)
                     self._look(name, services[name].client, services[name].path)
         self._permit_reading(services)
@@ -192,7 +192,7 @@ class RobotUnderTest:
             self.permission.forbid_post_to(services[Interface.PUBLISHERS].endpoint)
 
     @contextmanager
-    def _told(self, name: Interface, url: str) -> Iterator[None]:
+    def _tell_if_slow(self, name: Interface, url: str) -> Iterator[None]:
         """Say what the run waits for if connecting takes long."""
         waits = f"{name}: waiting for {url}, up to {self.connection.timeout_s:g} s for each answer"
         later = threading.Timer(_SILENT_S, self._tell, [waits])
@@ -243,7 +243,7 @@ class RobotUnderTest:
         client.hangs.forget()
         if times:
             run.unreachable.pop(name, None)
-            run.effort = run.effort.seen(statistics.median(times), min(times))
+            run.effort = run.effort.slowed_to(statistics.median(times), min(times))
             self.connection.pace.usual_s = run.effort.usual_ms / 1000
 
     def leave_at_rest(self) -> None:
@@ -284,7 +284,7 @@ class RobotUnderTest:
         return self.rest is not None if name is Interface.REST else name in self.soap.there
 
     @property
-    def reached(self) -> bool:
+    def was_reached(self) -> bool:
         """Return whether any interface responded at the start, or was lost in one of the first requests."""
         return self.run.losses > 0 or any(self.has(name) and name not in self.run.unreachable for name in Interface)
 
@@ -295,7 +295,7 @@ class RobotUnderTest:
         # Requirements on the web server need no operation.
         alone = all(run.contract.classes[name].beside for name in run.claims)
         left_out = run.limit.is_struck or bool(run.refused)
-        if self.log is None or self.rest is None or alone or left_out or not self.reached:
+        if self.log is None or self.rest is None or alone or left_out or not self.was_reached:
             return ""
         return self.log.nothing_shown(self.rest.call_rules)
 
@@ -306,7 +306,7 @@ class RobotUnderTest:
         recent = self.connection.recent
         # A gateway that briefly lost its device shows no fault yet.
         behind_gateway = bool(recent) and recent[-1].kind in OF_GATEWAY.values()
-        with self.run.limit.lifted():
+        with self.run.limit.lift():
             return (not behind_gateway and self._responds(self._grace_s)) or self._comes_back()
 
     def stop(self) -> None:
@@ -346,7 +346,7 @@ class RobotUnderTest:
     def note_uncalled(self) -> None:
         """Note which operations were not called because time was over."""
         if self.run.limit.is_struck and self.log and self.rest:
-            self.run.limit.uncalled = tuple(self.log.uncalled(self.rest.call_rules))
+            self.run.limit.uncalled = tuple(self.log.uncalled_labels(self.rest.call_rules))
 
     @property
     def _grace_s(self) -> float:
@@ -392,7 +392,7 @@ class RobotUnderTest:
 
     def _is_away(self, exchange: Exchange) -> bool:
         """Return whether a gateway responded in the device's place, as to requests that worked before."""
-        with self.run.limit.lifted():
+        with self.run.limit.lift():
             return self._is_of_gateway(exchange) and not self._responds(0.0)
 
     def _endpoint_of(self, request: Request) -> str:
@@ -412,7 +412,7 @@ class RobotUnderTest:
     def _answering(self) -> list[tuple[HttpClient, str]]:
         """Return a client and a path for each interface that responded at the start."""
         found: list[tuple[HttpClient, str]] = []
-        if self.rest is not None and (Interface.REST not in self.run.unreachable or not self.reached):
+        if self.rest is not None and (Interface.REST not in self.run.unreachable or not self.was_reached):
             found.append((self.rest.client, self.rest.path))
         found += [
             (service.client, service.path)

@@ -37,7 +37,7 @@ class RosEnds:
         self._ros, self._concerned = ros, concerned
         self._compared: Counter[str] = Counter()
 
-    def judged(self, requirement: str, exchange: Attempt | None) -> None:
+    def count(self, requirement: str, exchange: Attempt | None) -> None:
         """Count a case."""
         if exchange is not None and requirement.startswith(f"{ROS}/"):
             self._compared.update(self._calls(exchange.request))

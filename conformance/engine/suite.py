@@ -35,7 +35,7 @@ JUDGING = (
 _SELFTEST = {"mutants", "faulty_bodies", "independent_robots", "selftest.py"}
 
 
-def installed(name: str) -> str:
+def version_of(name: str) -> str:
     """Return the version of a distribution, or a text that it is not installed."""
     try:
         return version(name)
@@ -45,7 +45,7 @@ def installed(name: str) -> str:
 
 def suite_version() -> str:
     """Return the version of the installed suite."""
-    return installed("roaas")
+    return version_of("roaas")
 
 
 def suite_digest(contract: Contract, package: Path = _PACKAGE) -> str:
@@ -78,7 +78,7 @@ def file_digest(path: Path) -> str:
     return f"sha256:{hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
-def known(pack: str | None = None) -> dict[str, Any]:
+def suite_facts(pack: str | None = None) -> dict[str, Any]:
     """Return the facts with which a verifier checks this suite's certificates: digests, sets, ledger, profiles."""
     contract = Contract.load(pack or DEFAULT_PACK)
     sets = {
@@ -88,13 +88,13 @@ def known(pack: str | None = None) -> dict[str, Any]:
     return {
         "suite": suite_digest(contract),
         "requirement_sets": {name: one.digest for name, one in sets.items()},
-        "ledger": {id_: _known(item, contract, sets) for id_, item in contract.ledger.items()},
+        "ledger": {id_: _facts_of(item, contract, sets) for id_, item in contract.ledger.items()},
         "contract": contract_digests(contract),
         "profiles": {name: list(classes) for name, classes in contract.profiles.items()},
     }
 
 
-def _known(item: Requirement, contract: Contract, sets: Mapping[str, RequirementSet]) -> dict[str, Any]:
+def _facts_of(item: Requirement, contract: Contract, sets: Mapping[str, RequirementSet]) -> dict[str, Any]:
     """Return the facts on a requirement for a certificate: the fields of `reports.attestation.outcomes.Entry`."""
     ids = {item.id, *item.aliases}
     return {

@@ -9,7 +9,7 @@ import msgspec
 
 from conformance.contract.ledger import Requirement
 from conformance.contract.toml_file import Text, TomlFileError, read_toml
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 from conformance.verdict.verdicts import Value, Verdict
 
 _KNOWN = Path(__file__).with_name("web_servers.toml")
@@ -36,7 +36,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @cache
-def _known() -> _File:
+def _known_servers() -> _File:
     return read_toml(_KNOWN, _File, TomlFileError)
 
 
@@ -53,7 +53,7 @@ def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
     failed = {
         verdict.requirement.id: verdict.requirement for verdict in judged if verdict.value in {Value.FAIL, Value.WARN}
     }
-    tricked = [id_ for id_ in failed if id_ in _known().smuggling]
+    tricked = [id_ for id_ in failed if id_ in _known_servers().smuggling]
     text = " ".join(_sentences(failed.values(), len(judged), tricked, server))
     return {"server": server or None, "text": text, "smuggling": tricked}
 
@@ -61,9 +61,9 @@ def web_server(verdicts: Sequence[Verdict], server: str) -> dict[str, Any]:
 def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str], server: str) -> Iterator[str]:
     name = f"{server[:_SERVER_SHOWN]} by its Server field" if server else "which sends no Server field"
     if not failed:
-        yield f"Its web server, {name}, meets each of the {counted(judged, 'rule')} judged."
+        yield f"Its web server, {name}, meets each of the {count_of(judged, 'rule')} judged."
         return
-    count = f"{len(failed)} of {counted(judged, 'rule')}"
+    count = f"{len(failed)} of {count_of(judged, 'rule')}"
     named = ", ".join(f"{requirement.id} ({requirement.level}, {requirement.source})" for requirement in failed)
     yield f"Its web server, {name}, does not meet {count}: {named}."
     if tricked:
@@ -77,7 +77,7 @@ def _sentences(failed: Collection[Requirement], judged: int, tricked: list[str],
 
 def _remedies(failed: Sequence[str], server: str) -> Iterator[str]:
     """Yield this server's known remedies, each with the rules that it repairs."""
-    for remedy in _known().remedy:
+    for remedy in _known_servers().remedy:
         mended = [id_ for id_ in failed if id_ in remedy.meets]
         if mended and (not remedy.servers or server.lower().startswith(remedy.servers)):
             met = "every rule is met" if len(mended) == len(failed) else f"these are met: {', '.join(mended)}"

@@ -96,7 +96,7 @@ class MemberResult:
     digest: str | None = None
 
     @property
-    def trusted(self) -> list[str]:
+    def trusted_classes(self) -> list[str]:
         """The classes that the robot passed in a complete run, without failures accepted by a baseline."""
         if self.document is None or self.document["interrupted"]:
             return []
@@ -240,12 +240,12 @@ async def _first(process: asyncio.subprocess.Process, event: asyncio.Event, most
 def _statement(member: Member) -> str:
     """Return a statement (TOML) with the addresses from the fleet file."""
     endpoints = [
-        f"{key} = {_written(value)}" for key, value in asdict(member.endpoints).items() if value not in {None, ()}
+        f"{key} = {_toml(value)}" for key, value in asdict(member.endpoints).items() if value not in {None, ()}
     ]
     return "\n".join(["[robot]", f"name = {basic_string(member.name)}", "", "[endpoints]", *endpoints, ""])
 
 
-def _written(value: str | float | tuple[str, ...]) -> str:
+def _toml(value: str | float | tuple[str, ...]) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(basic_string, value))}]"
     return basic_string(value) if isinstance(value, str) else str(value)

@@ -79,7 +79,7 @@ def _robot(result: MemberResult) -> dict[str, Any]:
         "exit_code": result.exit_code,
         "reason": result.reason,
         "seconds": round(result.seconds, 3),
-        "trusted": result.trusted,
+        "trusted": result.trusted_classes,
         "result": result.digest,
     }
     if document is not None:

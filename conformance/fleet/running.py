@@ -36,7 +36,7 @@ class FleetRun:
         self._done = 0
 
     @property
-    def interrupted(self) -> bool:
+    def was_interrupted(self) -> bool:
         """Whether a signal interrupted the fleet."""
         return self._stop.asked.is_set()
 

@@ -48,7 +48,7 @@ class Octets(msgspec.Struct, frozen=True, omit_defaults=True):
             return cls(base64=octets)
 
     @property
-    def kept(self) -> bytes | None:
+    def content(self) -> bytes | None:
         """The octets, or None if only their hash is kept."""
         return None if self.sha256 else self.base64 or self.text.encode()
 
@@ -146,7 +146,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
     @property
     def request(self) -> Request | None:
         """The request, or None if its body was too long to be kept."""
-        body, raw = self.body.kept, self.raw.kept if self.raw else None
+        body, raw = self.body.content, self.raw.content if self.raw else None
         if body is None or (self.raw and raw is None):
             return None
         return Request(self.method, self.url, self.headers, body, raw, self.query)
@@ -159,7 +159,7 @@ class Sent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="event", t
             return None
         if came is None:
             return Unanswered(request, self.problem, self.kind or NoAnswer.CLOSED)
-        body = came.body.kept
+        body = came.body.content
         if body is None:
             return None
         elapsed_ms = 1000 * (self.ended_s - self.sent_s)
@@ -247,12 +247,12 @@ def read_history(path: Path) -> Iterator[Event]:
     decoder = msgspec.json.Decoder(Event)
     try:
         for number, line in enumerate(_lines(read_octets(path, _MOST)), 1):
-            yield _checked(decoder.decode(line), number)
+            yield _check(decoder.decode(line), number)
     except (OSError, ValueError, RecursionError) as error:
         raise HistoryError(f"{path} cannot be read as a history: {error}") from error
 
 
-def _checked(event: Event, number: int) -> Event:
+def _check(event: Event, number: int) -> Event:
     if (number == 1) != isinstance(event, Began):
         raise ValueError(f"line {number}: a history has one event `began`, its first")
     if isinstance(event, Began) and event.version > VERSION:

@@ -96,7 +96,7 @@ class HistoryWriter(Recorder):
             with self.path.open("xb", buffering=0) as file:
                 packer, octets, ends = zlib.compressobj(_FAST, wbits=_GZIP), 0, False
                 while not ends:
-                    lines, ends = self._gathered()
+                    lines, ends = self._gather()
                     if octets > _MOST:
                         self.problem, lines = f"it has more than {_MOST:,} octets", []
                     if ends:
@@ -116,12 +116,12 @@ class HistoryWriter(Recorder):
                 while self._queue.get() is not None:
                     pass
 
-    def _gathered(self) -> tuple[list[bytes], bool]:
+    def _gather(self) -> tuple[list[bytes], bool]:
         """Return the events of the next moment as lines, and whether they are the last ones."""
         lines, item = list[bytes](), self._queue.get()
         self._closing.wait(_GATHERED_S)
         while item is not None:
-            lines.append(msgspec.json.encode(_masked(self._event(item))))
+            lines.append(msgspec.json.encode(_mask(self._event(item))))
             if self._queue.empty():
                 return lines, False
             item = self._queue.get()
@@ -135,7 +135,7 @@ class HistoryWriter(Recorder):
         return Sent.of(passage, number, span, client, self._began_s)
 
 
-def _masked(event: Event) -> object:
+def _mask(event: Event) -> object:
     """Return an event with variables in place of secrets, also in bytes before they are encoded."""
     if not SECRETS:
         return event

@@ -69,7 +69,7 @@ def response_to(
     return None
 
 
-def agreed(responses: Sequence[Response | None]) -> Response | None:
+def agreement(responses: Sequence[Response | None]) -> Response | None:
     """Return a number's response, if drives forth and back at one velocity agree; else None."""
     found = [response for response in responses if response is not None]
     if len(found) < len(responses) or not found or len({response.is_position for response in found}) > 1:

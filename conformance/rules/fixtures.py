@@ -41,7 +41,7 @@ _NEEDED_LATER: Final = ("jsonschema", "schemathesis.specs.openapi")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _watched(
+def _attach_checkers(
     run: Run,
     interfaces: Interfaces,
     connection: Connection,
@@ -71,7 +71,7 @@ def _watched(
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():
         for listener in listeners:
-            listener.answered(exchange)
+            listener.on_response(exchange)
 
 
 def _descriptions(service: SoapService) -> Iterator[Wsdl]:
@@ -146,7 +146,7 @@ def gateway(run: Run, interfaces: Interfaces, ros: RosMap) -> Iterator[Gateway]:
 
 
 @pytest.fixture
-def _prepared(interfaces: Interfaces, run: Run) -> Iterator[None]:
+def _import_early(interfaces: Interfaces, run: Run) -> Iterator[None]:
     """Import modules that later checks need in a background thread, while the current check waits for the robot."""
     services = tuple(interfaces.soap.there.values())
     for service in services:
@@ -162,7 +162,7 @@ def _prepare(services: Iterable[SoapService], run: Run) -> None:
     # What fails here fails again in the check that needs it, and is judged there.
     with suppress(Exception):
         for service in services:
-            _ = service.described.types, service.contract.types
+            _ = service.description.types, service.contract.types
             importlib.import_module("conformance.api.soap.zeep_client")
         for module in _NEEDED_LATER[: 1 if run.effort.name == "quick" else None]:
             importlib.import_module(module)

@@ -5,8 +5,8 @@ from contextlib import ExitStack, closing, suppress
 from typing import Final
 from urllib.parse import quote
 
-from conformance.api.rest.applicable import allowed, callable_operations
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.applicable import allows, callable_operations
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stranger import Stranger
 from conformance.api.rest.things import collection_of, path_chosen
@@ -38,7 +38,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
     closed = [
         item
         for item in operations_of(api.run.contract)
-        if demands(api.run.contract.openapi, item) and allowed(api, item)
+        if demands(api.run.contract.openapi, item) and allows(api, item)
     ]
     if not closed:
         raise NotPossibleError("no operation that may be called requires credentials by the description")
@@ -53,7 +53,7 @@ def anonymous_requests(api: RestInterface, values: Values) -> tuple[Exchange, ..
             tried += [(stranger, True) for stranger in ([unknown, *near] if own else [])]
             if operation.label in api.streams:
                 continue
-            request = written(operation, usual_inputs(operation, values)[0])
+            request = request_of(operation, usual_inputs(operation, values)[0])
             for client, authorized in tried:
                 with suppress(NoAnswerError):  # the survey reports a missing response
                     exchange = client.send(
@@ -83,7 +83,7 @@ def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operati
     for operation in api.run.effort.subsample(closed, _KEPT) if read is not None else ():
         if operation.label in api.streams or read is None:
             continue
-        request = written(operation, usual_inputs(operation, values)[0])
+        request = request_of(operation, usual_inputs(operation, values)[0])
         with suppress(NoAnswerError):
             read.send(api)
             yield api.client.send(
@@ -124,7 +124,7 @@ def _beyond_ascii(api: RestInterface, values: Values, closed: list[Operation]) -
     ]
     reads = [operation for operation in closed if operation.method == "GET" and operation.label not in api.streams]
     for name in names[:1] if reads else ():
-        target = written(reads[0], usual_inputs(reads[0], values)[0]).target
+        target = request_of(reads[0], usual_inputs(reads[0], values)[0]).target
         with suppress(NoAnswerError):
             query = f"{'&' if '?' in target else '?'}{quote(name, safe='')}=%C3%A9"
             yield api.client.send("GET", target + query, authorized=False, fresh=True)

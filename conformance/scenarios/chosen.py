@@ -66,10 +66,10 @@ class Chosen:
         for number, (name, parameter) in enumerate(islice(_filters(listing), _FILTERS)):
             for change in self.changes[: 1 if number else None]:
                 if not self.living.is_over:
-                    self._filtered(listing, things[-1], change, (name, parameter))
-        self._ordered(listing, things)
+                    self._read_filtered(listing, things[-1], change, (name, parameter))
+        self._read_sorted(listing, things)
 
-    def _filtered(self, listing: Listing, thing: Thing, change: Operation, by: tuple[str, Parameter]) -> None:
+    def _read_filtered(self, listing: Listing, thing: Thing, change: Operation, by: tuple[str, Parameter]) -> None:
         """Change the member that a filter is for, and read the lists of both values until they are right."""
         name, parameter = by
         was = members_of(members(thing.last, ())).get(name)
@@ -150,7 +150,7 @@ class Chosen:
             parameters = read.parameter("path")
             is_of = singular(collection_of(path).rpartition("/")[2]) == name and method == "GET"
             if is_of and len(parameters) == 1 and all(fits(parameters[0].schema, one) for one in values):
-                told = {one: self._counted(read, one)[1] for one in values}
+                told = {one: self._count_of(read, one)[1] for one in values}
                 if found := {value: one for value, one in told.items() if one is not None}:
                     yield read, found
 
@@ -160,7 +160,7 @@ class Chosen:
         said = flat(members_of(parts_of(read.shape or {})).get(things, {})).get("description")
         return isinstance(said, str) and bool(_NOW.search(said)) and not _EVER.search(said)
 
-    def _counted(self, read: Operation, value: Any) -> tuple[Exchange, int | None]:
+    def _count_of(self, read: Operation, value: Any) -> tuple[Exchange, int | None]:
         """Return the number of things with a value that a resource reports, or None."""
         things = plain_name(collection_of(self.living.read.template).rpartition("/")[2])
         path = read.template.replace(f"{{{read.parameter('path')[0].name}}}", quote(str(value), safe=""))
@@ -170,11 +170,11 @@ class Chosen:
 
     def _count(self, read: Operation, value: Any, right: int, thing: Thing, after: str) -> None:
         """Read a count until it is that of the list."""
-        found, told = self.living.writer.until(partial(self._counted, read, value), lambda pair: pair[1] == right)
+        found, told = self.living.writer.until(partial(self._count_of, read, value), lambda pair: pair[1] == right)
         expected = f"{right}, as many as the list by {value} has {after}"
         self.living.note(Kind.SHOWN, read.label, found, expected, "" if told == right else str(told), thing)
 
-    def _ordered(self, listing: Listing, things: list[Thing]) -> None:
+    def _read_sorted(self, listing: Listing, things: list[Thing]) -> None:
         """Give two things numbers that sort differently as texts, and sort by them; a checker judges the lists."""
         sort = listing.sort
         if sort is None or len(things) < len(_NUMBERS):

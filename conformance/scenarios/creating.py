@@ -12,7 +12,7 @@ from conformance.api.rest.inputs import usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import identified
+from conformance.api.rest.things import id_member
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
@@ -49,16 +49,16 @@ def created_path(
             break
     if made is None or made.exchange is None or made.status not in statuses:
         return ""
-    return located(surveyor.api, read, made.exchange)
+    return location_of(surveyor.api, read, made.exchange)
 
 
-def located(api: RestInterface, read: Operation, made: Exchange) -> str:
+def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:
     """Return the path of a created thing, as far as the response tells its location, or an empty text."""
     sent, answer = made.request.url, made.response
     location, targets = answer.header("location"), []
     if location and is_same(joined(sent, location), sent):
         targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
-    if id_ := identified(read_json(answer.body).value, read)[1]:
+    if id_ := id_member(read_json(answer.body).value, read)[1]:
         base = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/")
         targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))

@@ -74,7 +74,7 @@ class DescribedMessages:
     ) -> bytes:
         """Return a message as bytes; see `whole`."""
         made = self.whole(port, operation, node, *more, space=space, authorized=authorized)
-        return b'<?xml version="1.0" encoding="utf-8"?>\n' + made.written()
+        return b'<?xml version="1.0" encoding="utf-8"?>\n' + made.serialize()
 
     def whole(
         self,
@@ -93,7 +93,7 @@ class DescribedMessages:
             NotPossibleError: one of them cannot be made.
         """
         token = self.token if authorized else None
-        own = (self._made(tag, operation)[1] for tag in operation.headers)
+        own = (self._make(tag, operation)[1] for tag in operation.headers)
         addressed = addressing_blocks(operation.addressed, port.url) if operation.addressed else ()
         blocks = (*([block_of(token, space or port.envelope)] if token else ()), *own, *addressed, *more)
         return envelope((node,) if node else (), blocks or None, space or port.envelope)
@@ -120,15 +120,15 @@ class DescribedMessages:
         """
         if not operation.request:
             return None, None
-        declared, made = self._made(operation.request, operation, turn, given, form)
+        declared, made = self._make(operation.request, operation, turn, given, form)
         kept = made
         for path, _ in simple_leaves(declared, made) if current else ():
             name = made.at(path).name
             if name not in self.values and (text := current.get(name.lower())) is not None:
                 kept = with_text(kept, path, text)
-        return declared, made if self.found.types.invalid(parse(kept.written())) else kept
+        return declared, made if self.found.types.invalid(parse(kept.serialize())) else kept
 
-    def invented(self, declared: Element, node: Node, *, named: bool = False) -> list[str]:
+    def invented_names(self, declared: Element, node: Node, *, named: bool = False) -> list[str]:
         """Return the names of values that only the device can know: texts, and numbers that are ids.
 
         ``named``: with those of [values], which the device may know no more.
@@ -141,7 +141,7 @@ class DescribedMessages:
             and (named or node.at(path).name not in self.values)
         ]
 
-    def _made(
+    def _make(
         self,
         tag: str,
         operation: SoapOperation,
@@ -160,7 +160,7 @@ class DescribedMessages:
         fault = ""
         for optional in (False, True) if form is None else (True,):
             node = ordinary(declared, optional=optional, form=form or 0)
-            unsure = self.invented(declared, node, named=True)
+            unsure = self.invented_names(declared, node, named=True)
             for path, simple in simple_leaves(declared, node):
                 name = node.at(path).name
                 values = (given.get(name.lower()) if name in unsure else None) or self.values.get(name)
@@ -172,7 +172,7 @@ class DescribedMessages:
                 how = advice(": give the folder of its schema by --schemas")
                 fault = f"no document declares what {lacking} holds{how}"
                 continue
-            fault = self.found.types.invalid(parse(node.written()))
+            fault = self.found.types.invalid(parse(node.serialize()))
             if not fault:
                 return declared, node
         raise NotPossibleError(f"no valid message can be made for {operation.name} without values in [values]: {fault}")

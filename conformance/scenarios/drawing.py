@@ -22,7 +22,7 @@ _ACTING: Final = 12
 SLOW_SHARE: Final = 4
 
 
-def drawn(
+def draw_requests(
     operation: Operation, usual: Inputs, values: Values, effort: Effort, seed: int, slow: Container[str] = ()
 ) -> Iterator[list[Variation]]:
     """Yield the valid, the invalid and the odd requests that are sent to an operation.

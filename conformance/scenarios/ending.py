@@ -15,10 +15,10 @@ from conformance.api.call_rules import words_of
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.inputs import usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.listing import listed
+from conformance.api.rest.listing import items_of
 from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import collection_of, identified, represented
+from conformance.api.rest.things import collection_of, id_member, object_in
 from conformance.api.rest.values import Values
 from conformance.checkers.changes import ENDING, FINAL, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
@@ -27,7 +27,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.scenarios.creating import located
+from conformance.scenarios.creating import location_of
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.own_things import path_of_usual
 from conformance.scenarios.scenario import NoOccasionError, scenario
@@ -89,12 +89,12 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
             begins,
         ):
             api.run.limit.check()
-            with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
+            with api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
                 if create is None:
                     _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
                     break
                 made = writer.send(create)
-                if (path := located(api, read, made)) and made.response.ok:
+                if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
                     _walk(writer, kind, path, steps)
         found.append(replace(kind, paths=tuple(paths)))
@@ -143,9 +143,9 @@ def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
 def _listed_as_done(writer: Writer, kind: Ended) -> str:
     """Return the path of a listed thing that is done."""
     lister = callable_operations(writer.api).get(("GET", collection_of(kind.read.template)))
-    items = listed(read_json(writer.send(lister).response.body).value) if lister is not None else None
+    items = items_of(read_json(writer.send(lister).response.body).value) if lister is not None else None
     for item in items or []:
-        id_ = identified(item, kind.read)[1]
+        id_ = id_member(item, kind.read)[1]
         if isinstance(item, dict) and id_ is not None and item.get(kind.state) in FINAL:
             return f"{collection_of(kind.read.template)}/{id_}"
     return ""
@@ -190,14 +190,14 @@ def used_things(api: RestInterface, values: Values) -> tuple[Deletion, ...]:
     for (method, path), delete in operations.items():
         if method == "DELETE" and "409" in delete.responses and _IN_USE.search(_said_of(api, delete)):
             api.run.limit.check()
-            with api.run.limit.lifted(), suppress(NoAnswerError):
-                found += _used(Writer(api, values), operations, path, delete)
+            with api.run.limit.lift(), suppress(NoAnswerError):
+                found += _delete_used(Writer(api, values), operations, path, delete)
     if not found:
         raise NoOccasionError("the description says of no DELETE that it refuses by 409 what is in use")
     return tuple(found)
 
 
-def _used(writer: Writer, operations: _Operations, path: str, delete: Operation) -> Iterator[Deletion]:
+def _delete_used(writer: Writer, operations: _Operations, path: str, delete: Operation) -> Iterator[Deletion]:
     read, create = operations.get(("GET", path)), operations.get(("POST", collection_of(path)))
     thing = singular(collection_of(path).rpartition("/")[2])
     users = [
@@ -210,12 +210,12 @@ def _used(writer: Writer, operations: _Operations, path: str, delete: Operation)
     if read is None or create is None or not users:
         return
     made, (maker, reader, name) = writer.send(create), users[0]
-    place, id_ = located(writer.api, read, made), identified(read_json(made.response.body).value, read)[1]
+    place, id_ = location_of(writer.api, read, made), id_member(read_json(made.response.body).value, read)[1]
     body = _referring(writer, maker, name, place.rpartition("/")[2] if id_ is None else id_) if place else None
     if body is None:
         return
     using = writer.send(maker, "", body)
-    at = located(writer.api, reader, using) if using.response.ok else ""
+    at = location_of(writer.api, reader, using) if using.response.ok else ""
     if at and members(writer.send(reader, at), (name,)).get(name) == body[name]:
         deleted = writer.conditional(delete, read, place)
         user, there = writer.send(reader, at), writer.send(read, place)
@@ -244,12 +244,12 @@ def _referring(writer: Writer, create: Operation, name: str, id_: Any) -> dict[s
     base = usual if isinstance(usual, dict) else whole
     is_list = "array" in kinds_of(flat(schema).get("properties", {}).get(name, {}))
     body = {**base, name: [id_] if is_list else id_} if isinstance(base, dict) else None
-    body = writer.values.unique.renewed(create, body, schema) if body is not None else None
+    body = writer.values.unique.with_new_values(create, body, schema) if body is not None else None
     return {**body, name: [id_] if is_list else id_} if body is not None and fits(schema, body) else None
 
 
 def _said_of(api: RestInterface, operation: Operation) -> str:
     """Return the description's texts on an operation and its 409."""
     given: Any = api.run.contract.openapi.get("paths", {}).get(operation.template, {}).get(operation.method.lower(), {})
-    said = represented(given.get("responses", {}).get("409", {}), ()).get("description")
+    said = object_in(given.get("responses", {}).get("409", {}), ()).get("description")
     return f"{operation.text} {said if isinstance(said, str) else ''}"

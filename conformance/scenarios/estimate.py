@@ -16,7 +16,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.documents.openapi import Operation
-from conformance.scenarios.drawing import drawn
+from conformance.scenarios.drawing import draw_requests
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.soap_survey import requests_of
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -73,11 +73,11 @@ class Estimate:
 
     def text(self, usual_ms: float | None = None) -> str:
         """Return the estimate as a sentence; without a time if the time of an answer is not known."""
-        requests = f"{_rounded(self.requests)} requests"
+        requests = f"{_round(self.requests)} requests"
         if usual_ms is None:
             return f"This run sends about {requests}; how long that takes depends on the device's response time."
         seconds = self.seconds(usual_ms)
-        long = f"{_rounded(seconds)} s" if seconds < 100 else f"{_rounded(seconds / 60)} minutes"  # noqa: PLR2004 - in one place
+        long = f"{_round(seconds)} s" if seconds < 100 else f"{_round(seconds / 60)} minutes"  # noqa: PLR2004 - in one place
         more = f"; {' and '.join(self.slow)} as long as the device needs" if self.slow else ""
         return (
             f"This run sends about {requests} and takes about {long} (the device answers in {usual_ms:.1f} ms){more}."
@@ -97,27 +97,29 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
     surveyed = covering = fuzzed = 0
     if {"description", "robustness"} & set(run.claims):
         reads = [operation for operation in operations if operation.method == "GET"]
-        surveyed = sum(_surveyed(operation, effort, run.seed) for operation in operations) + TIMED_AGAIN * len(reads)
+        surveyed = sum(_survey_count(operation, effort, run.seed) for operation in operations) + TIMED_AGAIN * len(
+            reads
+        )
         surveyed += max(FEWEST_REPEATS, effort.cases(REPEATS)) if reads else 0
-        generated = [_generated(operation, effort) for operation in operations]
+        generated = [_generated_counts(operation, effort) for operation in operations]
         covering, fuzzed = sum(pair[0] for pair in generated), sum(pair[1] for pair in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
     slow = tuple(name for name in (MOTION, ROS) if name in run.claims)
     return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow)
 
 
-def _surveyed(operation: Operation, effort: Effort, seed: int) -> int:
+def _survey_count(operation: Operation, effort: Effort, seed: int) -> int:
     """Return how many requests of an operation the survey sends."""
     values = Values()
     try:
-        groups = list(drawn(operation, usual_inputs(operation, values)[0], values, effort, seed))
+        groups = list(draw_requests(operation, usual_inputs(operation, values)[0], values, effort, seed))
     except Exception:  # noqa: BLE001 - the survey tells what cannot be read
         return 1
     timed = 0 if effort.name == "quick" or operation.method == "DELETE" else TIMED * (1 + len(groups))
     return 2 + timed + sum(map(len, groups))
 
 
-def _generated(operation: Operation, effort: Effort) -> tuple[int, int]:
+def _generated_counts(operation: Operation, effort: Effort) -> tuple[int, int]:
     """Return how many requests of an operation Schemathesis makes to cover it, and how many Hypothesis draws."""
     inputs = len(operation.parameters) + sum(_members(body.schema) for body in operation.bodies.values())
     if not inputs:
@@ -143,7 +145,7 @@ def _http(operations: Iterable[Operation], effort: Effort) -> tuple[int, int]:
     return own + _EACH_READ * reads + len(operations) + on_one + at_once, at_once
 
 
-def _rounded(value: float) -> str:
+def _round(value: float) -> str:
     """Return a number with two digits that count."""
     return f"{float(f'{value:.2g}'):,.0f}" if value >= 1 else f"{value:.1g}"
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from conformance.api.call_rules import words_of
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.things import collection_of
@@ -37,8 +37,8 @@ def held_operations(api: RestInterface, values: Values) -> Survey:
     is_held = {one.label: api.usual_status.get(one.label) in HELD and one.label not in api.working for one in actions}
     for operation in [one for one in actions if is_held[one.label] or ANOTHER.search(one.text)][:_HELD]:
         api.run.limit.check()
-        with api.run.limit.lifted(), suppress(NoAnswerError):
-            _Held(surveyor, callable_, operation, actions).called()
+        with api.run.limit.lift(), suppress(NoAnswerError):
+            _Held(surveyor, callable_, operation, actions).call()
     return surveyor.trace
 
 
@@ -74,9 +74,9 @@ class _Held:
         # Twice, because one of them may need another one before it.
         self._others = [*found, *([operation for operation in below if operation not in self._endings] * 2)][:_OTHERS]
 
-    def called(self) -> None:
+    def call(self) -> None:
         """Call it until it is accepted, and then on another thing, where the description speaks of a second one."""
-        path = self._made()
+        path = self._create()
         if not path and "}" in self.operation.template:
             return
         is_done = self._call(self.operation, path).ok
@@ -84,7 +84,7 @@ class _Held:
             self._call(other, path)
             if is_done := self._call(self.operation, path).ok:
                 break
-        second = self._made() if is_done and path and ANOTHER.search(self.operation.text) else ""
+        second = self._create() if is_done and path and ANOTHER.search(self.operation.text) else ""
         if second:
             self._read(path)
             self._call(self.operation, second)
@@ -93,7 +93,7 @@ class _Held:
             for text in filter(None, (second, path)):
                 self._call(ending, text)
 
-    def _made(self) -> str:
+    def _create(self) -> str:
         """Create a thing for it; return where it is, or nothing."""
         create = self.operations.get(("POST", collection_of(self.item)))
         read = self.operations.get(("GET", self.item))
@@ -107,7 +107,7 @@ class _Held:
     def _call(self, operation: Operation, path: str) -> Probe:
         """Call an operation, of a thing if it is one's."""
         inputs = usual_inputs(operation, self.surveyor.values)[0]
-        request = written(operation, inputs)
+        request = request_of(operation, inputs)
         if operation.template.startswith(f"{self.item}/"):
             target = path.rstrip("/") + operation.template[len(self.item) :]
             request = Outgoing(request.method, target, request.headers, request.body)

@@ -13,15 +13,15 @@ from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import Inputs, renewed, usual_inputs, written
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
-from conformance.api.rest.things import collection_of, identified
+from conformance.api.rest.things import collection_of, id_member
 from conformance.api.rest.values import Values
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter, plain_name
-from conformance.scenarios.creating import located
+from conformance.scenarios.creating import location_of
 from conformance.scenarios.reaching import key_of, new_key
 from conformance.scenarios.refusing import is_ours, is_refused
 from conformance.scenarios.scenario import NoOccasionError, scenario
@@ -81,7 +81,7 @@ def repeated_keys(api: RestInterface, values: Values) -> tuple[Keyed, ...]:
             continue
         tried += 1
         api.run.limit.check()
-        with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
+        with api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
             rounds = _Rounds(Writer(api, values), operation, key, by_key)
             first = list(rounds.play(0))
             wrong = [creation for creation in first if creation.fault]
@@ -115,7 +115,7 @@ class _Rounds:
         bodies, keys = self._bodies(_TURN + 10 * number), self._keys()
         if len(keys) < _KEYS or not bodies:
             return
-        before = self._listed()
+        before = self._list_paths()
         first = self._send(request := self._request(keys[0], rich := self._rich(bodies[0])))
         if is_refused(first) and rich is not bodies[0]:
             keys[0] = self._keys()[0]
@@ -126,7 +126,7 @@ class _Rounds:
         try:
             again = self._send(request)
             made.append(again)
-            yield self._repeated(first, again, name, before)
+            yield self._judge_repeat(first, again, name, before)
             if len(bodies) > 1 and self.operation.responses.keys() & _REFUSALS:
                 other = self._send(self._request(keys[0], bodies[1]))
                 made.append(other)
@@ -140,26 +140,26 @@ class _Rounds:
                 expected = f"something else than {name}, which was made for another key and another body"
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
                 # A retry may come after other keys; without a promise, a device may remember few keys.
-                more = keys[_KEYS : _KEYS + 1] if _FIRST.search(self._promised()) else []
+                more = keys[_KEYS : _KEYS + 1] if _FIRST.search(self._promise()) else []
                 made += [self._send(self._request(text, bodies[-1])) for text in more]
                 again = self._send(request)
                 made.append(again)
-                yield self._repeated(first, again, name, before)
+                yield self._judge_repeat(first, again, name, before)
             said = f"{self.operation.text} {self.key.says}"
             if len(keys) > _KEYS + 1 and UNSPENT.search(said):
                 yield from self._unspent(keys[_KEYS + 1 :], bodies[0], made)
             if _FIRST.search(said) and self._item is not None and name.startswith("/"):
                 yield from self._later(request, first, self._item, name)
         finally:
-            self._tidied(made)
+            self._tidy_up(made)
 
-    def _promised(self) -> str:
+    def _promise(self) -> str:
         """Return the description's text on idempotency keys: of the operation, the parameter, or the head."""
         head = str(self.writer.api.run.contract.openapi.get("info", {}).get("description", ""))
         own = [part for part in re.split(r"\n\s*\n", head) if _KEY.search(part)]
         return " ".join((self.operation.text, self.key.says, *own))
 
-    def _repeated(self, first: Exchange, again: Exchange, name: str, before: set[str] | None) -> Keyed:
+    def _judge_repeat(self, first: Exchange, again: Exchange, name: str, before: set[str] | None) -> Keyed:
         """Judge a repeated request: performed twice, it has made two things."""
         expected, shown, fault = f"the response with {name}, or a refusal", again, ""
         second = self._name(again) if again.response.ok else ""
@@ -186,7 +186,7 @@ class _Rounds:
         if not other or self._item is None or not name.startswith("/"):
             return ""
         there = members(self.writer.send(self._item, name), was)
-        return ", ".join(f"{shown(now[one])} as {one}" for one in sorted(other) if same(there.get(one), was[one]))
+        return ", ".join(f"{clip(now[one])} as {one}" for one in sorted(other) if same(there.get(one), was[one]))
 
     def _rich(self, inputs: Inputs) -> Inputs:
         """Return inputs with several items in each list of objects, or the same inputs."""
@@ -216,14 +216,14 @@ class _Rounds:
         new = members(write.found, ()) if write is not None and again.response.ok else {}
         other = [name for name in new if name in was and name in now and was[name] != new[name]]
         if other:
-            fault = ", ".join(f"{shown(now[name])} as {name}" for name in other if now[name] == new[name])
+            fault = ", ".join(f"{clip(now[name])} as {name}" for name in other if now[name] == new[name])
             yield Keyed(self.operation.label, "later", again, "the members as in the first response", fault)
 
     def _send(self, request: Outgoing) -> Exchange:
         return self.writer.api.send(request)
 
     def _request(self, key: str, inputs: Inputs) -> Outgoing:
-        return written(self.operation, inputs.having("header", self.key.name, key))
+        return request_of(self.operation, inputs.having("header", self.key.name, key))
 
     def _keys(self) -> list[str]:
         """Return keys that the device does not know, as far as the schema allows them."""
@@ -232,10 +232,10 @@ class _Rounds:
     def _bodies(self, turn: int) -> list[Inputs]:
         """Return inputs with three different bodies, or one if the body cannot vary."""
         usual, values = usual_inputs(self.operation, self.writer.values)[0], self.writer.values
-        first, found = renewed(self.operation, usual, values), list[Inputs]()
+        first, found = with_new_values(self.operation, usual, values), list[Inputs]()
         for number in range(3):
             body = next(iter(self.writer.bodies(self.operation, turn + number)), None)
-            inputs = first if body is None else renewed(self.operation, replace(usual, body=body), values)
+            inputs = first if body is None else with_new_values(self.operation, replace(usual, body=body), values)
             if all(not same(inputs.body, one.body) for one in found) or not found:
                 found.append(inputs)
         return found if len(found) == 3 else found[:1]  # noqa: PLR2004 - see above
@@ -243,20 +243,20 @@ class _Rounds:
     def _name(self, exchange: Exchange) -> str:
         """Return the identifier or location of the thing that a response created; empty if it has neither."""
         if self._item is not None:
-            if path := located(self.writer.api, self._item, exchange):
+            if path := location_of(self.writer.api, self._item, exchange):
                 return path
-            if (id_ := identified(read_json(exchange.response.body).value, self._item)[1]) is not None:
+            if (id_ := id_member(read_json(exchange.response.body).value, self._item)[1]) is not None:
                 return str(id_)
         told = members(exchange, _IDS)
         id_ = next((one for name, one in told.items() if plain_name(name) in _IDS), None)
         return str(id_) if isinstance(id_, str | int) else exchange.response.header("location") or ""
 
-    def _listed(self) -> set[str] | None:
+    def _list_paths(self) -> set[str] | None:
         if self._lister is None or self._item is None or self._lister.parameter("path"):
             return None
         return set(read_whole(self.writer, self._lister, self._item, self._lister.template).ids)
 
-    def _tidied(self, made: list[Exchange]) -> None:
+    def _tidy_up(self, made: list[Exchange]) -> None:
         """Delete the things that these exchanges created."""
         names = {self._name(exchange): None for exchange in made if exchange.response.ok}
         for path in names:

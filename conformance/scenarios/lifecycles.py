@@ -14,11 +14,11 @@ from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.listing import listed
+from conformance.api.rest.listing import items_of
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, identified, identifier_of, path_chosen
+from conformance.api.rest.things import collection_of, id_member, identifier_of, path_chosen
 from conformance.api.rest.values import Values
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -61,7 +61,7 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
         if method == "GET" and collection and create is not None:
             api.run.limit.check()
             # Created things are deleted even after the time limit.
-            with api.run.limit.lifted():
+            with api.run.limit.lift():
                 lives += _seen_twice(partial(_Cycle, Writer(api, values), create, read, operations, held))
     lives += singletons(Writer(api, values), operations)
     if held and not lives:
@@ -135,7 +135,7 @@ class _Cycle:
             found = [self.living.other(thing, self.writer.send(self.read, thing.path)) for thing in things]
             if delete is not None:
                 for thing in things:
-                    self._deleted(thing, delete)
+                    self._delete_and_read(thing, delete)
         except NoAnswerError:
             return True
         return any(found)
@@ -198,10 +198,10 @@ class _Cycle:
 
             def unseen(found: Exchange) -> list[str]:
                 now = members(found, said) if found.response.ok else {}
-                return [f"{shown(was[name])} as {name}, as before it" for name in said if now.get(name) == was[name]]
+                return [f"{clip(was[name])} as {name}, as before it" for name in said if now.get(name) == was[name]]
 
-            found = self.writer.settled(lambda: self.writer.send(self.read, thing.path), unseen)
-            told = ", ".join(f"{shown(one)} as {name}" for name, one in said.items()) or "the thing"
+            found = self.writer.settle(lambda: self.writer.send(self.read, thing.path), unseen)
+            told = ", ".join(f"{clip(one)} as {name}" for name, one in said.items()) or "the thing"
             expected = f"{told}, as {action.label} with status {sent.response.status} said"
             living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing)
             thing.last = found.exchange if found.exchange.response.ok else thing.last
@@ -220,7 +220,7 @@ class _Cycle:
         for number, thing in enumerate(living.things):
             if not thing.is_own:
                 continue
-            deleted = self._deleted(thing, delete)
+            deleted = self._delete_and_read(thing, delete)
             if number == 0 and thing.state is State.GONE and not living.is_over:
                 self.writer.send(delete, thing.path)
                 if self.create.method == "PUT":
@@ -265,9 +265,9 @@ class _Cycle:
         if self.create.method == "PUT":
             if status == HTTPStatus.ACCEPTED:
                 return False
-            self._found(created, path, "")
+            self._read_created(created, path, "")
             return True
-        return self._taken(created, before)
+        return self._register(created, before)
 
     def _create_at_once(self, delete: Operation, count: int) -> None:
         """Create things by two clients at the same moment, of which each gets its own, and delete them."""
@@ -279,14 +279,14 @@ class _Cycle:
         if len({request.body for request in requests}) == len(turns):
             for created in send_together([[(writer.api.client, request) for request in requests]])[0]:
                 if isinstance(created, Exchange) and created.response.status == HTTPStatus.CREATED:
-                    self._taken(created, None)
+                    self._register(created, None)
             for thing in self.living.of(State.ALIVE):
-                self._deleted(thing, delete)
+                self._delete_and_read(thing, delete)
 
-    def _taken(self, created: Exchange, before: set[str] | None) -> bool:
+    def _register(self, created: Exchange, before: set[str] | None) -> bool:
         """Register the thing that a POST created, by the identifiers known before; return whether it is new."""
         status = created.response.status
-        id_ = str(identified(read_json(created.response.body).value, self.read)[1] or "")
+        id_ = str(id_member(read_json(created.response.body).value, self.read)[1] or "")
         is_new = status in {HTTPStatus.CREATED, HTTPStatus.SEE_OTHER} or (
             # A POST that is answered 200 may be a search or a login.
             status == HTTPStatus.OK and before is not None and bool(id_) and id_.casefold() not in before
@@ -299,28 +299,28 @@ class _Cycle:
                 other = f"{path} once more" if sent != created.request.body else ""
                 self.living.note(Kind.THERE, self.create.label, created, expected, other, again)
                 return False
-            self._found(created, path, id_)
+            self._read_created(created, path, id_)
             # Two paths may lead to one thing.
             is_known = any(thing.life.created is created for thing in self.living.of(State.ALIVE)[:-1])
             is_old = is_known or unquote(path.rstrip("/").rpartition("/")[2]).casefold() in (before or ())
             self.living.things[-1].is_own = not is_old
         return bool(paths)
 
-    def _found(self, created: Exchange, path: str, id_: str) -> None:
+    def _read_created(self, created: Exchange, path: str, id_: str) -> None:
         """Read a thing that was created, and compare it with the request."""
         absent = self.writer.until(
             lambda: self.writer.send(self.read, path), lambda exchange: exchange.response.status not in ABSENT
         )
         write = None if not absent.response.ok else self.writer.read_back(self.create, self.read, path, created)
         found = absent if write is None else write.found
-        found_id = str(identified(read_json(found.response.body).value, self.read)[1] or "") if write else ""
+        found_id = str(id_member(read_json(found.response.body).value, self.read)[1] or "") if write else ""
         writes = (write,) if write else ()
         life = Life(self.create.label, self.read.label, created, found, id=id_, found_id=found_id, writes=writes)
         thing = Thing(path, life, found, state=State.ALIVE if found.response.ok else State.UNKNOWN)
         self.living.things.append(thing)
         self.living.remember(thing, write, self.create)
 
-    def _deleted(self, thing: Thing, delete: Operation) -> Exchange:
+    def _delete_and_read(self, thing: Thing, delete: Operation) -> Exchange:
         """Delete a thing, and read it again."""
         deleted = self.writer.conditional(delete, self.read, thing.path)
         is_done = deleted.response.status in {HTTPStatus.OK, HTTPStatus.NO_CONTENT}
@@ -338,7 +338,7 @@ class _Cycle:
         if self.living.listing is not None:
             return set(self.living.listing.ids)
         listing = self.writer.send(self.living.lister)
-        items = listed(read_json(listing.response.body).value) or []
+        items = items_of(read_json(listing.response.body).value) or []
         ids = {identifier_of(item, self.read) for item in items if isinstance(item, dict)}
         return ids if listing.response.ok else None
 

@@ -12,8 +12,8 @@ from datetime import datetime, timedelta, timezone
 from itertools import combinations, islice, product
 from typing import Any, Final
 
-from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.applicable import allows
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.listing import (
@@ -101,7 +101,7 @@ def lists_of(api: RestInterface) -> list[Listing]:
     found = [
         listing_of(operation)
         for operation in operations_of(api.run.contract)
-        if operation.label not in api.streams and allowed(api, operation)
+        if operation.label not in api.streams and allows(api, operation)
     ]
     return [listing for listing in found if listing is not None]
 
@@ -164,7 +164,7 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             reader = Reader(api, values, listing)
             page, until = reader.page(), reader.until
             if page is not None and page.items:
-                reader.refused()
+                reader.send_invalid()
                 filters, doubted = {parameter.name for parameter in listing.filters.values()}, list[dict[str, Any]]()
                 for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
                     found = (
@@ -172,7 +172,7 @@ def vary_lists(api: RestInterface, values: Values) -> None:
                     )
                     if found is not None and query.keys() <= filters and found.items and _is_doubted(listing, found):
                         doubted.append(query)
-                _settled(reader, doubted)
+                _reread_totals(reader, doubted)
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Reader:
         for name, value in {**self.always, **(query or {})}.items():
             inputs = inputs.having("query", name, value)
         # A device may respond differently on a new connection, or with compression.
-        is_odd, request = len(query or {}) % 2 == 1, written(self.listing.operation, inputs)
+        is_odd, request = len(query or {}) % 2 == 1, request_of(self.listing.operation, inputs)
         target = self.path + "".join(request.target.partition("?")[1:]) if self.path else request.target
         headers = (*request.headers, *([("Accept-Encoding", "gzip")] if is_odd else []))
         found, limit = self.api.send(replace(request, target=target, headers=headers), fresh=is_odd), self.listing.limit
@@ -221,16 +221,16 @@ class Reader:
         )
         if limit is not None and page is not None and isinstance(most, int) and 0 < most < len(page.items):
             # A device that raises the limit shows as many items for the raised one.
-            raised = written(self.listing.operation, inputs.having("query", limit.name, len(page.items)))
+            raised = request_of(self.listing.operation, inputs.having("query", limit.name, len(page.items)))
             self.api.send(
                 replace(raised, target=self.path + raised.target[raised.target.index("?") :]) if self.path else raised
             )
         return found
 
-    def refused(self) -> None:
+    def send_invalid(self) -> None:
         """Send an invalid request, after which the valid ones have to be answered as before."""
         for variation in islice(invalid_variations(self.listing.operation, self.usual), 1):
-            self.api.send(written(self.listing.operation, variation.inputs))
+            self.api.send(request_of(self.listing.operation, variation.inputs))
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response, or None."""
@@ -238,9 +238,9 @@ class Reader:
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
 
-    def followed(self, target: str) -> tuple[Exchange, Page] | None:
+    def follow(self, target: str) -> tuple[Exchange, Page] | None:
         """Return a GET of a link's target and the list in its response, or None."""
-        usual = written(self.listing.operation, self.usual)
+        usual = request_of(self.listing.operation, self.usual)
         exchange = self.api.send(replace(usual, target=target))
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
@@ -251,7 +251,7 @@ class Reader:
         return None if part is None else part[1]
 
 
-def _settled(reader: Reader, doubted: list[dict[str, Any]]) -> None:
+def _reread_totals(reader: Reader, doubted: list[dict[str, Any]]) -> None:
     """Read lists with a wrong total again, if no change explains it.
 
     Args:
@@ -381,7 +381,7 @@ class _Parts:
         for walk in (
             self._entire,
             self._exact,
-            self._shifted,
+            self._read_shifted,
             self._beyond,
             self._last,
             self._by_offset,
@@ -408,7 +408,7 @@ class _Parts:
                 return found
         return None
 
-    def _paged(self, way: str, found: Exchange, expected: str, fault: str) -> Paged:
+    def _page_case(self, way: str, found: Exchange, expected: str, fault: str) -> Paged:
         return Paged(self.reader.listing.operation.label, way, found, expected, fault)
 
     def _entire(self, whole: Page) -> Paged | None:
@@ -422,7 +422,7 @@ class _Parts:
         # A limit may select the newest items: then the ends of both lists are equal.
         is_newest = found[-len(whole.items) :] == whole.identities[-len(found) :]
         fault = "" if found[: len(expected)] == expected or is_newest else _difference(expected, found)
-        return self._paged(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
+        return self._page_case(limit.name, part[0], f"the whole list, by {limit.name}={size}", fault)
 
     def _exact(self, whole: Page) -> Paged | None:
         """Read with a limit equal to the list's length: no page may follow, if the description says how that shows."""
@@ -437,11 +437,11 @@ class _Parts:
         if part is None or later is None or len(part[1].items) != count:
             return None
         fault = f"{cursor.name} {following[:60]}, which leads to an empty page" if not later[1].items else ""
-        return self._paged(
+        return self._page_case(
             f"{limit.name} exactly", later[0], "no further page, as the description says of the last", fault
         )
 
-    def _shifted(self, whole: Page) -> Paged | None:
+    def _read_shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""
         offset = self.reader.listing.offset
         part = self.reader.part({offset.name: 1}) if offset is not None and fitting(offset, 1) else None
@@ -449,7 +449,7 @@ class _Parts:
             return None
         expected, found = whole.identities[1:], part[1].identities
         fault = "" if found[: len(expected)] == expected else _difference(expected, found)
-        return self._paged(offset.name, part[0], f"the list from its second item on, by {offset.name}=1", fault)
+        return self._page_case(offset.name, part[0], f"the list from its second item on, by {offset.name}=1", fault)
 
     def _beyond(self, whole: Page) -> Paged | None:
         """Read far beyond the end."""
@@ -464,7 +464,7 @@ class _Parts:
         is_last = listing.offset is None and len(found) >= end
         again = bool(found) and found[:1] == whole.identities[:1] and not is_last
         fault = f"the item {found[0]} of the first page" if again else ""
-        return self._paged(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
+        return self._page_case(offset.name, part[0], f"no item of the first page, by {offset.name}={far}", fault)
 
     def _last(self, whole: Page) -> Paged | None:
         """Read the last two items, where a total tells where they are."""
@@ -474,7 +474,7 @@ class _Parts:
         if offset is None or part is None or part[1].totals != whole.totals:
             return None
         fault = "" if len(part[1].items) >= _FEWEST else f"{len(part[1].items)} items"
-        return self._paged(offset.name, part[0], f"the last {_FEWEST} of {end} items, by {offset.name}", fault)
+        return self._page_case(offset.name, part[0], f"the last {_FEWEST} of {end} items, by {offset.name}", fault)
 
     def _by_offset(self, whole: Page) -> Paged | None:
         offset = self.reader.listing.offset
@@ -563,7 +563,7 @@ class _Parts:
                 # Only a device that named a next page before says by its absence that this is the last.
                 ends = f"no further page after {len(ids)} items" if number > 1 and not whole.goes_on else ""
                 break
-            part = self.reader.followed(link) if link else self.reader.part({**query, limit.name: size})
+            part = self.reader.follow(link) if link else self.reader.part({**query, limit.name: size})
             if part is None:
                 return None
             last = part
@@ -582,7 +582,7 @@ class _Parts:
         fault = fault or (ends if len(ids) < max(count, len(whole.items)) else "")
         twice = next((f"the item {text[:60]} twice" for text in ids if ids.count(text) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
-        return self._paged(way, last[0], f"each item of the list once, page after page by {way}", fault)
+        return self._page_case(way, last[0], f"each item of the list once, page after page by {way}", fault)
 
 
 def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:

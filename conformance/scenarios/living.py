@@ -13,9 +13,9 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from conformance.api.rest.listing import fitting, listing_of
-from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, parts_of, represented
+from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, object_in, parts_of
 from conformance.documents.json_schema import Schema, is_number
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -209,7 +209,7 @@ class Living:
         lost = [f"no {name}" for name in thing.kept if name not in now] if now else []
         was = members(thing.last, said or ())
         alike = [name for name, one in (said or {}).items() if was.get(name) != one == now.get(name)]
-        return [*lost, *self._differ(thing, thing.kept, now), *(f"{shown(now[name])} as {name}" for name in alike)]
+        return [*lost, *self._differ(thing, thing.kept, now), *(f"{clip(now[name])} as {name}" for name in alike)]
 
     def check(
         self,
@@ -228,7 +228,7 @@ class Living:
             kind: what it shows if the thing has changed; by default: that it was lost, or what was written.
             said: see other().
         """
-        settled = self.writer.settled(partial(self._read, thing), lambda exchange: self.other(thing, exchange, said))
+        settled = self.writer.settle(partial(self._read, thing), lambda exchange: self.other(thing, exchange, said))
         found, wrong = settled.exchange, settled.wrong
         is_lost = found.response.status in ABSENT
         if is_lost:
@@ -238,7 +238,7 @@ class Living:
             now = members(found, thing.kept)
             thing.kept = {name: one for name, one in thing.kept.items() if not self._differ(thing, {name: one}, now)}
         thing.last = found if found.response.ok else thing.last
-        expected = f"the thing as it was read before {_said(after)}"
+        expected = f"the thing as it was read before {_change_text(after)}"
         kind = kind or (Kind.THERE if is_lost else Kind.KEPT)
         creates = after.request.method == "POST" and after.response.status == HTTPStatus.CREATED
         if creates and not is_lost:
@@ -287,7 +287,7 @@ class Living:
             found = self.writer.until(partial(self._read, thing), lambda exchange: not exchange.response.ok)
             other = f"status {found.response.status}" if found.response.ok else ""
             thing.state = State.UNKNOWN if other else thing.state
-            self.note(Kind.GONE, operation, found, f"status 404 or 410, as before {_said(after)}", other, thing)
+            self.note(Kind.GONE, operation, found, f"status 404 or 410, as before {_change_text(after)}", other, thing)
         if self.lister is not None and self.of(State.ALIVE) + self.of(State.GONE):
             self._look_at_list(after, operation)
 
@@ -305,7 +305,7 @@ class Living:
         if not wrong:
             self.note(Kind.THERE, operation, listing.exchange, "a list of the living things", "", thing)
         for thing, kind, expected, other in wrong:
-            self.note(kind, operation, listing.exchange, f"{expected} after {_said(after)}", other, thing)
+            self.note(kind, operation, listing.exchange, f"{expected} after {_change_text(after)}", other, thing)
             thing.is_told = True
         for thing in self.of(State.ALIVE)[-_LOOKED:] if not self._is_shown_otherwise else ():
             self._compare(thing, operation)
@@ -349,7 +349,7 @@ class Living:
     def _is_listable(self, found: Exchange, name: str, listing: WholeList) -> bool:
         """Return whether a thing has the identifier, is not marked as deleted, and in the state of a listed one."""
         value = read_json(found.response.body).value
-        states = [{item.get(key) for key in _STATES} for item in (represented(value, _STATES), *listing.items)]
+        states = [{item.get(key) for key in _STATES} for item in (object_in(value, _STATES), *listing.items)]
         return identifier_of(value, self.read) == name and not is_marked_deleted(value) and states[0] in states[1:]
 
     def list_of(self, thing: Thing) -> WholeList:
@@ -400,7 +400,7 @@ def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[st
     item = next((one for one, key in zip(listing.items, listing.ids, strict=True) if key == id_ and id_), {})
     now = members(found, names)
     return [
-        f"{shown(item[name])} as {name}"
+        f"{clip(item[name])} as {name}"
         for name in sorted(names & item.keys() & now.keys())
         if _is_other(now[name], item[name])
     ]
@@ -432,6 +432,6 @@ def _has(name: str, listing: WholeList) -> bool:
     return name in listing.ids
 
 
-def _said(after: Exchange) -> str:
+def _change_text(after: Exchange) -> str:
     """Return a request in words: "DELETE /valves/3 with status 204"."""
     return f"{after.request.method} {after.request.target.partition('?')[0]} with status {after.response.status}"

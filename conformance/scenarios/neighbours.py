@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import cycle, islice
 from typing import Final
 
-from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.applicable import allows
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation, valid_variations
@@ -42,7 +42,7 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
     reads = [
         item
         for item in operations_of(api.run.contract)
-        if item.method == "GET" and allowed(api, item) and item.label not in slow
+        if item.method == "GET" and allows(api, item) and item.label not in slow
     ]
     surveyor = Surveyor(api, values)
     found = _refusals(api)
@@ -55,7 +55,7 @@ def neighbours(api: RestInterface, values: Values) -> Survey:
             continue
         _head(surveyor, read, usual)
         last = surveyor.probes[-2].exchange
-        _cached(surveyor, read, usual, last)
+        _read_cached(surveyor, read, usual, last)
         _parts(surveyor, read, usual, last)
         for _ in found[: 1 if is_quick else _REFUSALS]:
             _after(surveyor, read, [usual], refusals)
@@ -94,10 +94,10 @@ def _after(
     return None
 
 
-def _cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange | None) -> None:
+def _read_cached(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange | None) -> None:
     """Where the last read had an entity tag, read by conditions of clients that have that copy, or another one."""
     tag = (last.response.header("etag") or "") if last is not None else ""
-    request = written(read, inputs)
+    request = request_of(read, inputs)
     conditions = [("GET", text) for text in (tag, f"{NO_TAG}, {tag}", f"W/{tag.removeprefix('W/')}", NO_TAG)]
     for method, tags in (*conditions, ("HEAD", tag)) if tag else ():
         conditional = replace(request, method=method, headers=(*request.headers, ("If-None-Match", tags)))
@@ -110,7 +110,7 @@ def _parts(surveyor: Surveyor, read: Operation, inputs: Inputs, last: Exchange |
         return
     if "206" not in read.responses and (last.response.header("accept-ranges") or "").strip().lower() != "bytes":
         return
-    read_parts(surveyor, read, written(read, inputs))
+    read_parts(surveyor, read, request_of(read, inputs))
 
 
 def read_parts(surveyor: Surveyor, read: Operation, whole: Outgoing, *, more: bool = True) -> None:
@@ -123,7 +123,7 @@ def read_parts(surveyor: Surveyor, read: Operation, whole: Outgoing, *, more: bo
 
 def _head(surveyor: Surveyor, read: Operation, inputs: Inputs) -> None:
     """Send HEAD in place of a GET."""
-    request = replace(written(read, inputs), method="HEAD")
+    request = replace(request_of(read, inputs), method="HEAD")
     surveyor.send(read, Variation(Kind.ODD, "", "", inputs), request, fresh=False)
 
 

@@ -8,12 +8,12 @@ from contextlib import suppress
 from itertools import islice
 from typing import Final
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.left_behind import LeftBehind
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.statuses import CRASHES, HELD, held_text
-from conformance.api.rest.things import represented
+from conformance.api.rest.things import object_in
 from conformance.api.rest.validity import VALID, validity
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import SOAP
@@ -57,11 +57,11 @@ class OtherExchanges(Listener):
     def __init__(self, api: RestInterface) -> None:
         self.probes: list[Probe] = []
         self.things: _Things = {}
-        self._made = LeftBehind(operations_of(api.run.contract), api.client.base_url).made
+        self._made = LeftBehind(operations_of(api.run.contract), api.client.base_url).created_path
         self._api = api
         self._seen: set[int] = set()
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Keep an exchange."""
         answer = exchange.response
         names = sorted(name.lower() for name, _ in answer.headers)
@@ -79,14 +79,14 @@ class OtherExchanges(Listener):
             path = context.target.partition("?")[0]
             made = path if exchange.request.method == "DELETE" else self._made(context.operation, path, exchange)
             reads = matching(self._api.run.contract, "GET", made) if made else None
-            if reads is not None and allowed(self._api, reads):
+            if reads is not None and allows(self._api, reads):
                 self.things.pop(made, None)
                 known = exchange.request.method != "DELETE", exchange.response.received_s
                 self.things = {made: known, **self.things}
                 if len(self.things) > _REMEMBERED:
                     self.things.popitem()
 
-    def unanswered(self, request: Unanswered) -> None:
+    def on_no_response(self, request: Unanswered) -> None:
         """Keep a request whose connection was closed; those of concurrent clients may be refused, and are not kept."""
         if request.kind is NoAnswer.CLOSED:
             self._keep(request, (request.kind,))
@@ -96,7 +96,7 @@ class OtherExchanges(Listener):
             return
         kind, label = Kind.OTHER, self._operation_of(attempt)
         if not label and isinstance(attempt, Exchange) and attempt.response.status in _ERRORS:
-            kind, label = Kind.ODD, self._refused(attempt)
+            kind, label = Kind.ODD, self._refusing_label(attempt)
         key = hash((label, shown))
         if not label or key in self._seen:
             return
@@ -104,7 +104,7 @@ class OtherExchanges(Listener):
         exchange, unanswered = (attempt, None) if isinstance(attempt, Exchange) else (None, attempt)
         self.probes.append(Probe(label, kind, exchange=exchange, unanswered=unanswered))
 
-    def _refused(self, exchange: Exchange) -> str:
+    def _refusing_label(self, exchange: Exchange) -> str:
         """Return the operation that refuses a request by a status which it declares; or an empty text."""
         context = RequestContext.of(self._api.run.contract, self._api.client.base_url, exchange.request)
         operation = context.operation if context and exchange.request.raw is None else None
@@ -141,15 +141,15 @@ def _wrong(things: _Things, sent: dict[str, Exchange]) -> _Things:
     return {path: one for path, one in things.items() if one[0] is (sent[path].response.status in ABSENT)}
 
 
-def _deleted(api: RestInterface, sent: dict[str, Exchange]) -> _Things:
+def _delete_things(api: RestInterface, sent: dict[str, Exchange]) -> _Things:
     """Delete things that were read: so many that a thing with each declared value of a member is deleted."""
     covered, found = set[tuple[str, ...]](), _Things()
     for path, exchange in sent.items():
         read, delete = (matching(api.run.contract, method, path) for method in ("GET", "DELETE"))
-        if read is None or delete is None or not allowed(api, delete) or len(found) >= _MOST_DELETED:
+        if read is None or delete is None or not allows(api, delete) or len(found) >= _MOST_DELETED:
             continue
         parts = flat(read.shape or {}).get("properties", {})
-        own = represented(read_json(exchange.response.body).value, parts)
+        own = object_in(read_json(exchange.response.body).value, parts)
         few = [name for name, one in parts.items() if name in own and _has_few(one)]
         values = {(read.template,), *((read.template, name, json_text(own[name])) for name in few)}
         if not values <= covered:
@@ -172,7 +172,7 @@ def others(api: RestInterface, other_exchanges: OtherExchanges) -> Survey:
         sent = _read(api, things)
         wrong = _wrong(things, sent)
         own = {path: one for path, one in sent.items() if things[path][0] and path not in wrong}
-        deleted = _deleted(api, own)
+        deleted = _delete_things(api, own)
         wrong |= _wrong(deleted, _read(api, deleted))
         # A device may carry out a request late, but not never.
         if wrong:

@@ -10,8 +10,8 @@ from itertools import islice, pairwise
 from typing import Any, Final
 from urllib.parse import quote
 
-from conformance.api.rest.applicable import allowed, callable_operations
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.applicable import allows, callable_operations
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
 from conformance.api.rest.patches import same
@@ -22,7 +22,7 @@ from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
 from conformance.documents.files import file_of, keeps_octets
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
@@ -79,7 +79,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
         changes = [operations[name, path] for name in ("PATCH", "PUT") if (name, path) in operations]
         create = operations.get(("POST", collection_of(path))) or operations.get(("PUT", path))
         delete = operations.get(("DELETE", path))
-        with api.run.limit.lifted(), suppress(NoAnswerError):
+        with api.run.limit.lift(), suppress(NoAnswerError):
             is_item = bool(read.parameter("path"))
             make = _put if create is not None and create.method == "PUT" else created_path
             thing_path = make(surveyor, create, read) if is_item and create is not None and collection_of(path) else ""
@@ -87,25 +87,25 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             is_fixed = not is_item or (bool(collection_of(path)) and (create is None or make is _put))
             free = [operation for operation in changes if not is_item or is_free(operation, path)]
             if free and is_fixed and not thing_path:
-                _Thing(surveyor, read, path_of_usual(read, values), is_own=False).written(free)
+                _Thing(surveyor, read, path_of_usual(read, values), is_own=False).write(free)
             if create is not None and thing_path:
                 thing = _Thing(surveyor, read, thing_path)
-                thing.asked()
+                thing.try_undeclared()
                 if "206" in read.responses:
                     thing.in_parts(read, thing.target)
-                thing.written(changes)
-                thing.filled()
+                thing.write(changes)
+                thing.upload()
                 thing.beside(create, delete)
                 thing.listed_below(operations)
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
-                thing.deleted(delete, operations.get(("GET", collection_of(path))))
+                thing.delete(delete, operations.get(("GET", collection_of(path))))
     return surveyor.trace
 
 
 def path_of_usual(read: Operation, values: Values) -> str:
     """Return the target of an operation's usual request."""
-    return written(read, usual_inputs(read, values)[0]).target
+    return request_of(read, usual_inputs(read, values)[0]).target
 
 
 def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
@@ -114,7 +114,7 @@ def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
     thing = _Thing(surveyor, read, path)
     if not path or thing.get(place="path of what does not exist").status not in ABSENT:
         return ""
-    return path if thing.sent(create, None).ok else ""
+    return path if thing.send(create, None).ok else ""
 
 
 @dataclass
@@ -140,23 +140,23 @@ class _Thing:
 
     def get(self, *fields: tuple[str, str], place: str = "") -> Probe:
         """Read it, and note its entity tag."""
-        probe = self.sent(self.read, None, *fields, place=place)
+        probe = self.send(self.read, None, *fields, place=place)
         if probe.ok and probe.exchange is not None:
             self.last, self.tag = probe.exchange, probe.exchange.response.header("etag") or ""
         return probe
 
-    def sent(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
+    def send(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
         """Send an operation to it, with its usual body or another one."""
         inputs = usual_inputs(operation, self.surveyor.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
-        request = written(operation, inputs)
+        request = request_of(operation, inputs)
         given = {name.lower() for name, _ in fields}
         headers = (*(pair for pair in request.headers if pair[0].lower() not in given), *fields)
         kind = Kind.ODD if given or place else Kind.AGAIN
         request = replace(request, target=self.target, headers=headers)
         return self.surveyor.send(operation, Variation(kind, "", place, inputs), request)
 
-    def asked(self) -> None:
+    def try_undeclared(self) -> None:
         """Send methods that the description does not have, to the thing and to paths below it."""
         if not self.get().ok:
             return
@@ -170,7 +170,7 @@ class _Thing:
                     self.api.send(Outgoing(method, self.target.rstrip("/") + below))
         self.get()
 
-    def written(self, changes: list[Operation]) -> None:
+    def write(self, changes: list[Operation]) -> None:
         """Write to it by wrong conditions and by right ones, one member at a time."""
         first = self.get()
         if not first.ok or first.exchange is None:
@@ -180,7 +180,7 @@ class _Thing:
             bodies = self._bodies(change, members(first.exchange, ()))
             # A JSON patch has no members, so use the first patch that changes something.
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
-                self._refused(change, refusable)
+                self._send_refusable(change, refusable)
             self._at_once(change, bodies)
             singles = bodies[:_SINGLES] if change.method == "PATCH" else []
             alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
@@ -188,7 +188,7 @@ class _Thing:
                 alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
             ):
                 old = self.tag
-                is_done = self.sent(change, body, *self._current(None if turn else change)).ok
+                is_done = self.send(change, body, *self._current(None if turn else change)).ok
                 if is_done or not turn:
                     self.get()
                     if is_done and old not in {"", self.tag} and change is changes[0] and not is_behind:
@@ -198,10 +198,10 @@ class _Thing:
             # Special bodies show what is written in other formats.
             formats = _by_format(change)
             for own in formats[1:] if self.tag else ():
-                self._refused(own, list(islice(self._special(own), 1)))
+                self._send_refusable(own, list(islice(self._special(own), 1)))
             for one, body in ((own, body) for own in formats for body in self._special(own)):
                 before, until = self._members(), time.monotonic() + _SETTLES_S
-                is_done = self.sent(one, body, *self._current(), place="body").ok
+                is_done = self.send(one, body, *self._current(), place="body").ok
                 self.get()
                 # A JSON patch describes the change, which a device may carry out later.
                 while waits and is_done and is_list_of_changes(before, body) and self._members() == before:
@@ -209,7 +209,7 @@ class _Thing:
                     time.sleep(_PAUSE_S if waits else 0)
                     self.get()
 
-    def _refused(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
+    def _send_refusable(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
         """Send requests whose headers alone let the device refuse them, and read after each.
 
         That is a wrong condition or none, no format that the device has, and no credentials.
@@ -234,13 +234,13 @@ class _Thing:
         # First without credentials: a later request may be carried out.
         if demands(self.api.run.contract.openapi, change):
             body, inputs = self._other(bodies), usual_inputs(change, self.surveyor.values)[0]
-            request = written(change, inputs if body is None else replace(inputs, body=body))
+            request = request_of(change, inputs if body is None else replace(inputs, body=body))
             headers = (*request.headers, *self._current())
             self.api.client.send(change.method, self.target, headers=headers, body=request.body, authorized=False)
             self.get()
         for fields in tried:
             is_right = fields and fields[0][0] != "If-Match"
-            self.sent(change, self._other(bodies), *fields, *(self._current() if is_right else ()))
+            self.send(change, self._other(bodies), *fields, *(self._current() if is_right else ()))
             if not self.get().ok:
                 return
 
@@ -254,12 +254,12 @@ class _Thing:
         others = [one for one in bodies if any(not same(now.get(name), one[name]) for name in one)]
         if self._current() and "if-match" in names and len(others) > 1:
             inputs = usual_inputs(change, self.surveyor.values)[0]
-            own = [written(change, replace(inputs, body=body)) for body in others[:2]]
+            own = [request_of(change, replace(inputs, body=body)) for body in others[:2]]
             fields = [tuple(pair for pair in own[0].headers if pair[0].lower() != "if-match"), self._current()]
             requests = [replace(request, target=self.target, headers=(*fields[0], *fields[1])) for request in own]
             send_together([[(self.api.client, request) for request in requests]])
             self.get()
-            self.sent(change, bodies[-1], *self._current())
+            self.send(change, bodies[-1], *self._current())
             self.get()
 
     def _other(self, bodies: Sequence[Any]) -> Any:
@@ -271,13 +271,13 @@ class _Thing:
 
     def _behind(self, change: Operation, body: Any, old: str) -> None:
         """Write and read by the entity tag that it had before: a client that missed a change (RFC 9110 13.1)."""
-        self.sent(change, body, ("If-Match", old))
+        self.send(change, body, ("If-Match", old))
         self.get()
         for tag in (old, NO_TAG):
             self.get(("If-None-Match", tag))
             self.get()
 
-    def filled(self) -> None:
+    def upload(self) -> None:
         """Upload files to a thing or to a sub-resource, and read them back: all bytes must be the same."""
         own = self.read.template.rstrip("/")
         operations = {
@@ -289,10 +289,10 @@ class _Thing:
             if method != "GET" or put is None or not f"{template}/".startswith(f"{own}/") or "{" in below:
                 continue
             media_type, *others = [body for body in put.bodies if keeps_octets(body)] or [""]
-            if not (media_type or _TEXT in put.bodies) or not (allowed(self.api, put) and allowed(self.api, read)):
+            if not (media_type or _TEXT in put.bodies) or not (allows(self.api, put) and allows(self.api, read)):
                 continue
             path = self.target.rstrip("/") + below
-            whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+            whole = replace(request_of(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
             files = [(media_type, file_of(media_type, octets)) for octets in _FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
             # Another media type comes first: a refused one ends the uploads.
@@ -300,12 +300,12 @@ class _Thing:
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], media_type=other)
                 for octets in _FILES[:2]:
                     sent = replace(inputs, body=file_of(other, octets))
-                    request = replace(written(put, sent), target=path)
+                    request = replace(request_of(put, sent), target=path)
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", sent), request)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
             for number, (kept_as, octets) in enumerate(files, 1):
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], body=octets, media_type=kept_as)
-                request = replace(written(put, inputs), target=path)
+                request = replace(request_of(put, inputs), target=path)
                 # A device may look into an image, and refuse one that is too small or too wide.
                 kind = Kind.AGAIN if kept_as == _OCTETS else Kind.ODD
                 if not self.surveyor.send(put, Variation(kind, "", "", inputs), request).ok:
@@ -316,7 +316,7 @@ class _Thing:
                     coded = replace(request, body=octets, headers=(*request.headers, _IN_CHUNKS))
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
-                self._ended(put, read, operations.get(("DELETE", template)), request, whole)
+                self._end_file(put, read, operations.get(("DELETE", template)), request, whole)
                 self.uploads.append((read, request, [octets for _, octets in files]))
 
     def beside(self, create: Operation, delete: Operation | None) -> None:
@@ -324,7 +324,7 @@ class _Thing:
         other = created_path(self.surveyor, create, self.read) if self.uploads and create.method == "POST" else ""
         for read, own, files in self.uploads if other else ():
             there = other.rstrip("/") + own.target.removeprefix(self.target.rstrip("/"))
-            whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=there)
+            whole = replace(request_of(read, usual_inputs(read, self.surveyor.values)[0]), target=there)
             for first, second in pairwise(files):
                 for target, octets in ((there, first), (own.target, second)):
                     self.api.send(replace(own, target=target, body=octets))
@@ -360,13 +360,13 @@ class _Thing:
             after = self._items(listing, other) if before is not None and page is not None else None
             if after is not None and before is not None and page is not None:
                 both = [item for item in after[1] if item in page.items and item not in before[1]]
-                expected, fault = f"no item that was created at {outgoing.target}", f"{shown(both[0])}" if both else ""
+                expected, fault = f"no item that was created at {outgoing.target}", f"{clip(both[0])}" if both else ""
                 self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
             self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
 
     def _at(self, operation: Operation, inputs: Inputs, below: str) -> tuple[Outgoing, Inputs]:
         """Return a request to what is below it, with the inputs that it has."""
-        request = written(operation, inputs)
+        request = request_of(operation, inputs)
         target = self.target.rstrip("/") + below + "".join(request.target.partition("?")[1:])
         return replace(request, target=target), inputs
 
@@ -378,19 +378,19 @@ class _Thing:
 
     def in_parts(self, read: Operation, path: str, *, more: bool = True) -> None:
         """Read a file, ranges of it, and the file again."""
-        whole = replace(written(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
+        whole = replace(request_of(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
         self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
         read_parts(self.surveyor, read, whole, more=more)
 
-    def _ended(
+    def _end_file(
         self, put: Operation, read: Operation, delete: Operation | None, request: Outgoing, whole: Outgoing
     ) -> None:
         """Write to a file that is there as if it were not, delete it, and write it again; read it after each."""
         steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = []
         if any(parameter.name.lower() == "if-none-match" for parameter in put.parameter("header")):
             steps.append((put, request, (("If-None-Match", "*"),)))
-        if delete is not None and allowed(self.api, delete):
-            own = written(delete, usual_inputs(delete, self.surveyor.values)[0])
+        if delete is not None and allows(self.api, delete):
+            own = request_of(delete, usual_inputs(delete, self.surveyor.values)[0])
             steps.append((delete, replace(own, target=whole.target), ()))
         for operation, outgoing, fields in steps:
             headers = (*(pair for pair in outgoing.headers if pair[0].lower() != "if-none-match"), *fields)
@@ -446,13 +446,13 @@ class _Thing:
             taken = {name: theirs[name] for name in unique.names(create) if name in theirs and name in parts}
             kept = {name: one for name, one in own.items() if name in parts and not parts[name].get("readOnly")}
             if taken:
-                self.sent(
+                self.send(
                     change, taken if change.method == "PATCH" else {**kept, **taken}, *self._current(), place="body"
                 )
                 self.get()
                 other.get()
         if delete is not None:
-            other.sent(delete, None, *other._current())
+            other.send(delete, None, *other._current())
 
     def _current(self, second: Operation | None = None) -> tuple[tuple[str, str], ...]:
         """Return If-Match with the thing's entity tag; a weak tag never matches (RFC 9110 13.1.1).
@@ -464,7 +464,7 @@ class _Thing:
         tags = tags if second is not None and _fits(second, tags) else self.tag
         return (("If-Match", tags),) if self.tag and not self.tag.startswith("W/") else ()
 
-    def deleted(self, delete: Operation | None, lister: Operation | None) -> None:
+    def delete(self, delete: Operation | None, lister: Operation | None) -> None:
         """Delete it by a wrong condition, and then by a right one; look for it in the list by each of its filters."""
         if delete is None or not self.get().ok:
             return
@@ -475,21 +475,21 @@ class _Thing:
         for query in queries:
             # A device may cache the response.
             self._look_in(listing, query, id_, began - _SETTLES_S)
-        self._refused(delete)
+        self._send_refusable(delete)
         ends, own = ending_with(delete), self.read.template.rstrip("/")
         for read in operations_of(self.api.run.contract):
             above, _, last = read.template.rstrip("/").rpartition("/")
             is_ending = read.method == "GET" and above == own and singular(last) in ends
-            if is_ending and "404" in read.responses and allowed(self.api, read):
+            if is_ending and "404" in read.responses and allows(self.api, read):
                 there = Outgoing("GET", f"{self.target.rstrip('/')}/{last}")
                 self.below.append((read, there))
         if not self.get().ok:
             return
-        if not self.sent(delete, None, *self._current(delete)).ok:
+        if not self.send(delete, None, *self._current(delete)).ok:
             self.get()
-            self.sent(delete, None, *self._current())
+            self.send(delete, None, *self._current())
         self.get(place=_GONE_PLACE)
-        head = replace(written(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
+        head = replace(request_of(self.read, usual_inputs(self.read, self.surveyor.values)[0]), method="HEAD")
         variation = Variation(Kind.ODD, "", _GONE_PLACE, Inputs())
         self.surveyor.send(self.read, variation, replace(head, target=self.target), fresh=False)
         is_gone = self.get(place=_GONE_PLACE).status in ABSENT

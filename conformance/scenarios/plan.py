@@ -41,7 +41,7 @@ def turn_of(step: Step, ranks: Mapping[str, int]) -> tuple[int, int, str, str]:
     return STAGES.index(step.stage), first, step.scenario.name if step.scenario else "", step.name
 
 
-def ordered(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
+def order_steps(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
     """Return the steps in the order of the run."""
     steps, ranks = list(steps), {id_: number for number, id_ in enumerate(ledger)}
     for step in steps:
@@ -51,7 +51,7 @@ def ordered(steps: Iterable[Step], ledger: Iterable[str]) -> list[Step]:
     return sorted(steps, key=lambda step: turn_of(step, ranks))
 
 
-def told(steps: Sequence[Step]) -> list[str]:
+def plan_lines(steps: Sequence[Step]) -> list[str]:
     """Return a plan as lines of text, stage by stage: scenarios with the state they leave, and checks."""
     lines: list[str] = []
     stage, scenario = None, ""

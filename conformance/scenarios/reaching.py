@@ -10,7 +10,7 @@ from urllib.parse import unquote
 
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.calls import value_text
-from conformance.api.rest.inputs import Inputs, parameter_verdict, renewed, written
+from conformance.api.rest.inputs import Inputs, parameter_verdict, request_of, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
 from conformance.api.rest.validity import VALID
@@ -53,10 +53,10 @@ class Reaching:
 
     def request(self, operation: Operation, variation: Variation) -> Outgoing:
         """Return the request of a variation, with the entity tag of its resource if it has or needs If-Match."""
-        request = written(operation, renewed(operation, variation.inputs, self.values, variation.place))
+        request = request_of(operation, with_new_values(operation, variation.inputs, self.values, variation.place))
         return request if variation.place.lower() == f"header {_IF_MATCH}" else self._current(operation, request)
 
-    def generated(self, operation: Operation, request: Outgoing) -> Outgoing:
+    def complete(self, operation: Operation, request: Outgoing) -> Outgoing:
         """Return a generated request with what only the device or the run knows: its thing, a new key, the tag.
 
         Otherwise 404, 412 or the refusal of a repeated key would hide what the request is about. DELETE keeps its path:
@@ -66,7 +66,7 @@ class Reaching:
         if has_more and operation.method != "DELETE":
             path, mark, query = request.target.partition("?")
             parts, steps = path.split("/"), operation.template.split("/")
-            known = [self._known(operation, step, part) for step, part in zip(steps, parts, strict=False)]
+            known = [self._known_part(operation, step, part) for step, part in zip(steps, parts, strict=False)]
             request = replace(request, target="/".join(known + parts[len(known) :]) + mark + query)
         key = key_of(operation)
         given, others = _without(request, key.name) if key is not None else ([], ())
@@ -75,7 +75,7 @@ class Reaching:
             request = replace(request, headers=(*others, (key.name, new)) if new else others)
         return self._current(operation, request)
 
-    def _known(self, operation: Operation, step: str, part: str) -> str:
+    def _known_part(self, operation: Operation, step: str, part: str) -> str:
         """Return a part of a path, with the known thing in place of a valid text that names none."""
         parameter = next((one for one in operation.parameter("path") if step == f"{{{one.name}}}"), None)
         if parameter is None or parameter_verdict(operation, parameter, unquote(part)) != VALID:
@@ -102,7 +102,7 @@ class Reaching:
         tag = self._tags.get(path, "")
         return replace(request, headers=(*others, ("If-Match", tag))) if tag else request
 
-    def acted(self) -> None:
+    def forget_tags(self) -> None:
         """Forget the entity tags: something may have changed."""
         self._tags.clear()
 
@@ -114,17 +114,17 @@ class Reaching:
         self._asked.add(label)
         with suppress(*_QUIET):
             for names, body in unique.trials(operation, inputs.body, operation.bodies[inputs.media_type].schema):
-                exchange = self.api.send(written(operation, replace(inputs, body=body)))
+                exchange = self.api.send(request_of(operation, replace(inputs, body=body)))
                 if exchange.response.ok:
                     self.values.learn(operation, exchange)
-                    unique.found(operation, names)
+                    unique.remember(operation, names)
                 if found is exchange.response.ok:
                     break
                 found = True
         self.api.single[label] = self.api.single.get(label, False) and not found
         return found
 
-    def refused(self, status: int, operation: Operation, request: Outgoing) -> None:
+    def keep_refused(self, status: int, operation: Operation, request: Outgoing) -> None:
         """Keep a refused request; send the first ones refused by a state again, if the description says what remains.
 
         Before and after each, all that can be read without input is read, which a checker judges.

@@ -121,6 +121,6 @@ def record(judge: Judge, requirement: str, outcomes: Iterable[Outcome]) -> None:
             case NotSeen():
                 judge.not_seen(requirement, outcome.reason)
             case NotClaimed():
-                judge.unclaimed(requirement, outcome.reason)
+                judge.note_unclaimed(requirement, outcome.reason)
             case Note():
                 judge.note(requirement, outcome.remark)

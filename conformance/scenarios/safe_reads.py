@@ -17,13 +17,13 @@ from itertools import islice
 from typing import Any, Final
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.patches import same
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import another, collection_of, is_devices, is_shared
 from conformance.api.rest.values import Values
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
 from conformance.scenarios.creating import created_path
@@ -94,7 +94,7 @@ def safe_reads(api: RestInterface, values: Values) -> tuple[Watched, ...]:
     """Read writable resources before and after all safe requests, and again without them if they changed."""
     watch = _Watch(Writer(api, values))
     api.run.limit.check()
-    with api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
+    with api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
         found = watch.play()
         if found:
             return tuple(found)
@@ -144,10 +144,10 @@ class _Watch:
     def play(self) -> list[Watched]:
         """Return the record of each resource."""
         try:
-            self.resources = [resource for resource in self.resources if self._settled(resource)]
+            self.resources = [resource for resource in self.resources if self._settle(resource)]
             # An earlier safe request may already have undone a change, so write something just before them.
             for resource in self.resources:
-                self._changed(resource)
+                self._write_other(resource)
             found = dict[tuple[str, bool], Watched]()
             # HEAD may undo what GET changed, so each method is tried apart. None: requests to other things.
             for methods in (("GET",), ("HEAD", "OPTIONS"), ()):
@@ -157,17 +157,17 @@ class _Watch:
                 for resource in self.resources if methods else [one for one in self.resources if not one.path]:
                     key = resource.read.label, bool(methods)
                     if not (key in found and found[key].fault):
-                        found[key] = self._judged(resource, methods, took)
+                        found[key] = self._judge(resource, methods, took)
             return list(found.values())
         finally:
             for resource in self.resources:
                 if resource.first:
                     resource.was = resource.first
-                    self._restored(resource)
+                    self._restore(resource)
                 if resource.delete is not None:
                     self.writer.conditional(resource.delete, resource.read, resource.path)
 
-    def _settled(self, one: _Resource) -> bool:
+    def _settle(self, one: _Resource) -> bool:
         """Note how a resource reads, twice alike; return whether it can be watched."""
         for _ in range(2):
             before, one.last = one.last, self._read(one)
@@ -178,7 +178,7 @@ class _Watch:
             one.was = {name: value for name, value in now.items() if same(was.get(name), value)}
         return bool(one.was)
 
-    def _changed(self, one: _Resource) -> None:
+    def _write_other(self, one: _Resource) -> None:
         """Write other values to a permanent resource; if it does not show them, watch it unchanged."""
         if one.write is None or one.path or one.last is None:
             return
@@ -190,10 +190,10 @@ class _Watch:
         if now == first:
             return
         one.first, one.was = first, now
-        if not self._restored(one):
+        if not self._restore(one):
             one.was = first
-            self._restored(one)
-            self._settled(one)
+            self._restore(one)
+            self._settle(one)
 
     def _read(self, one: _Resource) -> Exchange:
         return self.writer.send(one.read, one.path)
@@ -204,7 +204,7 @@ class _Watch:
         for (method, template), read in self._operations.items():
             if method != "GET":
                 continue
-            request = written(read, usual_inputs(read, self.writer.values)[0])
+            request = request_of(read, usual_inputs(read, self.writer.values)[0])
             own = next((text for text in made if f"{template}/".startswith(f"{text}/")), "")
             if own and "{" not in template[len(own) :]:
                 rest = "".join(request.target.partition("?")[1:])
@@ -239,9 +239,9 @@ class _Watch:
             return one.last.came
         now = members(one.last, one.names) if one.last.response.ok else one.was
         other = [name for name, value in one.was.items() if name in now and not same(now[name], value)]
-        return "; ".join(f"{shown(now[name])} as {name} in place of {shown(one.was[name])}" for name in other)
+        return "; ".join(f"{clip(now[name])} as {name} in place of {clip(one.was[name])}" for name in other)
 
-    def _judged(self, one: _Resource, methods: Sequence[str], took: float) -> Watched:
+    def _judge(self, one: _Resource, methods: Sequence[str], took: float) -> Watched:
         """Judge one resource after some requests, and if it has changed by rounds with and without them."""
         what = f"{' and '.join(methods)} of everything" if methods else "things of collections were created and deleted"
         expected, label = f"what was written before {what}", one.read.label
@@ -249,7 +249,7 @@ class _Watch:
         if last is None or not wrong:
             return Watched(label, last or self._read(one), expected, is_safe=bool(methods))
         for _ in range(_ROUNDS):
-            if not self._restored(one):
+            if not self._restore(one):
                 break
             time.sleep(took)
             if self._wrong(one):
@@ -260,12 +260,12 @@ class _Watch:
         else:
             guilty = self._guilty(one, methods) if methods else None
             return Watched(label, guilty or one.last or last, expected, wrong, is_safe=bool(methods))
-        self._restored(one)
+        self._restore(one)
         return Watched(label, last, expected, is_safe=bool(methods))
 
     def _guilty(self, one: _Resource, methods: Sequence[str]) -> Exchange | None:
         """Return the safe request after which a resource changed; None if only several together change it."""
-        if not self._restored(one):
+        if not self._restore(one):
             return None
         for request in islice(self._safe(methods), _SINGLE):
             sent = self._send([request])
@@ -273,13 +273,13 @@ class _Watch:
                 return sent
         return None
 
-    def _restored(self, one: _Resource) -> bool:
+    def _restore(self, one: _Resource) -> bool:
         """Write a resource's earlier values, or create another in its place; return whether it reads so."""
         if one.path and one.last is not None and one.last.response.status in ABSENT:
             create = self._operations["POST", collection_of(one.read.template.rstrip("/"))]
             one.path = created_path(Surveyor(self.writer.api, self.writer.values), create, one.read)
             one.last = None
-            return bool(one.path) and self._settled(one)
+            return bool(one.path) and self._settle(one)
         if one.write is None:
             return False
         usual = self.writer.bodies(one.write, 0, members(one.last, ()) if one.last is not None else {})

@@ -59,11 +59,11 @@ def scenario(
     The function raises NotPossibleError if the device cannot play it, and PartialTraceError if it was aborted.
     """
 
-    def made(play: Callable[..., Any]) -> Scenario:
+    def make(play: Callable[..., Any]) -> Scenario:
         summary = (inspect.getdoc(play) or "").partition("\n")[0]
         return Scenario(play.__name__, play, frozenset(needs), leaves, stage, summary)
 
-    return made
+    return make
 
 
 class PartialTraceError(Exception):

@@ -66,8 +66,8 @@ def singletons(writer: Writer, operations: Mapping[tuple[str, str], Operation]) 
         if not is_free(write, path) or len(lives) >= _RESOURCES:
             continue
         writer.api.run.limit.check()
-        with writer.api.run.limit.lifted(), suppress(NoAnswerError):  # the survey reports a broken connection
-            if writes := _written(writer, read, write):
+        with writer.api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
+            if writes := _write_values(writer, read, write):
                 lives.append(Life("", read.label, writes[0].sent, writes[0].found, writes=tuple(writes)))
     return lives
 
@@ -77,7 +77,7 @@ def is_free(write: Operation, path: str) -> bool:
     return not (write.motion or words_of(path) & _CONNECTING)
 
 
-def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
+def _write_values(writer: Writer, read: Operation, write: Operation) -> list[Write]:
     """Write values of each member one after another, and restore the first values at the end."""
     media_type, before = usual_inputs(write, writer.values)[0].media_type, writer.send(read)
     if not is_json(media_type) or not before.response.ok or before.response.cut:
@@ -102,7 +102,7 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
 
     last = before
 
-    def done(values: dict[str, Any], before: Exchange) -> list[Write]:
+    def write_one(values: dict[str, Any], before: Exchange) -> list[Write]:
         nonlocal last
         body = values if write.method == "PATCH" and fits(schema, values) else {**first, **values}
         in_time = time.monotonic() < until
@@ -114,13 +114,13 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
         for turn in range(max(map(len, chosen.values()), default=0)):
             values = {name: some[turn] for name, some in chosen.items() if turn < len(some)}
             then, again = last, list[Write]()
-            whole = done(values, then)
+            whole = write_one(values, then)
             is_told = bool(whole and whole[-1].other)
             if len(values) > 1 and (is_told or not whole):
                 # Members may depend on each other, so a whole body is written too.
-                wrong = _lost(writer, read, write, whole[-1]) if whole else dict.fromkeys(values, True)
+                wrong = _lost_members(writer, read, write, whole[-1]) if whole else dict.fromkeys(values, True)
                 names = [name for name in values if wrong.get(name)][:few]
-                again = [one for name in names for one in done({name: values[name]}, then)]
+                again = [one for name in names for one in write_one({name: values[name]}, then)]
             found += again or ([] if is_told and len(values) > 1 else whole)
             first_time += whole or again
     finally:
@@ -130,16 +130,16 @@ def _written(writer: Writer, read: Operation, write: Operation) -> list[Write]:
     shown = {
         name
         for one in first_time
-        for name, lost in _lost(writer, read, write, one).items()
+        for name, lost in _lost_members(writer, read, write, one).items()
         if not lost and _body(one)[name] != first.get(name)
     }
     kept = [name for name in chosen if is_keeping or name in shown]
-    told = [(one, _lost(writer, read, write, one)) for one in found]
+    told = [(one, _lost_members(writer, read, write, one)) for one in found]
     known = [replace(one, other=tuple(text for name in kept for text in own.get(name, ()))) for one, own in told]
     return known + (restored if kept else []) if known else []
 
 
-def _lost(writer: Writer, read: Operation, write: Operation, done: Write) -> dict[str, Any]:
+def _lost_members(writer: Writer, read: Operation, write: Operation, done: Write) -> dict[str, Any]:
     """Return the members that read differently than written, for each one that was sent."""
     body, schema = _body(done), write.bodies[done.sent.request.media_type].schema
     now, collections = members(done.found, body), writer.values.collections

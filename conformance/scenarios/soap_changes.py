@@ -17,7 +17,7 @@ from typing import Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.soap.forms import another, boundless, extreme, rewritten, shortest
-from conformance.api.soap.messages import declarations, derived, ordinary, simple_leaves, with_text
+from conformance.api.soap.messages import declarations, derivations, ordinary, simple_leaves, with_text
 from conformance.api.soap.mutations import branches, invalid_ones, mutations
 from conformance.api.soap.roles import KEEPS, REFERS, SETTLES_S, Act, Role, in_order, texts_of
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes
@@ -96,7 +96,7 @@ class _Changes:
                     self.acts.append((act, *self.caller.messages.usual(act.operation)))
                     continue
                 declared, node, kind = usual_message(self.caller, act)
-                has = kind is Kind.USUAL and self.caller.probes[-1].succeeded
+                has = kind is Kind.USUAL and self.caller.probes[-1].is_success
                 if act.role in _GIVES and (full := full_message(self.caller, act, declared, node)):
                     if not has:
                         short = partial(self.caller.messages.message, act.port, act.operation, node)
@@ -124,15 +124,15 @@ class _Changes:
                 break
             node, own = forms[turn % len(forms)]
             free = [one for one in own if node.at(one[0]).name.lower() not in keys]
-            made = _varied(node, free, turn)
-            if not self.caller.ask(act, made, "a message with other values").succeeded:
+            made = _with_others(node, free, turn)
+            if not self.caller.ask(act, made, "a message with other values").is_success:
                 # Some members may not be changed: find those that may, one by one.
-                tried = [(one, self.caller.ask(act, _varied(node, [one], turn), "another value")) for one in free]
-                keys |= {node.at(one[0]).name.lower() for one, probe in tried if not probe.succeeded}
-                free = [one for one, probe in tried if probe.succeeded]
+                tried = [(one, self.caller.ask(act, _with_others(node, [one], turn), "another value")) for one in free]
+                keys |= {node.at(one[0]).name.lower() for one, probe in tried if not probe.is_success}
+                free = [one for one, probe in tried if probe.is_success]
                 if not free:
                     break
-                made = _varied(node, free, turn)
+                made = _with_others(node, free, turn)
                 self.caller.ask(act, made, "a message with other values")
             sent = self._wait(readers, made, free)
             if sent and 0 < turn <= _LASTING:
@@ -144,7 +144,7 @@ class _Changes:
                 self._read(readers, made, times=2)
             elif sent and turn and refusals < _REFUSALS:
                 # An effect of a refusal shows soon; other values have stayed for longer by now.
-                self._refuse(act, declared, _varied(made, free, turn + 1), refusals)
+                self._refuse(act, declared, _with_others(made, free, turn + 1), refusals)
                 refusals += 1
                 self._read(readers, made, times=2)
             left_s = time.monotonic()
@@ -154,7 +154,7 @@ class _Changes:
         node, free = whole, [one for one in leaves if whole.at(one[0]).name.lower() not in keys]
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
             plain = self.caller.ask(act, other, "a message with other values")
-            if plain.succeeded and self._wait(readers, other, free):
+            if plain.is_success and self._wait(readers, other, free):
                 self.caller.ask(act, node, "the first values")
                 self.caller.send(act, kind, says, octets, charset)
                 self._wait(readers, other, free)
@@ -165,14 +165,14 @@ class _Changes:
 
     def _forms(self, act: Act, node: Node, free: _Leaves) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
         """Yield messages in other forms: what is special, its kind, the plain message, its octets, their encoding."""
-        made = _varied(node, free, _BEYOND_ASCII)
+        made = _with_others(node, free, _BEYOND_ASCII)
         whole = self.caller.messages.whole(act.port, act.operation, made)
         for charset, kind in (("utf-16", Kind.VARIED), ("iso-8859-1", Kind.TRIED)):  # XML 1.0, 2.2: UTF-16 is no choice
             head = f'<?xml version="1.0" encoding="{charset}"?>'
-            octets = (head + whole.written().decode()).encode(charset, "xmlcharrefreplace")
+            octets = (head + whole.serialize().decode()).encode(charset, "xmlcharrefreplace")
             yield f"a message in {charset}", kind, made, octets, charset
-        made = _varied(node, free, 1)
-        yield "texts: cdata", Kind.VARIED, made, self._styled(act, made, XmlStyle(text="cdata")), "utf-8"
+        made = _with_others(node, free, 1)
+        yield "texts: cdata", Kind.VARIED, made, self._style(act, made, XmlStyle(text="cdata")), "utf-8"
         octets = self.caller.messages.message(act.port, act.operation, made)
         for text in {made.at(path).text for path, simple in free if simple.builtin in STRINGS}:
             # Only in texts: a device that reads only a part of an identifier or number refuses the message.
@@ -180,7 +180,7 @@ class _Changes:
                 octets = octets.replace(f">{text}<".encode(), f">{text[:2]}<!-- 2 -->{text[2:]}<".encode())
         yield "comments within texts", Kind.TRIED, made, octets, "utf-8"
         for form, turn in enumerate((0, 1)):
-            made = other = _varied(node, free, turn)
+            made = other = _with_others(node, free, turn)
             for path, simple in free:
                 other = with_text(other, path, rewritten(simple, other.at(path).text, form))
             octets = self.caller.messages.message(act.port, act.operation, other)
@@ -203,7 +203,7 @@ class _Changes:
                 if made in tried or time.monotonic() > until:
                     continue
                 tried.append(made)
-                if self.caller.ask(act, made, f"a message with {says}").succeeded:
+                if self.caller.ask(act, made, f"a message with {says}").is_success:
                     self._wait(readers, made, leaves)
                     if leaves is free:
                         break
@@ -213,11 +213,11 @@ class _Changes:
         until = time.monotonic() + _BUDGET_S
         names = {node.at(path).name.lower() for path, _ in free} | act.inherited
         # What is left out has to keep a value that is not the first one, which a device may go back to.
-        node = _varied(node, free, 1) if act.keeps else node
+        node = _with_others(node, free, 1) if act.keeps else node
         if act.keeps:
             self.caller.ask(act, node, "a message with other values")
-        for says, made in (*_without(declared, node), *_counted(declared, node), *_derived(declared, node)):
-            if time.monotonic() < until and not self.caller.messages.found.types.invalid(parse(made.written())):
+        for says, made in (*_without(declared, node), *_counted(declared, node), *_derivations(declared, node)):
+            if time.monotonic() < until and not self.caller.messages.found.types.invalid(parse(made.serialize())):
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
                 left = [(path, kind, made.at(path)) for path, kind in simple_leaves(declared, made) if path]
                 left = [one for one in left if one[2].text or one[2].name.lower() in act.emptied]
@@ -244,7 +244,7 @@ class _Changes:
         found: dict[str, list[str]] = {}
         for _ in range(times):
             for act, _, node in readers:
-                found |= _told(self.caller.ask(act, _asked(node, written), "a valid message"))
+                found |= _values_in(self.caller.ask(act, _with_values_of(node, written), "a valid message"))
         return found
 
     def _refuse(self, act: Act, declared: Element, node: Node, turn: int) -> None:
@@ -278,7 +278,7 @@ class _Changes:
         told = [(thing, self._read(readers, thing)) for thing in things]
         things = [thing for thing, values in told if values]
         if len(things) > 1:
-            written = [_varied(thing, free, turn) for turn, thing in enumerate(things, 1)]
+            written = [_with_others(thing, free, turn) for turn, thing in enumerate(things, 1)]
             for made in written:
                 self.caller.ask(act, made, "a message for another thing")
             for wait_s in (0.0, SETTLES_S):
@@ -286,8 +286,8 @@ class _Changes:
                 for made in written:
                     self._read(readers, made)
             # Several clients read different things at the same moment: each must get its own.
-            asked = [(one, _asked(message, made)) for made in written for one, _, message in readers]
-            clients = [self._addressed(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
+            asked = [(one, _with_values_of(message, made)) for made in written for one, _, message in readers]
+            clients = [self._address(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
             send_together([clients] * (_ROUNDS[not self._is_quick] // 2))
             for made in written:
                 self._read(readers, made, times=2)
@@ -308,10 +308,10 @@ class _Changes:
         made, asks = list[str](), list[Node]()
         forms = [*forms[:2], *_forms_of(declared, short or node)[:1]]
         for turn in range(_THINGS):
-            probe = self.caller.ask(act, _varied(*forms[turn], turn), "a message that creates")
-            if not probe.succeeded:
+            probe = self.caller.ask(act, _with_others(*forms[turn], turn), "a message that creates")
+            if not probe.is_success:
                 probe = self.caller.ask(act, node, "a message that creates")
-            told = {name: texts[0] for name, texts in _told(probe).items() if len(texts) == 1}
+            told = {name: texts[0] for name, texts in _values_in(probe).items() if len(texts) == 1}
             made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
             asks = [Node("", "", tuple(Node(*pair) for pair in told.items())), *asks]
             if not turn:
@@ -319,7 +319,7 @@ class _Changes:
                 time.sleep(_LASTS_S)
             self._read(lists, node)
             yield
-        typed = [_told(probe) for probe in self._created_as_derived(act, declared, node)]
+        typed = [_values_in(probe) for probe in self._created_as_derived(act, declared, node)]
         made += [texts[0] for told in typed for name, texts in told.items() if REFERS.search(name)][: len(typed)]
         asks += [Node("", "", tuple(Node(name, texts[0]) for name, texts in told.items())) for told in typed]
         time.sleep(SETTLES_S)
@@ -327,7 +327,7 @@ class _Changes:
         for asked in asks * 3:
             self._read(readers, asked)
         for kind in (0, _REFUSALS - 1):
-            self._refuse(act, declared, _varied(node, free, _THINGS), kind)
+            self._refuse(act, declared, _with_others(node, free, _THINGS), kind)
             self._read(lists, node, times=2)
         for id_ in made:
             self.remove(remove[0], remove[2], id_)
@@ -339,10 +339,10 @@ class _Changes:
 
     def _created_as_derived(self, act: Act, declared: Element, node: Node) -> Iterator[SoapProbe]:
         """Create a thing of a derived type, and again if that is refused; yield the success."""
-        for says, made in islice(_derived(declared, node), 1):
+        for says, made in islice(_derivations(declared, node), 1):
             for kind in (Kind.TRIED, Kind.VARIED):
                 probe = self.caller.ask(act, made, says, kind)
-                if probe.succeeded:
+                if probe.is_success:
                     yield probe
                     break
 
@@ -368,23 +368,23 @@ class _Changes:
         if len(asked) > 1:
             rounds = range(_ROUNDS[not self._is_quick])
             clients = [[asked[(number + turn) % len(asked)] for number in range(MOST_CLIENTS)] for turn in rounds]
-            send_together([list(starmap(self._addressed, together)) for together in clients])
+            send_together([list(starmap(self._address, together)) for together in clients])
 
     def _about_another(self, act: Act, declared: Element | None, node: Node | None) -> Iterator[Node]:
         """Yield a message that reads something else, if the device accepts it."""
         if declared is None or node is None:
             return
         made, known = (
-            _varied(node, [leaf for leaf in simple_leaves(declared, node) if leaf[0]], 1),
-            self.caller.known(act),
+            _with_others(node, [leaf for leaf in simple_leaves(declared, node) if leaf[0]], 1),
+            self.caller.known_values(act),
         )
         for path, _ in simple_leaves(declared, node):
             others = [text for text in known.get(node.at(path).name.lower(), ()) if text != node.at(path).text]
             made = with_text(made, path, others[0]) if others else made
-        if made != node and self.caller.ask(act, made, "a message about another thing").succeeded:
+        if made != node and self.caller.ask(act, made, "a message about another thing").is_success:
             yield made
 
-    def _addressed(self, act: Act, node: Node | None) -> Addressed:
+    def _address(self, act: Act, node: Node | None) -> Addressed:
         """Return a message as one of several clients sends it."""
         octets = self.caller.messages.message(act.port, act.operation, node)
         sent = Outgoing("POST", target_of(act.port), fields_of(act.port, act.operation), octets)
@@ -402,7 +402,7 @@ class _Changes:
             # What is left out of a message that writes is read too (_ends).
             made_of += [*_without(declared, node)] if declared and node and act.role is not Role.WRITES else []
             for says, made in made_of:
-                if self.caller.messages.found.types.invalid(parse(made.written())):
+                if self.caller.messages.found.types.invalid(parse(made.serialize())):
                     continue
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, made))
             if act.role is Role.WRITES:
@@ -410,7 +410,7 @@ class _Changes:
         for act, _, node in [one for one in self.acts if one[0].role is Role.READS][: 1 if self._is_quick else 9]:
             # Comments are sent to no device that rejects them: client libraries write none.
             for says, style in [pair for pair in single_changes() if "comment" not in pair[0]]:
-                self._vary(act, node, f"a message with {says}", partial(self._styled, act, node, style))
+                self._vary(act, node, f"a message with {says}", partial(self._style, act, node, style))
             for says, text, actor in _BLOCKS:
                 block = mandatory(act.port, text, actor)
                 self._vary(act, node, says, partial(self.caller.messages.message, act.port, act.operation, node, block))
@@ -422,15 +422,15 @@ class _Changes:
                 # WS-I BP 1.1 R1127: the Body decides, or the message is refused.
                 self.caller.ask(act, node, f"a message with the SOAPAction of {other.operation.name}", action=other)
 
-    def _styled(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
+    def _style(self, act: Act, node: Node | None, style: XmlStyle) -> bytes:
         """Return a message in a style."""
         return serialize(self.caller.messages.whole(act.port, act.operation, node), style).encode()
 
     def _vary(self, act: Act, node: Node | None, says: str, write: Callable[[], bytes]) -> None:
         """Send a message, and again where it is refused and the usual one is not; each with a nonce of its own."""
         probe = self.caller.send(act, Kind.TRIED, says, write())
-        if not probe.succeeded:
-            if not self.caller.ask(act, node, "a valid message").succeeded:
+        if not probe.is_success:
+            if not self.caller.ask(act, node, "a valid message").is_success:
                 return
             probe = self.caller.send(act, Kind.TRIED, says, write())
         if probe.exchange is not None:
@@ -450,21 +450,21 @@ def soap_changes(api: RestInterface) -> tuple[SoapProbe, ...]:
     api.run.limit.in_turns(steps, 1.0)
     changes.read_often()
     for act, _, node in changes.by_role(Role.REMOVES):
-        for id_ in {text for texts in changes.caller.known(act).values() for text in texts}:
+        for id_ in {text for texts in changes.caller.known_values(act).values() for text in texts}:
             changes.remove(act, node, id_)
     return tuple(changes.caller.probes)
 
 
-def _told(probe: SoapProbe) -> dict[str, list[str]]:
+def _values_in(probe: SoapProbe) -> dict[str, list[str]]:
     """Return the values in a success, by name in lower case."""
     try:
-        inside = probe.inside() if probe.succeeded else []
+        inside = probe.inside() if probe.is_success else []
     except NotSoapError:
         return {}
     return {name: texts for element in inside for name, texts in texts_of(element).items()}
 
 
-def _asked(node: Node | None, written: Node) -> Node | None:
+def _with_values_of(node: Node | None, written: Node) -> Node | None:
     """Return a message with the values of another one, by their names."""
     names = {written.at(path).name.lower(): written.at(path).text for path in written.paths()}
     for path in node.paths() if node else ():
@@ -484,7 +484,7 @@ def _once(node: Node) -> Node:
     return replace(node, children=tuple(children.values())[::-1])
 
 
-def _varied(node: Node, free: _Leaves, turn: int) -> Node:
+def _with_others(node: Node, free: _Leaves, turn: int) -> Node:
     """Return a message with other values, by turn."""
     there = Counter[str]()
     for path, simple in free:
@@ -528,13 +528,13 @@ def _alternatives(declared: Element, node: Node, free: frozenset[str]) -> Iterat
             yield f"{other!r} as {name}", with_text(node, path, other)
     for path, says, branch in branches(declared, node):
         yield says, node.replaced(path, ordinary(branch))
-    if (turned := _turned(node)) != node:
+    if (turned := _reorder(node)) != node:
         yield "attributes in another order", turned
 
 
-def _turned(node: Node) -> Node:
+def _reorder(node: Node) -> Node:
     """Return a message whose attributes are in another order."""
-    return replace(node, children=tuple(map(_turned, node.children)), attributes=node.attributes[::-1])
+    return replace(node, children=tuple(map(_reorder, node.children)), attributes=node.attributes[::-1])
 
 
 def _bounded(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
@@ -549,9 +549,9 @@ def _bounded(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
             yield f"the {says} numbers", made
 
 
-def _derived(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
+def _derivations(declared: Element, node: Node) -> Iterator[tuple[str, Node]]:
     """Yield messages in which a derived type takes the place of its base, each with what is special about it."""
-    for made in derived(declared, node):
+    for made in derivations(declared, node):
         names = [text for path in made.paths() for name, text in made.at(path).attributes if name == clark(XSI, "type")]
         yield f"xsi:type {local(names[-1])}", made
 

@@ -135,7 +135,7 @@ class SoapProbe:
             return None
 
     @property
-    def succeeded(self) -> bool:
+    def is_success(self) -> bool:
         """Whether the response is a success: 2xx without a fault."""
         return self.exchange is not None and self.exchange.response.ok and self.fault is None
 
@@ -187,7 +187,7 @@ class Caller:
             declared, node = self.messages.usual(operation)
         except NotPossibleError:
             return _MANY
-        return len(self.messages.invented(declared, node)) if declared and node else 0
+        return len(self.messages.invented_names(declared, node)) if declared and node else 0
 
     def learn(self, probe: SoapProbe, node: Node | None) -> None:
         """Keep the values in a message's successful response; other content has none."""
@@ -210,7 +210,7 @@ class Caller:
                 if act.role is Role.READS:
                     self.current |= {name: texts[0] for name, texts in told.items() if len(texts) == 1}
 
-    def known(self, act: Act) -> dict[str, list[str]]:
+    def known_values(self, act: Act) -> dict[str, list[str]]:
         """Return values by name, first those of things that the suite created; for ending operations no others."""
         found: dict[str, list[str]] = {}
         for name, simple in act.sent.items():
@@ -227,7 +227,7 @@ class Caller:
             keys = {key for name, simple in maker.makes.items() for key in maker.keys(name, simple)}
             if keys & needed and label not in self.lost and maker is not act:
                 probe = self.ask(maker, node, "a message that creates")
-                if probe.succeeded:
+                if probe.is_success:
                     self.learn(probe, node)
                     return True
         return False
@@ -305,7 +305,7 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
     declared, node, kind = usual_message(caller, act)
     if act.role is not Role.READS and act.role is not Role.REMOVES:
         node = full_message(caller, act, declared, node) or node
-    works = caller.probes[-1].succeeded
+    works = caller.probes[-1].is_success
     _read_what_it_did(caller, act, node)
     if works:
         _about_others(caller, act, node)
@@ -356,15 +356,15 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
     messages, tried = caller.messages, list[Node | None]()
     current = caller.current if act.role is Role.WRITES else {}
     declared, node = messages.usual(act.operation, current=current)
-    invented = messages.invented(declared, node) if declared and node else []
-    unsure = messages.invented(declared, node, named=True) if declared and node else []
+    invented = messages.invented_names(declared, node) if declared and node else []
+    unsure = messages.invented_names(declared, node, named=True) if declared and node else []
     names = {name.lower() for name in unsure if REFERS.search(name)} or {name.lower() for name in unsure}
     kind, is_last = Kind.TRIED if invented else Kind.USUAL, bool(unsure) and act.role in LAST
     for turn in range(_TRIED + 2 if unsure else 1):
         if act.label in caller.lost:
             break
         is_new = turn > _TRIED and caller.renew(act)
-        known = caller.known(act)
+        known = caller.known_values(act)
         has = any(known.get(name) for name in names)
         if (turn > _TRIED and not is_new) or (is_last and (not has if turn else has or invented)):
             continue
@@ -375,7 +375,7 @@ def usual_message(caller: Caller, act: Act) -> tuple[Element | None, Node | None
             continue
         tried.append(node)
         probe = caller.ask(act, node, "a valid message", Kind.TRIED if turn else kind)
-        if probe.succeeded:
+        if probe.is_success:
             kind, caller.probes[-1] = Kind.USUAL, replace(probe, kind=Kind.USUAL)
             caller.learn(probe, node)
             break
@@ -401,10 +401,10 @@ def full_message(caller: Caller, act: Act, declared: Element | None, node: Node 
     for form in (1, 0):
         with contextlib.suppress(NotPossibleError):
             full = caller.messages.usual(act.operation, current=known, form=form)[1]
-            if full is None or len(full.written()) <= len(node.written()):
+            if full is None or len(full.serialize()) <= len(node.serialize()):
                 continue
             probe = caller.ask(act, full, "a message with all optional parts")
-            if probe.succeeded:
+            if probe.is_success:
                 caller.learn(probe, full)
                 return full
     return None
@@ -413,7 +413,7 @@ def full_message(caller: Caller, act: Act, declared: Element | None, node: Node 
 def _read_what_it_did(caller: Caller, act: Act, node: Node | None) -> None:
     """Read the thing that an operation created or concerns: its response may break the schema in one state only."""
     probe = caller.probes[-1]
-    if probe.operation != act.label or not probe.succeeded or act.role not in {Role.OTHER, Role.ENDS, Role.CREATES}:
+    if probe.operation != act.label or not probe.is_success or act.role not in {Role.OTHER, Role.ENDS, Role.CREATES}:
         return
     texts = {node.at(path).name.lower(): node.at(path).text for path in node.paths()} if node else {}
     with contextlib.suppress(NotSoapError):
@@ -431,7 +431,7 @@ def _about_others(caller: Caller, act: Act, node: Node | None) -> None:
     for turn in (1, 1) if act.role is Role.OTHER and act.makes else (0,) if act.role is Role.ENDS else ():
         with contextlib.suppress(NotPossibleError):
             is_new = turn or caller.renew(act)
-            other = caller.messages.usual(act.operation, turn, caller.known(act))[1] if is_new else node
+            other = caller.messages.usual(act.operation, turn, caller.known_values(act))[1] if is_new else node
             if other != node:
                 caller.ask(act, other, "a message about another thing")
                 _read_what_it_did(caller, act, other)

@@ -124,7 +124,7 @@ def _in_lines(changed: dict[str, Any], parts: dict[str, Any]) -> list[dict[str, 
     return [{name: _LINES} for name in (longer or texts)[-1:]]
 
 
-def _emptied(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]:
+def _empty_values(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]:
     """Return empty lists and maps, null, and objects without their optional members, as far as they are allowed."""
     found: dict[str, Any] = {}
     for name, one in body.items():
@@ -151,7 +151,7 @@ def _replacing(
         whole = {**base, **changed}
         rich = {**whole, **_rich(parts, whole, values.collections)}
         lines = [{**whole, **one} for one in _in_lines(changed, parts)]
-        less = {**rich, **{name: one for name, one in _emptied(parts, rich).items() if may(name)}}
+        less = {**rich, **{name: one for name, one in _empty_values(parts, rich).items() if may(name)}}
         yield from (whole, *(one for one in (rich, less, *lines) if one != whole and fits(schema, one)))
         least = {name: base[name] for name in base if name in flat(schema).get("required", ())}
         other = telling(schema, least, 2, values.collections)
@@ -322,7 +322,7 @@ def _patches(
             makers.append(lambda whole=whole, added=added: [whole, added])  # type: ignore[misc] # bound in its round
             break
     makers += [
-        lambda: [testing(*unequal), replacing(one, 2)] if (unequal := _turned(now())) else [],
+        lambda: [testing(*unequal), replacing(one, 2)] if (unequal := _reversed_list(now())) else [],
         lambda: [{"op": "move", **moved} for moved in _moves(read, now(), may)][:1],
         lambda: [{"op": "remove", "path": _pointer(name)} for name in _optional(read, now(), may)][:1],
     ]
@@ -368,7 +368,7 @@ def _moves(read: Operation, there: dict[str, Any], may: Callable[[str], bool]) -
             yield {"from": pointer, "path": _pointer(target)}
 
 
-def _turned(there: dict[str, Any]) -> tuple[str, Any] | None:
+def _reversed_list(there: dict[str, Any]) -> tuple[str, Any] | None:
     """Return a list of a thing with its items in the opposite order, which is another list (RFC 6902 4.6)."""
     lists = ((name, one[::-1]) for name, one in there.items() if isinstance(one, list) and one != one[::-1])
     return next(lists, None)

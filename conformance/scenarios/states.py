@@ -149,9 +149,9 @@ class _Walker:
             return
         one, before = self._map.operations[name], self._read()
         self._tried[name, before] += 1
-        made = self._binding.made(one.send or name, one.body)
+        made = self._binding.make(one.send or name, one.body)
         exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
-        taken = exchange.response.ok and not self._failed(exchange)
+        taken = exchange.response.ok and not self._has_failed(exchange)
         wanted = self._map.following(one.leads(before) if taken else before)
         within_s = (one.within_s or self._map.within_s) if taken else _KEEPS_S
         shown, arrived = [self._read()], False
@@ -172,7 +172,7 @@ class _Walker:
             shown.append(state)
 
     def _read(self) -> str:
-        made = self._binding.made(self._map.read, None)
+        made = self._binding.make(self._map.read, None)
         exchange = self._api.client.send(made.method, made.target, headers=made.headers, body=made.body)
         try:
             said = str(at(self._binding.content(exchange.response.body), self._map.at))
@@ -182,7 +182,7 @@ class _Walker:
             return state
         raise NotPossibleError(f"[states] {self._map.read} got {exchange.came}: no state in {said[:80]!r}")
 
-    def _failed(self, exchange: Exchange) -> bool:
+    def _has_failed(self, exchange: Exchange) -> bool:
         if self._map.failed is None:
             return False
         try:
@@ -201,7 +201,7 @@ def walked(api: RestInterface, state_map: StateMap) -> Walk:
     states = state_map.states
     taken_in = {name: tuple(filter(one.is_taken_in, states)) for name, one in state_map.operations.items()}
 
-    def seen() -> Walk:
+    def walk_so_far() -> Walk:
         return Walk(states, taken_in, tuple(walker.steps), walker.first, walker.here)
 
     try:
@@ -211,6 +211,6 @@ def walked(api: RestInterface, state_map: StateMap) -> Walk:
         with suppress(NoAnswerError, NotPossibleError):
             walker.go_back()
         if isinstance(error, NoAnswerError | NotPossibleError):
-            raise PartialTraceError(seen()) from error
+            raise PartialTraceError(walk_so_far()) from error
         raise
-    return seen()
+    return walk_so_far()

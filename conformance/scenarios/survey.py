@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.calls import Call, value_text
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import unacceptable, undeclared_types
 from conformance.api.rest.statuses import HELD, differ
@@ -21,7 +21,7 @@ from conformance.api.rest.values import Values
 from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
-from conformance.scenarios.drawing import SLOW_SHARE, drawn, has_input, order_of
+from conformance.scenarios.drawing import SLOW_SHARE, draw_requests, has_input, order_of
 from conformance.scenarios.lists import Paged
 from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -156,7 +156,7 @@ class Survey:
             found.setdefault(probe.operation, []).append(probe)
         return found
 
-    def held(self, label: str) -> bool:
+    def is_held(self, label: str) -> bool:
         """Return whether the device's state kept it from acting on each usual request of an operation."""
         statuses = {probe.status for probe in self.of(label, Kind.USUAL) if not probe.invents}
         return bool(statuses) and statuses <= HELD and not any(probe.ok for probe in self.of(label))
@@ -216,12 +216,12 @@ class Surveyor:
         """
         by_inputs = request is None
         request = request or self.reaching.request(operation, variation)
-        probe, losses = self._described(operation, variation, request), self.api.run.losses
+        probe, losses = self._probe_of(operation, variation, request), self.api.run.losses
         try:
             # A device may handle the first request on a connection differently.
             if fresh is None:
                 fresh = variation.kind is Kind.USUAL or len(self.probes) % _FRESH == 0
-            exchange = self._recorded(request, fresh=fresh)
+            exchange = self._send_recorded(request, fresh=fresh)
         except (NotPossibleError, TimeIsOverError) as refused:
             raise PartialTraceError(self.trace) from refused
         except NoAnswerError as none:
@@ -260,11 +260,11 @@ class Surveyor:
             self.api.streams.add(operation.label)
         if exchange.response.ok:
             self.values.learn(operation, exchange)
-            self.values.accepted(operation, request)
+            self.values.remember(operation, request)
         elif status in REFUSALS:
-            self.reaching.refused(status, operation, request)
+            self.reaching.keep_refused(status, operation, request)
         if not operation.safe and status not in REFUSALS - WANTS_CONDITION:
-            self.reaching.acted()
+            self.reaching.forget_tags()
 
     def _is_single(self, operation: Operation) -> bool:
         """Return whether a creation that succeeded is refused the second time, as where names are unique."""
@@ -272,10 +272,10 @@ class Surveyor:
         succeeds = operation.method == "POST" and label in self.api.working
         if succeeds and usual is not None and label not in self.api.single:
             with suppress(NotPossibleError, TimeIsOverError, NoAnswerError):
-                self.api.single[label] = self.api.send(written(operation, usual)).response.status in _DOUBTED
+                self.api.single[label] = self.api.send(request_of(operation, usual)).response.status in _DOUBTED
         return self.api.single.get(label, False)
 
-    def _described(self, operation: Operation, variation: Variation, request: Outgoing) -> Probe:
+    def _probe_of(self, operation: Operation, variation: Variation, request: Outgoing) -> Probe:
         """Return a probe of a request that is not sent yet."""
         said = validity(
             self.api.run.contract, request.method, request.target, request.content_type, request.body, request.headers
@@ -287,7 +287,7 @@ class Surveyor:
         given = operation.label, variation.kind, variation.says, variation.place
         return Probe(*given, validity=own.verdict, why=own.why, invents=invents)
 
-    def _recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
+    def _send_recorded(self, request: Outgoing, *, fresh: bool) -> Exchange:
         """Send a request whose exchange becomes a probe and that no checker judges.
 
         Raises:
@@ -308,7 +308,7 @@ class Surveyor:
             return
         path = f"{operation.template.partition('{')[0].rstrip('/').rpartition('/')[0]}/{UNKNOWN}"
         path = f"{path}/{UNKNOWN}" if known_path(self.api.run.contract, path) else path
-        with self.api.run.limit.lifted(), suppress(NoAnswerError):
+        with self.api.run.limit.lift(), suppress(NoAnswerError):
             self.elsewhere[operation.label] = self.api.client.send("GET", path)
 
     def begin(self, operation: Operation) -> None:
@@ -355,7 +355,7 @@ class Surveyor:
         run = self.api.run
         try:
             self.begin(operation)
-            if run.limit.bounded:
+            if run.limit.has_limit:
                 self.look_elsewhere(operation)
             yield
             if operation.label not in self.given_up:
@@ -369,7 +369,7 @@ class Surveyor:
     def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
         usual = self.usual[operation.label]
-        groups, parts = drawn(operation, usual, self.values, effort, seed, self.api.slow), _MOST_PARTS
+        groups, parts = draw_requests(operation, usual, self.values, effort, seed, self.api.slow), _MOST_PARTS
         left = _BUDGETS * effort.budget_s
         self._time(operation, usual, effort, time.monotonic() + left)
         for variations in groups:
@@ -480,7 +480,7 @@ def _is_near(template: str, other: str) -> bool:
 def survey(api: RestInterface, values: Values) -> Survey:
     """Send each operation that may be called its usual request, and many that differ from it in one thing."""
     run = api.run
-    operations = [item for item in operations_of(run.contract) if allowed(api, item)]
+    operations = [item for item in operations_of(run.contract) if allows(api, item)]
     if not operations:
         raise NotPossibleError("no operation of the description may be called")
     surveyor = Surveyor(api, values)
@@ -498,10 +498,10 @@ def survey(api: RestInterface, values: Values) -> Survey:
             surveyor.begin(operation)
     for operation in operations:
         surveyor.look_elsewhere(operation)
-    return _repeated(surveyor, operations)
+    return _repeat_quickest(surveyor, operations)
 
 
-def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
+def _repeat_quickest(surveyor: Surveyor, operations: list[Operation]) -> Survey:
     """Send the quickest usual request many times, and return the finished survey."""
     quickest = [
         (probe.exchange.response.elapsed_ms, probe.operation)
@@ -512,7 +512,7 @@ def _repeated(surveyor: Surveyor, operations: list[Operation]) -> Survey:
     last: Exchange | None = None
     for _, label in sorted(quickest)[:1]:
         operation = next(item for item in operations if item.label == label)
-        request = written(operation, surveyor.usual[label])
+        request = request_of(operation, surveyor.usual[label])
         for _ in range(max(FEWEST_REPEATS, surveyor.api.run.effort.cases(REPEATS))):
             if surveyor.api.run.limit.is_past(SURVEY_SHARE):
                 break
@@ -540,7 +540,7 @@ def generated_requests(api: RestInterface, values: Values, explore: Explorer) ->
 
     run = api.run
     operations = {
-        item.label: item for item in operations_of(run.contract) if allowed(api, item) and item.label not in api.streams
+        item.label: item for item in operations_of(run.contract) if allows(api, item) and item.label not in api.streams
     }
     surveyor = Surveyor(api, values)
     for target in targets(run.contract):
@@ -581,7 +581,7 @@ def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, ex
         return
     for negative in (True, False):
         with suppress(*NOT_GENERATED):
-            explore(target.fuzzed(negative=negative), partial(_send_case, surveyor, operation), cases=FUZZED)
+            explore(target.strategy(negative=negative), partial(_send_case, surveyor, operation), cases=FUZZED)
 
 
 def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
@@ -596,5 +596,5 @@ def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
         return
     whole = replace(request, headers=(*headers, *request.headers))
     if whole not in surveyor.api.judged:
-        whole = surveyor.reaching.generated(operation, whole)
+        whole = surveyor.reaching.complete(operation, whole)
         surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import listing_of, page_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import Values
 from conformance.documents.json_schema import is_number
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.xsd_shapes import number_in
@@ -72,7 +72,7 @@ def tables(api: RestInterface, values: Values) -> tuple[Table, ...]:
         for read in reads:
             api.run.limit.check()
             with suppress(NoAnswerError):  # the survey reports a broken connection
-                for compare in (_compared, _chosen):
+                for compare in (_compare, _read_filtered):
                     first = compare(api, values, read)
                     again = compare(api, values, read) if first is not None and first.fault else first
                     found += [table for table in (again,) if table is not None]
@@ -102,9 +102,9 @@ def _quoted_texts(
                 Writer(api, values).conditional(delete, read, path)
 
 
-def _compared(api: RestInterface, values: Values, read: Operation) -> Table | None:
+def _compare(api: RestInterface, values: Values, read: Operation) -> Table | None:
     """Read a list as JSON, as CSV and as JSON; None if it has changed meanwhile, or is no list with the same names."""
-    request = written(read, usual_inputs(read, values)[0])
+    request = request_of(read, usual_inputs(read, values)[0])
     json_type = next(filter(is_json, read.formats))
     kept = tuple(pair for pair in request.headers if pair[0].lower() != "accept")
     before, table, after = (
@@ -131,13 +131,13 @@ def _compared(api: RestInterface, values: Values, read: Operation) -> Table | No
     return Table(read.label, table, f"the {len(items)} items that JSON has before and after, one a row", fault)
 
 
-def _chosen(api: RestInterface, values: Values, read: Operation) -> Table | None:
+def _read_filtered(api: RestInterface, values: Values, read: Operation) -> Table | None:
     """Read a filtered list as JSON and as CSV; None if JSON does not show that the filter excludes items."""
     listing, json_type = listing_of(read), next(filter(is_json, read.formats))
 
     def ask(media_type: str, **query: Any) -> Exchange:
         inputs = usual_inputs(read, values)[0]
-        request = written(read, replace(inputs, query={**inputs.query, **query}, accept=media_type))
+        request = request_of(read, replace(inputs, query={**inputs.query, **query}, accept=media_type))
         return api.client.send("GET", request.target, headers=request.headers)
 
     page = page_of(ask(json_type).response, read)
@@ -185,9 +185,9 @@ def _differences(
             value, text = item.get(name), row[place].strip() if place < len(row) else ""
             other = number_in(text) if isinstance(value, int | float) and is_number(value) else None
             if other is not None and not math.isclose(float(value or 0), other, **_NEAR):
-                yield f"{text} as {name} in row {number}, and {shown(value)} in JSON"
+                yield f"{text} as {name} in row {number}, and {clip(value)} in JSON"
             if isinstance(value, str) and '"' in value and not _is_shown(value.strip(), text):
-                yield f"{shown(text)} as {name} in row {number}, and {shown(value)} in JSON"
+                yield f"{clip(text)} as {name} in row {number}, and {clip(value)} in JSON"
 
 
 def _is_shown(value: str, text: str) -> bool:

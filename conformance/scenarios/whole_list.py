@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.listing import Page, cursors, listing_of, page_of
-from conformance.api.rest.things import collection_of, identified, identifier_of
+from conformance.api.rest.things import collection_of, id_member, identifier_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -129,7 +129,7 @@ def read_items(writer: Writer) -> None:
         writer.api.run.limit.check()
         with suppress(NoAnswerError):  # the survey reports a broken connection
             page = page_of(writer.send(lister).response, lister)
-            ids = [identified(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
+            ids = [id_member(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
             ids = [one for one in ids if one is not None]
             chosen = dict.fromkeys(ids[index] for index in (0, len(ids) // 2, -1)) if ids else {}
             for id_ in [*chosen, *list(chosen)[: len(chosen) > 1]]:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from conformance.api.rest.inputs import renewed, usual_inputs, whole_body, written
+from conformance.api.rest.inputs import request_of, usual_inputs, whole_body, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, as_answered, differences, represented, with_items
+from conformance.api.rest.things import another, as_answered, differences, object_in, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -106,7 +106,7 @@ class Writer:
         inputs = usual_inputs(operation, self.values)[0]
         inputs = inputs if body is None else replace(inputs, body=body)
         inputs = inputs if query is None else replace(inputs, query={**inputs.query, **query})
-        request = written(operation, renewed(operation, inputs, self.values))
+        request = request_of(operation, with_new_values(operation, inputs, self.values))
         rest = "".join(request.target.partition("?")[1:])
         given = {name.lower() for name, _ in headers}
         kept = [pair for pair in request.headers if pair[0].lower() not in given]
@@ -150,7 +150,7 @@ class Writer:
                 return found
             time.sleep(_PAUSE_S)
 
-    def settled(self, read: Callable[[], Exchange], wrong: Callable[[Exchange], Sequence[str]]) -> Settled:
+    def settle(self, read: Callable[[], Exchange], wrong: Callable[[Exchange], Sequence[str]]) -> Settled:
         """Return the first read without a fault, or the last one and the faults of the last few."""
         seen: list[Sequence[str]] = []
 
@@ -173,7 +173,7 @@ class Writer:
         fresh: bool = False,
     ) -> Write:
         """Read a thing until it shows written values; before: an earlier read; fresh: new connections."""
-        found = self.settled(
+        found = self.settle(
             lambda: self.send(read, path, fresh=fresh),
             lambda exchange: self.differing(operation, read, sent, exchange, before),
         )
@@ -214,4 +214,4 @@ class Writer:
 def members(exchange: Exchange, names: Any) -> dict[str, Any]:
     """Return the members of the thing in a JSON response; names: those that it probably has."""
     value = read_json(exchange.response.body).value if is_json(exchange.response.media_type) else None
-    return represented(value, {plain_name(name) for name in names})
+    return object_in(value, {plain_name(name) for name in names})

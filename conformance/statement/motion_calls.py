@@ -57,7 +57,7 @@ def written_out(motion: Any, values: Mapping[str, Sequence[Any]]) -> Any:
         return motion
     axes = _axes(motion)
     known = {name: given[0] for name, given in values.items() if given and name not in axes}
-    return _with_values({name: _directed(table) for name, table in motion.items()}, known)
+    return _with_values({name: _put_direction(table) for name, table in motion.items()}, known)
 
 
 def _axes(motion: Mapping[str, Any]) -> set[str]:
@@ -77,7 +77,7 @@ def _with_values(value: Any, known: Mapping[str, Any]) -> Any:
     return NAME.sub(lambda found: quote(str(known[found[1]]), safe="") if found[1] in known else found[0], value)
 
 
-def _directed(table: Any) -> Any:
+def _put_direction(table: Any) -> Any:
     """Return a table with its direction as a part of its body.
 
     Raises:
@@ -97,7 +97,7 @@ def _directed(table: Any) -> Any:
     axis = given.get("of", named[0] if len(named) == 1 else None)
     if axis not in named:
         raise ValueError(f"direction: of = must name one of {', '.join(named)}")
-    sized = _sized(body, axis)
+    sized = _with_sizes(body, axis)
     *folders, last = str(given["at"]).strip("/").split("/")
     place = sized
     for folder in folders:
@@ -106,11 +106,11 @@ def _directed(table: Any) -> Any:
     return {**rest, "body": sized}
 
 
-def _sized(value: Any, axis: str) -> Any:
+def _with_sizes(value: Any, axis: str) -> Any:
     if isinstance(value, dict):
-        return {name: _sized(item, axis) for name, item in value.items()}
+        return {name: _with_sizes(item, axis) for name, item in value.items()}
     if isinstance(value, list):
-        return [_sized(item, axis) for item in value]
+        return [_with_sizes(item, axis) for item in value]
     return value.replace(f"{{{axis}}}", f"{{{axis}:{SIZE}}}") if isinstance(value, str) else value
 
 

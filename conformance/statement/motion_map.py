@@ -78,7 +78,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the distance of two positions, for angles the shorter way."""
         return math.remainder(one - other, _TURNS[self.unit]) if self.angle else one - other
 
-    def moved(self, one: float, other: float) -> float:
+    def distance(self, one: float, other: float) -> float:
         """Return how far the axis moved between two readings: an angle may begin anew after a whole turn."""
         return abs(math.remainder(one - other, _TURNS.get(self.unit or "none", math.inf)))
 
@@ -270,7 +270,7 @@ class Switch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     shows: dict[str, Any] = {}
     within_s: Positive = 2.0
 
-    def shown(self, value: Any) -> Any:
+    def reading_of(self, value: Any) -> Any:
         """Return the reading that means a sent value."""
         return self.shows.get(str(value), value)
 

@@ -250,7 +250,7 @@ class RosMap(_Forms, frozen=True):
         )
 
     @property
-    def described(self) -> tuple[str, ...]:
+    def describable(self) -> tuple[str, ...]:
         """Return the operations in a form that a description has: without queries. OpenAPI has no WebSocket."""
         found = self.operations.items()
         sockets = {call for call, one in found if isinstance(one, Reads) and one.stream == "websocket"}

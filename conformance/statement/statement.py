@@ -84,7 +84,7 @@ class Statement(msgspec.Struct, frozen=True):
         return {"declared": {}, "limits": {}, "tolerances": {}}
 
     @property
-    def undeclared(self) -> dict[str, str]:
+    def why_not_tested(self) -> dict[str, str]:
         """Return why requirements are not tested whose prerequisite is not declared, by prerequisite."""
         return {}
 
@@ -103,7 +103,7 @@ class Statement(msgspec.Struct, frozen=True):
             raise StatementError(f"ROS domain {domain_id}: this contract has no ROS probe, and the statement no [ros]")
         return msgspec.structs.replace(self, ros_map=msgspec.structs.replace(self.ros_map, domain_id=domain_id))
 
-    def claimed(self, contract: Contract) -> tuple[str, ...]:
+    def claims_of(self, contract: Contract) -> tuple[str, ...]:
         """Return the classes to judge: those claimed, or, without claims, those whose interfaces all have an address.
 
         So a vendor who claims nothing is not judged more leniently than one who claims everything.
@@ -148,7 +148,7 @@ class _Claims(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     profile: str | None = None
     classes: tuple[str, ...] | None = None
 
-    def named(self, contract: Contract, path: Path) -> tuple[str, ...] | None:
+    def claimed_names(self, contract: Contract, path: Path) -> tuple[str, ...] | None:
         """Return the classes that are claimed by profile or name, or None.
 
         Raises:
@@ -228,7 +228,7 @@ class StatementFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return {
             "robot": {key: str(value) for key, value in robot.items() if value is not None},
             "endpoints": beside(path.parent, self.endpoints, self.auth),
-            "claims": self.claims.named(contract, path),
+            "claims": self.claims.claimed_names(contract, path),
             "load": self.load,
             "values": self.values,
             "calls": self.calls,

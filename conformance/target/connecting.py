@@ -62,7 +62,7 @@ def connection_of(where: Endpoints) -> Connection:
     return found
 
 
-def keyed(where: Endpoints, document: dict[str, Any]) -> Endpoints:
+def place_api_key(where: Endpoints, document: dict[str, Any]) -> Endpoints:
     """Return endpoints whose API key goes to the description's place, unless the user names another.
 
     Args:

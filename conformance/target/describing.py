@@ -20,7 +20,7 @@ from conformance.documents.security import without_credentials
 from conformance.statement.endpoints import Endpoints
 from conformance.transport.client import Connection
 from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, server_of
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
     from conformance.documents.wsdl import Wsdl
@@ -206,7 +206,7 @@ def _without_cases(document: Schema) -> tuple[str, ...]:
     large = [f"{method} {path}" for method, path, operation in every if unrolls(document, operation)]
     if not large:
         return ()
-    more = f" and {counted(len(large) - 1, 'other operation')}" if large[1:] else ""
+    more = f" and {count_of(len(large) - 1, 'other operation')}" if large[1:] else ""
     return (f"{large[0]}{more} had no generated requests: the schemas have too many parts for that.",)
 
 

@@ -16,7 +16,7 @@ import msgspec
 from conformance.commandline.device_options import advice
 from conformance.commandline.extras import lacking_ros, lacking_soap
 from conformance.commandline.help_pages import USUAL_STATEMENT
-from conformance.commandline.out_folder import FolderError, held, own_folder, write_atomically, write_json
+from conformance.commandline.out_folder import FolderError, hold, own_folder, write_atomically, write_json
 from conformance.contract.described import MOTION, ROS, STATES
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.contract.toml_file import basic_string
@@ -38,7 +38,7 @@ from conformance.statement.statement import (
     load_statement,
     maps_in,
 )
-from conformance.target.connecting import connection_of, keyed
+from conformance.target.connecting import connection_of, place_api_key
 from conformance.target.describing import described_contract, is_wsdl, soap_contract
 
 _BY_MAP: Final = "--ros and --ros-play judge a gateway by its ROS map: give"
@@ -88,7 +88,7 @@ class DeviceOptions:
         known = {one.name for one in fields(cls)} - {"endpoints"}
         return cls(where, **{name: value for name, value in given.items() if name in known})
 
-    def applied(self, endpoints: Endpoints) -> Endpoints:
+    def apply(self, endpoints: Endpoints) -> Endpoints:
         """Return endpoints with those given by the command."""
         return msgspec.structs.replace(endpoints, **self.endpoints)
 
@@ -182,14 +182,14 @@ def what_is_judged(source: str | None, statement: Path | None, options: DeviceOp
     api = api_of(statement) if statement else None
     source = source or (api.openapi or api.wsdl if api else None)
     if source is not None:
-        return _described(source, api, statement, options)
+        return _judge_described(source, api, statement, options)
     if options.ros or options.ros_play:
         raise StatementError(f"{_BY_MAP} a statement with [api], as it goes by the gateway's own description")
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     return Judged(_apply(declared, options, contract), contract)
 
 
-def _described(source: str, api: Api | None, statement: Path | None, options: DeviceOptions) -> Judged:
+def _judge_described(source: str, api: Api | None, statement: Path | None, options: DeviceOptions) -> Judged:
     """Return the statement and contract of a device that is judged by its own description.
 
     Raises:
@@ -202,7 +202,7 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
                 f"--{name.replace('_', '-')} is for a robot with the paper's contract, and this device is judged by "
                 f"its description {source}: leave one of them out"
             )
-    where = options.applied(endpoints_of(statement) if statement else Endpoints())
+    where = options.apply(endpoints_of(statement) if statement else Endpoints())
     api = api or Api()
     base_url = options.base_url or api.base_url
     soap = is_wsdl(source) or source in {options.wsdl, api.wsdl}
@@ -211,7 +211,7 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
         # Where an API key goes, the description may say, so that it is read without one.
         connection = connection_of(where if where.api_key else msgspec.structs.replace(where, api_key_file=None))
         more: dict[str, Any] = {
-            "mapped": _mapped(statement, options),
+            "mapped": _map_classes(statement, options),
             "allow_files": options.allow_files or api.allow_files,
         }
         if soap:
@@ -229,11 +229,11 @@ def _described(source: str, api: Api | None, statement: Path | None, options: De
     _check_map(declared, contract)
     if soap and declared.motion_map is not None:
         _check_messages(declared.motion_map, contract)
-    where = keyed(where, contract.openapi)
+    where = place_api_key(where, contract.openapi)
     return Judged(_apply(msgspec.structs.replace(declared, endpoints=where), options, contract), contract, remarks)
 
 
-def _mapped(statement: Path | None, options: DeviceOptions) -> tuple[str, ...]:
+def _map_classes(statement: Path | None, options: DeviceOptions) -> tuple[str, ...]:
     """Return the classes that the maps of a statement claim.
 
     Raises:
@@ -259,7 +259,7 @@ def _check_map(declared: Statement, contract: Contract) -> None:
     """
     labels = [operation.label for operation in operations_of(contract)]
     calls = [("motion", call) for call in (declared.motion_map.calls if declared.motion_map else ())]
-    calls += [("ros.operations", call) for call in (declared.ros_map.described if declared.ros_map else ())]
+    calls += [("ros.operations", call) for call in (declared.ros_map.describable if declared.ros_map else ())]
     calls += [("states", call) for call in (declared.state_map.calls if declared.state_map else ())]
     for table, call in calls:
         if not named_by([call], labels):
@@ -295,7 +295,7 @@ def _apply(declared: Statement, options: DeviceOptions, contract: Contract) -> S
     Raises:
         StatementError: an option has an invalid value.
     """
-    where = options.applied(declared.endpoints)
+    where = options.apply(declared.endpoints)
     for key in ("rest", "publishers_endpoint", "subscribers_endpoint"):
         url = getattr(where, key)
         if url is not None and not url.startswith(("http://", "https://")):
@@ -354,7 +354,7 @@ def lock_result_folder(out: Path) -> None:
         click.UsageError: it cannot take the results.
     """
     try:
-        click.get_current_context().with_resource(held(out))
+        click.get_current_context().with_resource(hold(out))
     except FolderError as error:
         raise click.UsageError(f"{advice('--out ')}{out}: {error}") from error
 

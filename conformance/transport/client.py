@@ -24,7 +24,7 @@ from conformance.transport.connections import (
     Deadline,
     HttpConnection,
     NoConnectionError,
-    explained,
+    explain,
     tls_context,
 )
 from conformance.transport.credentials import Credential, Credentials, bearer
@@ -253,13 +253,13 @@ class HttpClient:
         """
         path, headers = sendable(path), tuple(headers)
         for tries in itertools.count(1):
-            exchange = self._sent(method, path, headers, body, timeout_s, fresh=fresh, authorized=authorized)
+            exchange = self._send(method, path, headers, body, timeout_s, fresh=fresh, authorized=authorized)
             endpoint = partial(self.connection.endpoint_of, exchange.request)
             if not self.connection.is_patient or not self.connection.overload.waits(exchange.response, endpoint, tries):
                 return exchange
         raise AssertionError("unreachable: it counts without an end")
 
-    def _sent(
+    def _send(
         self,
         method: str,
         path: str,
@@ -277,13 +277,11 @@ class HttpClient:
         authorized = authorized and self._authorized and bool(credentials)
         if authorized:
             target, query = credentials.target(path), credentials.target(path, shown=True)[len(path) :]
-            sent = credentials.added(fields, method, self.prefix + target)
-            shown = tuple(credentials.added(shown, shown=True))
+            sent = credentials.add_to(fields, method, self.prefix + target)
+            shown = tuple(credentials.add_to(shown, shown=True))
         request = Request(method, self.url(path), shown, body, query=query)
         if (drafts := _drafts.get()) is not None:
-            return self._drafted(
-                method, target, tuple(pair for pair in sent if pair[0] != "Connection"), request, drafts
-            )
+            return self._draft(method, target, tuple(pair for pair in sent if pair[0] != "Connection"), request, drafts)
         self.put_off(request)
         whole = timeout_s or self.connection.timeout_s
         deadline, started = self.hangs.within_s(whole), time.monotonic()
@@ -291,7 +289,7 @@ class HttpClient:
             response = self._exchange(request, target, sent, deadline, fresh=fresh)
             if authorized and response.status == _CHALLENGE and credentials.learn(response.headers):
                 self.connection.recorder.withdraw(self._recorded)
-                sent = credentials.added(fields, method, self.prefix + target)
+                sent = credentials.add_to(fields, method, self.prefix + target)
                 response = self._exchange(request, target, sent, deadline, fresh=fresh)
             self.connection.note(method)
         except _SilenceError as none:
@@ -303,22 +301,22 @@ class HttpClient:
                     self.hangs.hurried.add(endpoint)
                     none.kind = NoAnswer.HURRIED
                 else:
-                    self.hangs.hung(endpoint, whole)
-            raise self._unanswered(request, str(none), none.kind) from none
-        self.hangs.answered(response.elapsed_ms / 1000)
+                    self.hangs.note_hang(endpoint, whole)
+            raise self._report_no_response(request, str(none), none.kind) from none
+        self.hangs.note_answer(response.elapsed_ms / 1000)
         self.connection.pace.took(response.elapsed_ms / 1000, len(body) + len(response.octets))
         exchange = Exchange(request, response)
         number = self._recorded
         if self.connection.is_away(exchange):
             self.connection.recorder.withdraw(number)
             problem = f"a gateway responded {response.status} in the device's place"
-            raise self._unanswered(request, problem, OF_GATEWAY[response.status])
+            raise self._report_no_response(request, problem, OF_GATEWAY[response.status])
         self.connection.recent.append(Sending(request, None))
         for listener in self.connection.listeners:
-            listener.answered(exchange)
+            listener.on_response(exchange)
         return exchange
 
-    def _drafted(self, method: str, target: str, fields: Headers, request: Request, drafts: list["Draft"]) -> Exchange:
+    def _draft(self, method: str, target: str, fields: Headers, request: Request, drafts: list["Draft"]) -> Exchange:
         """Keep a request that is not sent; return it with the response of a device that has no such resource.
 
         Raises:
@@ -337,12 +335,12 @@ class HttpClient:
         drafts.append(Draft(self, method, octets))
         return Exchange(request, Response(_NOTHING_THERE, (), b"", 0.0))
 
-    def _unanswered(self, request: Request, problem: str, kind: NoAnswer) -> NoAnswerError:
+    def _report_no_response(self, request: Request, problem: str, kind: NoAnswer) -> NoAnswerError:
         """Report a request without a response; return the exception to be raised."""
         unanswered = Unanswered(request, problem, kind)
         self.connection.recent.append(Sending(request, kind))
         for listener in self.connection.listeners:
-            listener.unanswered(unanswered)
+            listener.on_no_response(unanswered)
         return NoAnswerError(unanswered)
 
     def put_off(self, request: Request) -> None:
@@ -444,7 +442,7 @@ def is_drafting() -> bool:
 
 
 @contextmanager
-def drafted() -> Iterator[list[Draft]]:
+def draft_requests() -> Iterator[list[Draft]]:
     """Send nothing: yield a list that collects this thread's requests. Each gets a response 404."""
     drafts: list[Draft] = []
     token = _drafts.set(drafts)
@@ -473,7 +471,7 @@ def _no_answer(error: Exception, seconds: float) -> _SilenceError:
         return _SilenceError(f"a response that is not HTTP: {text}", NoAnswer.MALFORMED)
     if isinstance(error, NoConnectionError):
         kind = NoAnswer.TLS if "SSL" in text or "certificate" in text.lower() else NoAnswer.REFUSED
-        return _SilenceError(f"no connection: {explained(text)}", kind)
+        return _SilenceError(f"no connection: {explain(text)}", kind)
     if isinstance(error, OSError):
         return _SilenceError(f"the connection broke without a response: {text}", NoAnswer.CLOSED)
     raise error

@@ -38,11 +38,11 @@ def content_of(octets: bytes, encoding: str | None, *, is_whole: bool) -> Conten
     found, fault = None, ""
     for bits in (_GZIP_BITS,) if coding in _GZIP else _DEFLATE_BITS if coding == "deflate" else ():
         if is_whole and found is None:
-            found, fault = _unpacked(octets, bits)
+            found, fault = _unpack(octets, bits)
     return Content(octets if found is None else found, coding, found is not None, fault if coding in _GZIP else "")
 
 
-def _unpacked(octets: bytes, bits: int) -> tuple[bytes | None, str]:
+def _unpack(octets: bytes, bits: int) -> tuple[bytes | None, str]:
     """Return decompressed content, or None if it is too large or not compressed; and the error or an empty text."""
     left, found = octets, bytearray()
     for _ in range(_MEMBERS):  # several members of gzip are one content (RFC 1952 2.2)

@@ -164,7 +164,7 @@ class HttpConnection:
             raise
         except OSError:
             return  # a server that does not take a whole request may have answered it all the same
-        deadline.sent()
+        deadline.note_sent()
 
     def _head(self, link: socket.socket, deadline: Deadline) -> h11.Response | h11.InformationalResponse:
         """Return the head of the final response or the next interim response (RFC 9110 15.2)."""
@@ -332,7 +332,7 @@ class Deadline:
         """
         return min(self.left_s(), self._seconds)
 
-    def sent(self) -> None:
+    def note_sent(self) -> None:
         """Note that the whole request has been handed to the network."""
         self._at = min(self._at, time.monotonic() + self._seconds + time_to_arrive(self._octets))
 
@@ -373,13 +373,13 @@ class ClientCertificate(NamedTuple):
 
         SECRETS.keep(passphrase, "$ROAAS_KEY_PASSPHRASE")
 
-        def given() -> str:
+        def give_passphrase() -> str:
             nonlocal is_encrypted
             is_encrypted = True
             return passphrase
 
         try:
-            context.load_cert_chain(self.file, self.key_file, given)
+            context.load_cert_chain(self.file, self.key_file, give_passphrase)
         except (OSError, ValueError) as error:
             if is_encrypted and not self.passphrase_file:
                 how = advice(": name the file with its passphrase by --client-key-passphrase-file")
@@ -393,7 +393,7 @@ class ClientCertificate(NamedTuple):
             raise CertificateError(f"client certificate {self.file}, key {key}: {reason}") from None
 
 
-def explained(text: str) -> str:
+def explain(text: str) -> str:
     """Return a TLS error's text, with the user's remedy if it is known."""
     if any(said in text for said in ("WRONG_VERSION_NUMBER", "RECORD_LAYER_FAILURE", "PACKET_LENGTH_TOO_LONG")):
         return "this port does not speak TLS; is the address http://?"

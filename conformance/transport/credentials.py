@@ -85,20 +85,20 @@ class Credential:
 
     def __post_init__(self) -> None:
         if WRONG not in self.secret:
-            for secret in filter(None, (self.sent,) if self.near else self.secrets):
+            for secret in filter(None, (self.as_sent,) if self.near else self.secrets):
                 SECRETS.keep(secret, self.variable)
 
     @property
     def variable(self) -> str:
         """The shell variable that stands for the sent text, with its dollar sign; the text itself where it is wrong."""
         if WRONG in self.secret:
-            return self.sent
+            return self.as_sent
         own = {Kind.BEARER: "TOKEN", Kind.BASIC: "BASIC", Kind.DIGEST: "DIGEST"}.get(self.kind)
         name = own or re.sub("[^A-Z0-9]", "_", f"{self.kind}_{self.name}".upper())
         return f"$ROAAS_{name}{_NEARLY[self.near][1]}"
 
     @property
-    def sent(self) -> str:
+    def as_sent(self) -> str:
         """Return the secret in the form in which a request carries it."""
         if self.kind is Kind.BASIC:
             return base64.b64encode(self.secret.encode()).decode()
@@ -146,7 +146,7 @@ class Credential:
         if self.kind is Kind.HEADER and self.header.lower() == "cookie":
             values = (pair.partition("=")[2] for pair in self.secret.split("; "))
             parts += [value for value in values if len(value) >= _SHORTEST_IN_COOKIE]
-        return tuple(sorted({self.sent, self.secret, *parts}, key=len, reverse=True))
+        return tuple(sorted({self.as_sent, self.secret, *parts}, key=len, reverse=True))
 
     @property
     def places(self) -> tuple[tuple[str, str], ...]:
@@ -179,7 +179,7 @@ class Credentials:
     def __bool__(self) -> bool:
         return bool(self.items)
 
-    def added(
+    def add_to(
         self, fields: Sequence[tuple[str, str]], method: str = "GET", target: str = "/", *, shown: bool = False
     ) -> list[tuple[str, str]]:
         """Return a request's headers with the credentials; cookies join those of the request (RFC 6265 5.4)."""
@@ -207,7 +207,7 @@ class Credentials:
         found: dict[str, str] = {}
         for item in self.items:
             if item.header and item.header.lower() not in there:
-                value = item.value(item.variable if shown else item.sent)
+                value = item.value(item.variable if shown else item.as_sent)
                 if item.kind is Kind.DIGEST and not shown:
                     value = item.digest.answer(method, target)
                     if not value:
@@ -233,10 +233,10 @@ class Credentials:
 
     def target(self, target: str, *, shown: bool = False) -> str:
         """Return a request target with the credentials that go into the query."""
-        queries = [item.value(item.variable if shown else item.sent) for item in self.items if not item.header]
+        queries = [item.value(item.variable if shown else item.as_sent) for item in self.items if not item.header]
         return target + "".join(f"{'&' if '?' in target or number else '?'}{one}" for number, one in enumerate(queries))
 
-    def hidden(self, text: str) -> str:
+    def hide(self, text: str) -> str:
         """Return a text with variables in place of secrets, in whatever form a robot repeats them."""
         if any(item.kind is Kind.DIGEST for item in self.items):
             text = _ANSWER.sub(r"\1$ROAAS_DIGEST", text)
@@ -248,9 +248,9 @@ class Credentials:
 
     def hidden_bytes(self, octets: bytes) -> bytes:
         """Return bytes with variables in place of secrets."""
-        return self.hidden(octets.decode("latin-1")).encode("latin-1", "replace") if self.items else octets
+        return self.hide(octets.decode("latin-1")).encode("latin-1", "replace") if self.items else octets
 
-    def revealed(self, octets: bytes) -> bytes:
+    def reveal(self, octets: bytes) -> bytes:
         """Return bytes with the secrets in place of variables, to send a recorded request again."""
         # Longest first, because one variable's name may begin another's.
         for item in sorted(self.items, key=lambda item: -len(item.variable)):
@@ -258,7 +258,7 @@ class Credentials:
                 answer = item.digest.answer(line[1].decode("latin-1"), line[2].decode("latin-1"))
                 field = f"Authorization: {answer}\r\n".encode("latin-1") if answer else b""
                 octets = _SHOWN_ANSWER.sub(lambda _, field=field: field, octets)  # type: ignore[misc] # a default
-            octets = octets.replace(item.variable.encode(), item.sent.encode("latin-1"))
+            octets = octets.replace(item.variable.encode(), item.as_sent.encode("latin-1"))
         return octets
 
     @property
@@ -279,7 +279,7 @@ class Credentials:
         return tuple(
             Credentials(items)
             for items in found
-            if all(one.value(one.sent) != own.value(own.sent) for one, own in zip(items, self.items, strict=True))
+            if all(one.value(one.as_sent) != own.value(own.as_sent) for one, own in zip(items, self.items, strict=True))
         )
 
 
@@ -351,14 +351,14 @@ class UsernameToken:
         digest = hashlib.sha1(nonce + created.encode() + self.password.encode(), usedforsecurity=False).digest()
         return _text(digest), _text(nonce), created
 
-    def revealed(self, octets: bytes) -> bytes:
-        """Return a request with a fresh token in place of the variables of hidden(); its length stays the same."""
+    def reveal(self, octets: bytes) -> bytes:
+        """Return a request with a fresh token in place of the variables of hide_token(); its length stays the same."""
         for variable, text in zip(_VARIABLES, self.fresh(), strict=True):
             octets = octets.replace(variable, text.encode())
         return octets
 
 
-def hidden(octets: bytes) -> bytes:
+def hide_token(octets: bytes) -> bytes:
     """Return a request with variables in place of the texts that differ in each token."""
     return _TOKEN.sub(b"".join(b"\\%d%b" % (part, name) for part, name in enumerate(_VARIABLES, 1)), octets, count=1)
 

@@ -189,7 +189,7 @@ class Response:
         values = self._by_name.get(name.lower())
         return ", ".join(values) if values else None
 
-    def repeated(self, *names: str) -> str:
+    def repeated_name(self, *names: str) -> str:
         """Return the first of these headers that occurs more than once, or an empty text."""
         return next((name for name in names if len(self._by_name.get(name.lower(), ())) > 1), "")
 
@@ -314,7 +314,7 @@ class NotPermittedError(Exception):
 class Listener:
     """Base class for objects that are called with every response and every request without a response. Does nothing."""
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Handle a response."""
 
     def by_hand(self, exchange: Exchange) -> None:
@@ -323,5 +323,5 @@ class Listener:
     def acted_by_hand(self, *, deletes: bool) -> None:
         """Handle that bytes over a raw socket may have changed something, or deleted it."""
 
-    def unanswered(self, request: Unanswered) -> None:
+    def on_no_response(self, request: Unanswered) -> None:
         """Handle a request without a response."""

@@ -21,7 +21,7 @@ from click.globals import push_context
 from conformance.commandline.device_options import advice
 from conformance.transport.client import Connection
 from conformance.transport.codings import content_of
-from conformance.transport.connections import explained
+from conformance.transport.connections import explain
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Request, Response
 from conformance.transport.passage import Heard, Passage
@@ -81,7 +81,7 @@ class Fetcher:
         if isinstance(found, httpx.TooManyRedirects):
             raise ValueError(f"more than {_REDIRECTS} redirects") from found  # noqa: TRY004 - of what was fetched
         if isinstance(found, httpx.TransportError):
-            self._silent[server] = _worded(found, seconds)
+            self._silent[server] = _error_text(found, seconds)
             raise UnreachableError(f"{url}: {self._silent[server]}") from found
         raise found
 
@@ -109,9 +109,9 @@ class Fetcher:
                     self._record(began, [*response.history, response])
                     said = self._hint(url, response.status_code)
                     raise ValueError(f"the server responded {response.status_code}{said}")
-                octets = _decoded(response)
+                octets = _decode(response)
         except httpx.TransportError as error:
-            self._record(began, [], Request("GET", url), _worded(error, self._connection.timeout_s))
+            self._record(began, [], Request("GET", url), _error_text(error, self._connection.timeout_s))
             raise
         self._record(began, [*response.history, response], octets=octets)
         self._octets += len(octets)
@@ -189,7 +189,7 @@ class _Guard(httpx.BaseTransport):
             sent = httpx.Request(
                 request.method,
                 parts.copy_with(raw_path=target.encode("ascii")),
-                headers=credentials.added([*given, ("Connection", "close")], request.method, target),
+                headers=credentials.add_to([*given, ("Connection", "close")], request.method, target),
                 extensions=request.extensions,
             )
             inner = self._tls if parts.scheme == "https" else self._plain
@@ -210,7 +210,7 @@ class _Guard(httpx.BaseTransport):
         return httpx.HTTPTransport(verify=self._connection.tls(), trust_env=False)
 
 
-def _decoded(response: httpx.Response) -> bytes:
+def _decode(response: httpx.Response) -> bytes:
     """Return the content of a response without its coding.
 
     Raises:
@@ -228,12 +228,12 @@ def _decoded(response: httpx.Response) -> bytes:
     return content.octets
 
 
-def _worded(error: httpx.TransportError, seconds: float) -> str:
+def _error_text(error: httpx.TransportError, seconds: float) -> str:
     text = str(error) or type(error).__name__
     if isinstance(error, httpx.TimeoutException):
         return f"no response within {seconds:.3g} s"
     if isinstance(error, httpx.ConnectError):
-        return f"no connection: {explained(text)}{_unused_proxy()}"
+        return f"no connection: {explain(text)}{_unused_proxy()}"
     if isinstance(error, httpx.RemoteProtocolError) and "disconnected" not in text:
         return f"a response that is not HTTP: {text}"
     return f"the server closed the connection without a response: {text}{_maybe_tls(error)}"

@@ -99,11 +99,11 @@ class Hangs:
         is_over = self._waited_s > _MOST_WAITED_S
         return min(seconds, max(_HURRIED_S, _SLOWER * self._slowest_s)) if is_over else seconds
 
-    def answered(self, seconds: float) -> None:
+    def note_answer(self, seconds: float) -> None:
         """Record how long an answer took, s."""
         self._slowest_s = max(self._slowest_s, seconds)
 
-    def hung(self, endpoint: str, seconds: float) -> None:
+    def note_hang(self, endpoint: str, seconds: float) -> None:
         """Record that an endpoint did not answer within the whole deadline, s."""
         self._at[endpoint].append(time.monotonic())
         self._waited_s += seconds

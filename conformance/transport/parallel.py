@@ -152,9 +152,9 @@ def _tell(requests: Sequence[Addressed], attempts: Sequence[Attempt]) -> None:
     for (to, _), attempt in zip(requests, attempts, strict=True):
         for listener in to.connection.listeners:
             if isinstance(attempt, Exchange) and not is_busy(attempt):
-                listener.answered(attempt)
+                listener.on_response(attempt)
             elif not isinstance(attempt, Exchange) and attempt.kind not in {NoAnswer.CLOSED, NoAnswer.REFUSED}:
-                listener.unanswered(attempt)
+                listener.on_no_response(attempt)
     for attempt in attempts:
         if not isinstance(attempt, Exchange) and attempt.kind not in {NoAnswer.CLOSED, NoAnswer.REFUSED}:
             raise NoAnswerError(attempt)

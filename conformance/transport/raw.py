@@ -133,9 +133,9 @@ def talk(
         NoAnswerError: the connection cannot be opened, or the endpoint did not respond before.
         NotPermittedError: one of the requests in the bytes may not be sent in this run.
     """
-    endpoint = partial(client.connection.endpoint_of, shown(client, octets))
+    endpoint = partial(client.connection.endpoint_of, shown_request(client, octets))
     for tries in itertools.count(1):
-        came = _talked(client, octets, timeout_s, answers, cuts, pause_s)
+        came = _talk(client, octets, timeout_s, answers, cuts, pause_s)
         overload = client.connection.overload
         if not any(overload.waits(response, endpoint, tries) for response in _responses(octets, came)):
             return came
@@ -155,12 +155,12 @@ def _responses(octets: bytes, came: RawAnswer) -> Iterator[Response]:
             return
 
 
-def _talked(
+def _talk(
     client: HttpClient, octets: bytes, timeout_s: float | None, answers: int, cuts: Sequence[int], pause_s: float
 ) -> RawAnswer:
     within_s = (timeout_s or client.connection.timeout_s) + time_for(len(octets))
     deadline = time.monotonic() + within_s
-    request = shown(client, octets)
+    request = shown_request(client, octets)
     client.put_off(request)
     client.connection.take_slot(*((method, _url(client, target)) for method, target in requests_in(octets)))
     started, sent_s, first_s = time.perf_counter(), time.monotonic(), 0.0
@@ -182,7 +182,7 @@ def _talked(
     received = bytearray()
     closed = False
     with link:
-        sent_all, early = _sent(link, octets, deadline, cuts, pause_s)
+        sent_all, early = _send(link, octets, deadline, cuts, pause_s)
         while len(received) < _MOST:
             try:
                 _set_timeout(link, deadline)
@@ -210,7 +210,7 @@ def _talked(
     return RawAnswer(bytes(received), closed, sent_all, (time.perf_counter() - started) * 1000, early)
 
 
-def _sent(
+def _send(
     link: socket.socket, octets: bytes, deadline: float, cuts: Sequence[int], pause_s: float
 ) -> tuple[bool, bool]:
     """Send bytes with pauses; return whether all were sent, and whether bytes were received during a pause."""
@@ -244,7 +244,7 @@ def answers_in(octets: bytes, most: int) -> int:
     return most
 
 
-def shown(client: HttpClient, octets: bytes) -> Request:
+def shown_request(client: HttpClient, octets: bytes) -> Request:
     """Return the request as findings show it, without the credentials."""
     octets = client.connection.credentials.hidden_bytes(octets)
     line = octets.split(b"\r\n", 1)[0].decode("latin-1")
@@ -291,13 +291,13 @@ def parse(octets: bytes, method: str, *, closed: bool, elapsed_ms: float = 0.0) 
         FramingError: the response is incomplete or its framing is broken.
     """
     for _ in range(_MOST_INTERIM):
-        response, octets = _parsed(octets, method, closed=closed, elapsed_ms=elapsed_ms)
+        response, octets = _parse_first(octets, method, closed=closed, elapsed_ms=elapsed_ms)
         if response is not None:
             return response, octets
     raise FramingError(f"more than {_MOST_INTERIM} interim responses before a final one (RFC 9110 15.2)")
 
 
-def _parsed(octets: bytes, method: str, *, closed: bool, elapsed_ms: float) -> tuple[Response | None, bytes]:
+def _parse_first(octets: bytes, method: str, *, closed: bool, elapsed_ms: float) -> tuple[Response | None, bytes]:
     """Return the first response in a byte stream, None if it is interim, and the bytes after it; see parse()."""
     section, separator, _ = octets.partition(b"\r\n\r\n")
     if not separator:
@@ -352,7 +352,7 @@ def read_one(client: HttpClient, octets: bytes, came: RawAnswer, method: str) ->
         came: what talk() returned.
         method: method of the request.
     """
-    request = shown(client, octets)
+    request = shown_request(client, octets)
     if not came.octets:
         if came.closed:
             return Unanswered(request, _SILENCES[NoAnswer.CLOSED], NoAnswer.CLOSED), b""
@@ -410,7 +410,7 @@ class PartialRequest:
             head.append("Content-Type: application/json")
         head += [f"{name}: {value}" for name, value in headers]
         head.append("Transfer-Encoding: chunked" if promised is None and sent else f"Content-Length: {promised or 0}")
-        shown = credentials.hidden("\r\n".join(head))
+        shown = credentials.hide("\r\n".join(head))
         head += [f"{name}: {value}" for name, value in credentials.fields(method, target)]
         body = f"{len(sent):x}\r\n".encode() + sent + b"\r\n" if promised is None and sent else sent
         octets = "\r\n".join(head).encode() + b"\r\n\r\n" + body

@@ -181,7 +181,7 @@ def split(url: str) -> tuple[str, str]:
     return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}", f"{parts.path or '/'}{query}"
 
 
-def moved(url: str, old: str, new: str) -> str:
+def at_server(url: str, old: str, new: str) -> str:
     """Return a URL of the server ``old`` with another scheme and host: a device behind a front does not know its own.
 
     A URL of any other server is returned as it is.

@@ -76,7 +76,7 @@ class BridgeClient(HttpClient):
                 self._say(self._link, op="advertise", topic=topic, type=type_)
         self.connection.take_slot((method, self.url(path)))
         request, began = Request(method, self.url(path), (), body), time.monotonic()
-        status, came = self._done(self._link, path, body, within_s)
+        status, came = self._carry_out(self._link, path, body, within_s)
         ended = time.monotonic()
         if status is None:
             kind = NoAnswer.CLOSED if self._link.ended else NoAnswer.TIMEOUT
@@ -89,10 +89,10 @@ class BridgeClient(HttpClient):
         )
         exchange = Exchange(request, response)
         for listener in self.connection.listeners:
-            listener.answered(exchange)
+            listener.on_response(exchange)
         return exchange
 
-    def _done(self, link: Stream, path: str, body: bytes, within_s: float) -> tuple[HTTPStatus | None, bytes]:
+    def _carry_out(self, link: Stream, path: str, body: bytes, within_s: float) -> tuple[HTTPStatus | None, bytes]:
         """Carry an operation out; return a status, None without any response, and the message that came."""
         what, _, name = path.removeprefix("/").partition("/")
         if what in {"goal", "cancel"}:
@@ -101,13 +101,13 @@ class BridgeClient(HttpClient):
             if goal is None or what == "goal":
                 return (HTTPStatus.OK if goal else HTTPStatus.NOT_FOUND), json.dumps(goal).encode()
             self._say(link, op="cancel_action_goal", id=name, action=goal["action"])
-            return self._told(link, HTTPStatus.CONFLICT)
+            return self._take_status(link, HTTPStatus.CONFLICT)
         if what not in {"publish", "call", "act"}:
             # Each subscription opens a connection of its own; here only see whether the rosbridge responds.
-            return self._told(link, HTTPStatus.BAD_REQUEST, within_s)
+            return self._take_status(link, HTTPStatus.BAD_REQUEST, within_s)
         link.send(body.decode(errors="replace"))
         if what == "publish":
-            return self._told(link, HTTPStatus.BAD_REQUEST)
+            return self._take_status(link, HTTPStatus.BAD_REQUEST)
         said = json.loads(body)
         id_ = said["id"]
         if what == "act":
@@ -120,7 +120,7 @@ class BridgeClient(HttpClient):
         status = HTTPStatus.OK if last and last.get("op") == "service_response" else HTTPStatus.BAD_REQUEST
         return (status, last["_octets"]) if last else (None, b"")
 
-    def _told(self, link: Stream, refused: HTTPStatus, within_s: float = 0.0) -> tuple[HTTPStatus | None, bytes]:
+    def _take_status(self, link: Stream, refused: HTTPStatus, within_s: float = 0.0) -> tuple[HTTPStatus | None, bytes]:
         """Return `refused` and the status message if its level is "error"; otherwise 200, for the last message sent.
 
         With ``within_s``, silence gives None, because the outcome is not known. Without it, silence gives 200.
@@ -144,7 +144,7 @@ class BridgeClient(HttpClient):
         """Return messages until one of them ends the wait; record the states of goals in them."""
         until, found = time.monotonic() + within_s, list[dict[str, Any]]()
         while True:
-            for message in link.heard(1, max(0.0, until - time.monotonic())):
+            for message in link.take_new(1, max(0.0, until - time.monotonic())):
                 one = _object(message.octets)
                 found.append(one | {"_octets": message.octets})
                 goal = self._goals.get(str(one.get("id")), {})

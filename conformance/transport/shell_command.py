@@ -72,7 +72,7 @@ def shell_command(method: str, url: str, headers: Sequence[tuple[str, str]], bod
         words += ["-H", f"{name.title()}:"]
     pipe = ""
     if body:
-        pipe, data = _given(body)
+        pipe, data = _body_arguments(body)
         words += ["--data-binary", data]
     words.append(url + query)
     # The shell expands the variables of credentials.
@@ -102,7 +102,7 @@ def _curl_can(method: str, url: str, headers: Sequence[tuple[str, str]], body: b
     )
 
 
-def _given(body: bytes) -> tuple[str, str]:
+def _body_arguments(body: bytes) -> tuple[str, str]:
     """Return the command whose output is piped to curl, or an empty text, and the value of ``--data-binary``."""
     if _is_plain(body):
         text = body.decode()

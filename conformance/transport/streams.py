@@ -13,7 +13,7 @@ from importlib import import_module
 from socket import SHUT_RDWR, socket
 from typing import Any, Final, Literal, NamedTuple, cast
 
-from conformance.commandline.extras import told
+from conformance.commandline.extras import missing_extra
 from conformance.transport.client import HttpClient
 from conformance.transport.connections import open_link
 from conformance.transport.exchange import NoAnswer, NoAnswerError, NotPermittedError, Request, Response, Unanswered
@@ -69,9 +69,9 @@ class Stream:
         fields = [("Accept", _EVENTS)] if kind == "sse" else []
         fields += [("Last-Event-ID", after)] if after else []
         credentials = shared.credentials if shared.may_authorize(client.base_url) else type(shared.credentials)()
-        self.request = Request("GET", client.url(target), tuple(credentials.added(fields, shown=True)))
+        self.request = Request("GET", client.url(target), tuple(credentials.add_to(fields, shown=True)))
         path = client.prefix + credentials.target(target)
-        headers = dict(credentials.added(fields, "GET", path))
+        headers = dict(credentials.add_to(fields, "GET", path))
         self.last, self.last_id = cast("Message | None", None), ""
         self.ended, self._wanted = False, wanted
         self._came: deque[Message] = deque(maxlen=_KEPT)
@@ -96,7 +96,7 @@ class Stream:
         with suppress(Exception):
             self._send(text)
 
-    def heard(self, count: int = 0, within_s: float = 0.0) -> list[Message]:
+    def take_new(self, count: int = 0, within_s: float = 0.0) -> list[Message]:
         """Return messages since the last call; wait for ``count`` of them, or until no more can come."""
         with self._news:
             self._news.wait_for(lambda: len(self._came) >= count or self.ended, within_s)
@@ -167,7 +167,7 @@ def _messages(link: socket, url: str, headers: dict[str, str], timeout_s: float)
     try:
         library: Any = import_module("websockets.sync.client")
     except ModuleNotFoundError as error:
-        raise NotPermittedError(str(told(error.name, "a WebSocket"))) from error
+        raise NotPermittedError(str(missing_extra(error.name, "a WebSocket"))) from error
     try:
         opened = library.connect(
             f"ws://{url}", sock=link, additional_headers=headers, open_timeout=timeout_s, max_size=_LONGEST,

@@ -70,7 +70,7 @@ def load_baseline(
     """
     baseline = read_toml(path, _File, BaselineError).expected
     ids = set(known)
-    baseline = tuple(_renewed(entry, renamed) for entry in baseline)
+    baseline = tuple(_with_present_id(entry, renamed) for entry in baseline)
     for entry in baseline:
         if not entry.reason.strip():
             raise BaselineError(f"{path}: {entry.requirement} has no reason: write why its failure is accepted")
@@ -79,7 +79,7 @@ def load_baseline(
     return baseline
 
 
-def _renewed(entry: Expectation, renamed: Mapping[str, str]) -> Expectation:
+def _with_present_id(entry: Expectation, renamed: Mapping[str, str]) -> Expectation:
     """Return an entry with its requirement's present id."""
     new = renamed.get(entry.requirement)
     if new is None:
@@ -95,7 +95,7 @@ def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation],
     """
     expected = {entry.requirement: entry for entry in baseline}
     return [
-        _applied(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
+        _apply(verdict, expected[verdict.requirement.id], today) if verdict.requirement.id in expected else verdict
         for verdict in verdicts
     ]
 
@@ -132,7 +132,7 @@ def accepted_until(verdicts: Iterable[Verdict]) -> str:
     return min((verdict.expected_failure[1] for verdict in verdicts if verdict.expected_failure), default="")
 
 
-def _applied(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
+def _apply(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
     day = entry.expires.isoformat()
     # A requirement that another finding kept from being tested counts as failed by that finding.
     if verdict.value in {Value.FAIL, Value.WARN} or verdict.because is not None:

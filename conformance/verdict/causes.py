@@ -86,7 +86,7 @@ def by_cause(
         told = min(group, key=first)
         for finding in group:
             told_by[id(finding)].append(told)
-    kept = {id_: _kept(evidence[id_], told_by) for id_ in judged}
+    kept = {id_: _findings_kept(evidence[id_], told_by) for id_ in judged}
     waiting = {
         id_: [told for finding in evidence[id_].findings.values() for told in told_by[id(finding)]]
         + ([because] if (because := evidence[id_].because) else [])
@@ -128,7 +128,7 @@ def _groups(findings: Iterable[Finding]) -> list[list[Finding]]:
     ]
 
 
-def _kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
+def _findings_kept(evidence: Evidence, told_by: Mapping[int, list[Finding]]) -> dict[str, Finding]:
     """Return the findings that stay with a requirement, because no other finding has their cause."""
     return {
         key: finding

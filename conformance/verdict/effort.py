@@ -105,7 +105,7 @@ class Effort:
     minutes: float = DEEP_MINUTES
     speed: Speed = SPEEDS[0]
 
-    def seen(self, usual_ms: float, shortest_ms: float | None = None) -> Effort:
+    def slowed_to(self, usual_ms: float, shortest_ms: float | None = None) -> Effort:
         """Return the effort after an interface's response time was measured; it never increases.
 
         Args:
@@ -148,11 +148,11 @@ class Effort:
 
     def subsample(self, items: Sequence[_Item], count: int) -> list[_Item]:
         """Return all items for a fast robot, and ``count`` evenly spaced ones for a slow robot."""
-        return _spaced(items, count if self.slow else len(items))
+        return _evenly(items, count if self.slow else len(items))
 
     def alternatives(self, items: Sequence[_Item], count: int) -> list[_Item]:
         """Return values of one kind: as subsample(), and at quick effort every second one."""
-        return _spaced(items, count if self.slow else max(count, math.ceil(len(items) * _KEPT.get(self.name, 1.0))))
+        return _evenly(items, count if self.slow else max(count, math.ceil(len(items) * _KEPT.get(self.name, 1.0))))
 
     def draw(self, items: Sequence[_Item], standard: int, seed: str) -> list[_Item]:
         """Return ``cases(standard)`` of the items at random, in their order; the same ones for the same seed."""
@@ -177,7 +177,7 @@ class Effort:
         return [item for _, _, item in sorted(chosen, key=itemgetter(1))]
 
 
-def _spaced(items: Sequence[_Item], count: int) -> list[_Item]:
+def _evenly(items: Sequence[_Item], count: int) -> list[_Item]:
     if len(items) <= count:
         return list(items)
     return [items[index * len(items) // count] for index in range(count)]

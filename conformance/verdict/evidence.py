@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Final
 
 from conformance.contract.classes import CauseKind, Level
-from conformance.contract.ledger import Requirement, renamed, twins
+from conformance.contract.ledger import Requirement, ids_by_alias, twins
 from conformance.documents.openapi import is_json
 from conformance.documents.patterns import PatternError
 from conformance.transport.exchange import Attempt, Exchange, Listener, NoAnswer, Request, Unanswered
@@ -20,9 +20,9 @@ from conformance.verdict.finding import (
     Sent,
     Showing,
     causes_of,
+    few_of,
     kind_of,
     likeness,
-    listed,
     observed_in,
     subject_of,
 )
@@ -168,7 +168,7 @@ class Judge:
         self.concerned: Callable[[Request], Iterable[str]] = lambda _: ()
         self.judged: Callable[[str, Attempt | None], None] = lambda _requirement, _exchange: None
         self._ledger: Mapping[str, Requirement] = known if isinstance(known, Mapping) else {}
-        self._renamed, self._twins = renamed(self._ledger), twins(self._ledger)
+        self._renamed, self._twins = ids_by_alias(self._ledger), twins(self._ledger)
         # By kind of missing response: the requirement that forbids only that kind.
         self._on_silence = {one.forbids[0]: id_ for id_, one in self._ledger.items() if len(one.forbids) == 1}
         self._sent: deque[Sent] = deque(maxlen=MAX_SEQUENCE)
@@ -198,7 +198,7 @@ class Judge:
         self.check_name, self.at_risk, self.met = check_name, (), []
         self._sent.clear()
 
-    def sent(self, attempt: Attempt) -> None:
+    def note_sent(self, attempt: Attempt) -> None:
         """Record that the check sent a request, and its outcome."""
         self._sent.append(Sent(time.monotonic(), attempt.request))
         after = isinstance(self._newest, Exchange) and self._newest.response.status >= _REFUSED
@@ -267,11 +267,11 @@ class Judge:
             for occasion in self._occasions if exchange is self._newest else (occasion_of(exchange),):
                 evidence.occasions[occasion] += cases
         if not holds:
-            self.failed(requirement)
+            self.on_failure(requirement)
             subject = subject or subject_of(exchange, self.check_name)
             if not operations and exchange is not None:
                 operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
-            self._found(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
+            self._add_failure(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
             required, kind = self._ledger.get(requirement), kind_of(exchange, found)
             # A missing response breaks no SHOULD: it says only what should be in a response.
             if required and required.level is Level.MUST and kind in _SILENCES and kind not in required.forbids:
@@ -302,10 +302,10 @@ class Judge:
             operations=case.operations,
         )
 
-    def failed(self, requirement: str) -> None:
+    def on_failure(self, requirement: str) -> None:
         """Do nothing; a judge that wants to know at once of a failed case overrides it."""
 
-    def _found(
+    def _add_failure(
         self,
         evidence: Evidence,
         requirement: str,
@@ -403,7 +403,7 @@ class Judge:
     def faults(self) -> dict[str, list[str]]:
         """Return each suite error with what could not be judged because of it, and the requirements concerned."""
         found = self._faults.items()
-        return {f"{listed(list(met), _NAMED)}: not judged: {error}": sorted(ids) for error, (met, ids) in found}
+        return {f"{few_of(list(met), _NAMED)}: not judged: {error}": sorted(ids) for error, (met, ids) in found}
 
     def note(self, requirement: str, remark: str) -> None:
         """Add a remark that changes no verdict."""
@@ -413,7 +413,7 @@ class Judge:
         """Record what the device's state did not allow to test; if nothing else is judged, that is the verdict."""
         self._say(requirement, reason, lambda evidence: evidence.unseen)
 
-    def unclaimed(self, requirement: str, reason: str) -> None:
+    def note_unclaimed(self, requirement: str, reason: str) -> None:
         """Record why a requirement does not apply: no address was given for the interface that it needs."""
         evidence = self.of(requirement)
         if evidence is not None:
@@ -424,7 +424,7 @@ class Judge:
         if evidence is not None and text not in where(evidence):
             where(evidence).append(text)
 
-    def refuted(self) -> dict[str, int]:
+    def failure_counts(self) -> dict[str, int]:
         """Return the number of failures so far, by requirement."""
         return {id_: evidence.failures for id_, evidence in self.evidence.items() if evidence.findings}
 
@@ -448,7 +448,7 @@ class Judge:
             return 0
         return evidence.parts.get(requirement, 0) if requirement in self._renamed else evidence.cases
 
-    def stopped(self, requirement: str, reason: str) -> None:
+    def note_stopped(self, requirement: str, reason: str) -> None:
         """Record that a requirement was not tested because the run was aborted, and why."""
         evidence = self.of(requirement)
         if evidence is None:
@@ -508,11 +508,11 @@ class CheckerListener(Listener):
         self._judge, self._by_rule = judge, by_rule
         self._checkers = tuple(checkers)
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Judge an exchange."""
         self._check(exchange)
 
-    def unanswered(self, request: Unanswered) -> None:
+    def on_no_response(self, request: Unanswered) -> None:
         """Judge a request without a response."""
         self._check(request)
 

@@ -72,7 +72,7 @@ class Explorer:
         silence: list[NoAnswerError | TimeIsOverError] = []
         refuted: list[bool] = []
 
-        def bounded(value: Any) -> None:
+        def judge_in_time(value: Any) -> None:
             if silence:
                 return
             if time.monotonic() > until:
@@ -88,7 +88,7 @@ class Explorer:
                 refuted.append(True)
                 raise
 
-        prop = seed(self._next_seed())(self._settings(cases)(given(strategy)(bounded)))
+        prop = seed(self._next_seed())(self._settings(cases)(given(strategy)(judge_in_time)))
         _swallow_refuted(prop)
         if silence:
             raise silence[0]

@@ -126,17 +126,17 @@ class Finding:
     def text(self) -> str:
         """Return the finding as text: request, expected, actual, and how often."""
         rule = ", ".join(filter(None, (self.requirement, self.source)))
-        did = f"Sent {_described(self.exchange.request)}." if self.exchange else f"Tested {self.subject}."
+        did = f"Sent {_request_text(self.exchange.request)}." if self.exchange else f"Tested {self.subject}."
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
         others = [f"`{showing.operation}`" for showing in list(self.operations.values())[1:]]
         if others:
-            parts.append(f"The same for {counted(len(others), 'other operation')}: {listed(others)}.")
+            parts.append(f"The same for {count_of(len(others), 'other operation')}: {few_of(others)}.")
         if self.rest:
             parts.append("It stands for all further causes: the requirement has too many findings.")
         if self.again is not None:
-            parts.append(_repeated(self.again))
+            parts.append(_repetition_text(self.again))
         return " ".join(parts)
 
     @property
@@ -145,12 +145,12 @@ class Finding:
         return f"{self.subject}: {_clause(self.observed.split('. ', 1)[0])}"
 
 
-def counted(number: int, what: str) -> str:
+def count_of(number: int, what: str) -> str:
     """Return a number with its noun: "1 more operation", "9 more operations"."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def listed(names: Sequence[str], most: int = _NAMED) -> str:
+def few_of(names: Sequence[str], most: int = _NAMED) -> str:
     """Return the first names, and how many more there are: "GET /a, GET /b and 37 more"."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
@@ -235,7 +235,7 @@ def observed_in(exchange: Attempt | None, found: str) -> str:
     return said if rest.startswith((" with ", " as ")) else f"{came}{rest}"
 
 
-def _repeated(again: Again) -> str:
+def _repetition_text(again: Again) -> str:
     """Return a sentence on the repetitions of the request alone."""
     if again.came_back == again.sent:
         return f"Repeated {again.sent} times: {'failed' if again.judged else 'the same kind of response'} each time."
@@ -247,10 +247,10 @@ def _repeated(again: Again) -> str:
     )
 
 
-def _described(request: Request) -> str:
+def _request_text(request: Request) -> str:
     """Return a short description of a request: first line, unusual headers, body."""
     if request.raw is not None:
-        return f"the bytes {_quoted(request.raw)}"
+        return f"the bytes {_quote(request.raw)}"
     what = f"`{request.method} {_cut(request.target, _SHOWN_TARGET)}`"
     fields = [
         f"`{name}: {_cut(value, _SHOWN_FIELD)}`"
@@ -260,11 +260,11 @@ def _described(request: Request) -> str:
     if fields:
         what += f" with {', '.join(fields)}"
     if request.body:
-        what += f"{' and' if fields else ' with'} the body {_quoted(request.body)}"
+        what += f"{' and' if fields else ' with'} the body {_quote(request.body)}"
     return what
 
 
-def _quoted(octets: bytes) -> str:
+def _quote(octets: bytes) -> str:
     text = octets[:_SHOWN_BODY].decode("utf-8", "backslashreplace")
     shown = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in text)
     more = f" ({len(octets):,} bytes in all)" if len(octets) > _SHOWN_BODY else ""

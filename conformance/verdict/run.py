@@ -134,7 +134,7 @@ class Run:
         self.judge = Judge(self.contract.ledger)
 
     @property
-    def mapped(self) -> tuple[str, ...]:
+    def mapped_calls(self) -> tuple[str, ...]:
         """The operations that maps in the statement name, of those that may be called in this run."""
         said = self.statement
         maps = (said.motion_map, said.state_map) if self.allow_motion else ()
@@ -153,7 +153,7 @@ class Run:
         return self.wait_s or self.stop_s
 
     @property
-    def scored(self) -> frozenset[str] | None:
+    def scored_ids(self) -> frozenset[str] | None:
         """Return the requirements that count: those of the frozen set, some by an alias; None: all."""
         if self.requirement_set is None:
             return None
@@ -191,7 +191,7 @@ class Run:
         return self.share >= _FEWEST_SHARE and not self.limit.uncalled
 
     @property
-    def decided(self) -> bool:
+    def is_decided(self) -> bool:
         """Whether the robot can be conformant: enough was tried, nothing in the suite broke, and it was stopped."""
         return self.enough and not self.judge.faults and not self.stop_undelivered
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from conformance.transport.exchange import NotPermittedError
-from conformance.verdict.finding import counted, listed
+from conformance.verdict.finding import count_of, few_of
 
 
 class TimeIsOverError(NotPermittedError):
@@ -44,7 +44,7 @@ class TimeLimit:
         self._lifted = True
 
     @property
-    def bounded(self) -> bool:
+    def has_limit(self) -> bool:
         """Whether the run has a limit."""
         return self.minutes is not None
 
@@ -81,10 +81,10 @@ class TimeLimit:
             share: 0 to 1.
             behind: operations that begin a turn later.
         """
-        if not self.bounded:
+        if not self.has_limit:
             for step in steps.values():
                 deque(step, maxlen=0)
-        waiting, is_first = dict(steps) if self.bounded else {}, True
+        waiting, is_first = dict(steps) if self.has_limit else {}, True
         while waiting:
             for label, step in list(waiting.items()):
                 if is_first and label in behind:
@@ -105,7 +105,7 @@ class TimeLimit:
         return True
 
     @contextmanager
-    def lifted(self, *, when: bool = True) -> Iterator[None]:
+    def lift(self, *, when: bool = True) -> Iterator[None]:
         """Allow requests inside: a movement that was begun is ended, and a lost device is waited for."""
         before, self._lifted = self._lifted, self._lifted or when
         try:
@@ -127,9 +127,11 @@ class TimeLimit:
         """
         uncalled, shortened = self.uncalled, self.fewer
         said = [
-            f"{len(uncalled)} of {counted(operations, 'operation')} not called: {listed(uncalled)}" if uncalled else "",
-            f"{counted(len(shortened), 'operation')} got fewer requests: {listed(shortened)}" if shortened else "",
-            f"{counted(len(unjudged), 'requirement')} not judged: {listed(unjudged)}" if unjudged else "",
+            f"{len(uncalled)} of {count_of(operations, 'operation')} not called: {few_of(uncalled)}"
+            if uncalled
+            else "",
+            f"{count_of(len(shortened), 'operation')} got fewer requests: {few_of(shortened)}" if shortened else "",
+            f"{count_of(len(unjudged), 'requirement')} not judged: {few_of(unjudged)}" if unjudged else "",
         ]
         said = list(filter(None, said)) or ["some requests were not sent"]
         return f"--minutes {self.minutes or 0:g}: {'; '.join(said)}"

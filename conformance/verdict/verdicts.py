@@ -13,7 +13,7 @@ from conformance.contract.classes import Level, Prerequisite
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
 from conformance.verdict.evidence import Evidence
-from conformance.verdict.finding import Finding, counted
+from conformance.verdict.finding import Finding, count_of
 from conformance.verdict.run import Run
 
 # Why optional behaviour that a robot did not show has no verdict.
@@ -132,12 +132,12 @@ def verdict_of(
 def score(verdicts: Iterable[Verdict], requirements: Container[str], name: str) -> list[Verdict]:
     """Mark requirements outside a frozen set as not counting: their failures become warnings."""
     return [
-        verdict if verdict.requirement.id in requirements else _unscored(verdict, f"newer than {name}, and not scored")
+        verdict if verdict.requirement.id in requirements else _unscore(verdict, f"newer than {name}, and not scored")
         for verdict in verdicts
     ]
 
 
-def _unscored(verdict: Verdict, told: str) -> Verdict:
+def _unscore(verdict: Verdict, told: str) -> Verdict:
     value = {Value.FAIL: Value.WARN, Value.ERROR: Value.SKIP}.get(verdict.value, verdict.value)
     return replace(verdict, value=value, reason=": ".join(filter(None, (told, verdict.reason))), scored=False)
 
@@ -163,7 +163,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
         return ClassValue.NOT_CLAIMED, ""
     failed = [item for item in verdicts if item.value is Value.FAIL]
     if failed:
-        told = f"{len(failed)} of {counted(len(verdicts), 'requirement')} failed, first {failed[0].requirement.id}"
+        told = f"{len(failed)} of {count_of(len(verdicts), 'requirement')} failed, first {failed[0].requirement.id}"
         return ClassValue.FAIL, told
     unjudged = [
         item
@@ -172,7 +172,7 @@ def _class_verdict(verdicts: list[Verdict], claimed: bool) -> tuple[ClassValue, 
     ]
     if unjudged:
         first = unjudged[0]
-        all_ = counted(len(verdicts), "requirement")
+        all_ = count_of(len(verdicts), "requirement")
         told = f"{len(unjudged)} of {all_} could not be judged, first {first.requirement.id}"
         return ClassValue.INCONCLUSIVE, f"{told}: {first.reason}"
     if not any(item.evidence.cases for item in verdicts):
@@ -246,7 +246,7 @@ _OF_DESCRIPTION = {
 }
 
 
-def claimed(contract: Contract, claims: Collection[str]) -> str:
+def claims_text(contract: Contract, claims: Collection[str]) -> str:
     """Return the claimed classes in words: a profile's name, or the classes' names and "only"."""
     profile = next((name for name, classes in contract.profiles.items() if set(classes) == set(claims)), "")
     return profile or f"{', '.join(claims) or 'nothing'} only"
@@ -271,5 +271,5 @@ def verdict_line(run: Run, value: Overall, verdicts: Iterable[Verdict]) -> str:
         said = f"{said}, as far as --minutes {run.limit.minutes:g} allowed" if run.limit.is_struck else said
         return f"{said}, {run.less}" if run.less else said
     contract = f" (contract {run.contract.label})" if run.contract.label else ""
-    said = f"{_WORDS[value]} {claimed(run.contract, run.claims)}{contract}, {view_of(verdicts)}"
+    said = f"{_WORDS[value]} {claims_text(run.contract, run.claims)}{contract}, {view_of(verdicts)}"
     return f"{said}, {run.less}" if run.less else said

@@ -4,7 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from conformance.cli.explanation import EFFORTS, NEEDS, Explanation, explained, known, page_of
+from conformance.cli.explanation import EFFORTS, NEEDS, Explanation, explanation_of, ledger_of, page_of
 from conformance.contract.classes import QUESTIONS, ConformanceClass, Origin
 from conformance.contract.generic import generic_classes
 from conformance.contract.ledger import Requirement
@@ -56,9 +56,9 @@ _ORIGINS = {
 def pages() -> dict[str, str]:
     """Return the text of each page by its name in the source folder."""
     contract = Contract.load()
-    ledger, mutants = known(contract), self_test_of(contract).mutants
+    ledger, mutants = ledger_of(contract), self_test_of(contract).mutants
     classes = {**generic_classes(), **contract.classes}
-    found = {id_: explained(contract, item, mutants) for id_, item in ledger.items()}
+    found = {id_: explanation_of(contract, item, mutants) for id_, item in ledger.items()}
     by_class: dict[str, list[Requirement]] = defaultdict(list)
     for item in ledger.values():
         by_class[item.class_].append(item)

@@ -70,19 +70,19 @@ def require_good(status: int, location: str | None, body: bytes, expects: bytes 
 
 def _error(status: int, location: str | None, body: bytes, expects: bytes) -> CallError:
     if _OK <= status < _MULTIPLE_CHOICES:
-        return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {shown(body)}")
+        return CallError("content", f"status {status}, but the body lacks {expects.decode()!r}: {clip(body)}")
     if HTTPStatus.MULTIPLE_CHOICES <= status < HTTPStatus.BAD_REQUEST:  # RFC 9110 section 15.4: redirection
         return CallError("redirect", f"status {status} to {location!r}: use that address as the endpoint")
     refused = status if status in _REFUSALS else 0
     if _FAULT.search(body):
         return _fault(status, body, refused)
     hint = " (does it need a --token-file?)" if refused else ""
-    return CallError("status", f"status {status}{hint}: {shown(body)}", refused)
+    return CallError("status", f"status {status}{hint}: {clip(body)}", refused)
 
 
 def _fault(status: int, body: bytes, refused: int = 0) -> CallError:
     found = _FAULT_STRING.search(body)
-    reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else shown(body)
+    reason = found.group(1).decode("utf-8", "replace")[:_SHOWN] if found else clip(body)
     return CallError("fault", f"status {status}, SOAP fault: {reason}", refused)
 
 
@@ -118,7 +118,7 @@ class Reply:
             raise _fault(status, body)
         if self.element:
             raise CallError(
-                "content", f"status {status}, but the Body does not begin with {self.element}: {shown(body)}"
+                "content", f"status {status}, but the Body does not begin with {self.element}: {clip(body)}"
             )
 
 
@@ -143,7 +143,7 @@ class Declared:
             return  # a form that was valid once need not be parsed again: this runs for every request
         media_types = next((types for one, types in self.responses if one == status), None)
         if media_types is None:
-            raise self._undeclared(status, location, body)
+            raise self._status_error(status, location, body)
         name = (content_type or b"").decode("latin-1").partition(";")[0].strip().lower()
         if body and media_types and not any(fnmatchcase(name, text) for text in media_types):
             raise CallError(
@@ -152,14 +152,14 @@ class Declared:
         if body:
             self._seen.add((status, content_type))
 
-    def _undeclared(self, status: int, location: str | None, body: bytes) -> CallError:
+    def _status_error(self, status: int, location: str | None, body: bytes) -> CallError:
         if not _OK <= status < _MULTIPLE_CHOICES:
             return _error(status, location, body, b"")
         named = ", ".join(str(one) for one, _ in self.responses)
-        return CallError("status", f"status {status}, declared is {named}: {shown(body)}")
+        return CallError("status", f"status {status}, declared is {named}: {clip(body)}")
 
 
-def shown(body: bytes) -> str:
+def clip(body: bytes) -> str:
     """Return the beginning of a body, for a message."""
     text = body[:_SHOWN].decode("utf-8", "replace")
     return (text + " …" if len(body) > _SHOWN else text) or "(no body)"

@@ -52,7 +52,7 @@ class Described:
             number: how many.
         """
         good = Declared(self.responses) if self.interface == "rest" else Reply(self.reply)
-        made = [Request(credentials.revealed(each), good) for each in self.octets]
+        made = [Request(credentials.reveal(each), good) for each in self.octets]
         return [made[place % len(made)] for place in range(number)]
 
 
@@ -145,7 +145,7 @@ class Robot:
         return next((each.base_url for each in self.described if each.interface == "soap"), None)
 
     @property
-    def shown(self) -> dict[str, str | None]:
+    def addresses_by_name(self) -> dict[str, str | None]:
         """Return the addresses of its web services by name, as results show them."""
         papers = {"rest": self.rest, "publishers": self.publishers, "subscribers": self.subscribers}
         return papers | ({"soap": self.soap} if self.soap else {})
@@ -153,7 +153,7 @@ class Robot:
     @property
     def addresses(self) -> list[str]:
         """Return the addresses of its web services."""
-        return [each for each in self.shown.values() if each]
+        return [each for each in self.addresses_by_name.values() if each]
 
     @cached_property
     def tls(self) -> Any:
@@ -180,13 +180,13 @@ class Robot:
         """Return the credentials that are the same in each request."""
         return Credentials(tuple(item for item in self.credentials if item.kind is not Kind.DIGEST))
 
-    def _described(self, interface: str, operation: str) -> Described | None:
+    def _find_described(self, interface: str, operation: str) -> Described | None:
         return next((each for each in self.described if (each.interface, each.name) == (interface, operation)), None)
 
     def method(self, operation: str) -> str:
         """Return an operation's HTTP method over REST; POST if it is only offered over SOAP."""
         if self.described:
-            found = self._described("rest", operation)
+            found = self._find_described("rest", operation)
             return found.method if found else "POST"
         return CATALOGUE[operation].method
 
@@ -197,7 +197,7 @@ class Robot:
     def address(self, interface: str, operation: str) -> str | None:
         """Return the address of an operation over an interface; None if the interface lacks the operation."""
         if self.described:
-            found = self._described(interface, operation)
+            found = self._find_described(interface, operation)
             return found.base_url if found else None
         if interface == "rest":
             return self.rest
@@ -231,7 +231,7 @@ class Robot:
         address = self.address(interface, operation)
         if address is None:
             return []
-        described = self._described(interface, operation)
+        described = self._find_described(interface, operation)
         if described is not None:
             return described.requests(self.fixed, VARIANTS)
         if interface == "rosbridge":  # values of its own: one interface must not take another's delivery for its echo
@@ -264,7 +264,7 @@ def with_secrets(robot: Robot, secrets: Secrets | None) -> Robot:
     if user is not None and secrets is not None and secrets.username_token is not None:
         user = replace(user, password=secrets.username_token.password)  # the device's clock is known from the master
         found = replace(found, username_token=user)
-    revealed = Credentials(found.credentials).revealed
+    revealed = Credentials(found.credentials).reveal
     lacks_user = user is not None and not user.password
     if lacks_user or any(VARIABLE in revealed(octets) for each in found.described for octets in each.octets):
         raise ValueError("the requests need credentials that this worker lacks: start it with the master's options")

@@ -29,7 +29,7 @@ from websockets.uri import parse_uri
 
 from conformance.papers_robot.delivery import MESSAGE_FIELDS
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, connect_error, shown
+from loadtests.clients.failures import CallError, clip, connect_error
 from loadtests.clients.wire import Answer, Request, now_ns
 
 ODOMETRY_TOPIC = "/odom"
@@ -209,7 +209,7 @@ class Bridge:
                     elif protocol.handshake_exc is None:
                         opened.set(True)
                 if protocol.handshake_exc is not None:
-                    failure = _refused(protocol.handshake_exc, self.url)
+                    failure = _handshake_error(protocol.handshake_exc, self.url)
                     break
                 self._flush()  # answers to pings
         except (OSError, CallError) as error:
@@ -230,23 +230,23 @@ class Bridge:
             message = msgspec.json.decode(octets)
             kind, topic = message["op"], message.get("topic")
         except (msgspec.DecodeError, TypeError, KeyError, AttributeError, RecursionError):
-            self._fail(CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}"))
+            self._fail(CallError("malformed", f"not a message of the rosbridge protocol: {clip(octets)}"))
             return
         answer = Answer(_STATUS_OK, {}, octets, received, len(octets))
         if kind == "publish" and topic == self._delivery_topic:
-            self._echoed(message.get("msg"), answer)
+            self._take_echo(message.get("msg"), answer)
         elif kind == "publish" and topic == ODOMETRY_TOPIC:
             for waiter in list(self._reads.values()):
                 waiter.set(answer)
         elif kind == "status" and message.get("level") == "error":
-            self._fail(CallError("fault", f"rosbridge: {shown(str(message.get('msg')).encode())}"))
+            self._fail(CallError("fault", f"rosbridge: {clip(str(message.get('msg')).encode())}"))
 
-    def _echoed(self, values: Any, answer: Answer) -> None:
+    def _take_echo(self, values: Any, answer: Answer) -> None:
         """Give a delivery that came back to the request with the same values; ignore other publishers' deliveries."""
         try:
             key = tuple(float(values[name]) for name in MESSAGE_FIELDS)
         except (KeyError, TypeError, ValueError):
-            self._fail(CallError("content", f"not a delivery on {self._delivery_topic}: {shown(answer.body)}"))
+            self._fail(CallError("content", f"not a delivery on {self._delivery_topic}: {clip(answer.body)}"))
             return
         waiting = self._echoes.get(key)
         if waiting:
@@ -285,7 +285,7 @@ def bridge_endpoint(url: str) -> Endpoint:
     return Endpoint.parse(url, {"ws": 80, "wss": 443})
 
 
-def _refused(error: Exception, where: str) -> CallError:
+def _handshake_error(error: Exception, where: str) -> CallError:
     if isinstance(error, InvalidHandshake):
         return CallError("status", f"{where} does not speak WebSocket: {error}")
     return CallError("malformed", f"{where}: {error}")

@@ -70,9 +70,9 @@ class Routes:
             others = sorted(route.operation.method for route in self._routes if route.path.fullmatch(path))
             hint = f"the path has {', '.join(others)}" if others else "no path of it matches"
             raise ScenarioError(f"{method} {path} is not in the description: {hint}")
-        return _allowed(found)
+        return _check_allowed(found)
 
-    def named(self, name: str) -> Route:
+    def find(self, name: str) -> Route:
         """Return the operation with this method and path template.
 
         Raises:
@@ -81,7 +81,7 @@ class Routes:
         found = next((route for route in self._routes if route.operation.name == name), None)
         if found is None:
             raise ScenarioError(f"the description has no operation {name!r}: name it as in 'GET /items/{{id}}'")
-        return _allowed(found)
+        return _check_allowed(found)
 
 
 def _pattern(operation: Described) -> re.Pattern[str]:
@@ -89,7 +89,7 @@ def _pattern(operation: Described) -> re.Pattern[str]:
     return re.compile(_PARAMETER.sub("[^/]+", re.escape(template)))
 
 
-def _allowed(route: Route) -> Route:
+def _check_allowed(route: Route) -> Route:
     if route.operation.refused:
         raise ScenarioError(f"{route.operation.name} is not called: {route.operation.refused}")
     return route
@@ -256,7 +256,7 @@ class Client:
             values: of the path's parameters.
             how: the further arguments of `request`.
         """
-        route, given = self._routes.named(operation), values or {}
+        route, given = self._routes.find(operation), values or {}
         method, _, template = route.operation.name.partition(" ")
         missing = [name for name in _NAMED.findall(template) if name not in given]
         if missing:
@@ -314,7 +314,7 @@ class Client:
             record.busy -= 1
         if connection.connects != connects:
             record.count("connects")
-        error = _judged(answer, route.good)
+        error = _fault_of(answer, route.good)
         moments = (start, start, built, answer.received_ns, now_ns())
         sent = _Sent(record, segment, route.number, moments, server_ns(answer.headers.get(b"server-timing")))
         if catch_response:
@@ -331,7 +331,7 @@ class Client:
         if wrong := next(filter(_BREAK.search, lines), None):
             raise ScenarioError(f"the header {wrong!r} contains a line break")
         head = [f"{method} {self._credentials.target(target, shown=True)} HTTP/1.1", *lines, "", ""]
-        return self._robot.fixed.revealed("\r\n".join(head).encode()) + body
+        return self._robot.fixed.reveal("\r\n".join(head).encode()) + body
 
     def close(self) -> None:
         """Close the connection."""
@@ -350,7 +350,7 @@ def _fields(value: Any, headers: Mapping[str, str] | None) -> dict[str, str]:
     return {name: text for name, text in fields.items() if name.lower() not in given} | dict(headers or {})
 
 
-def _judged(answer: Answer, good: Declared) -> CallError | None:
+def _fault_of(answer: Answer, good: Declared) -> CallError | None:
     try:
         answer.require_good(good)
     except CallError as error:

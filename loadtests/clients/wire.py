@@ -123,7 +123,7 @@ class Connection:
         """
         deadline = gevent.Timeout.start_new(self.timeout_s)
         try:
-            octets = request.octets if self.user is None else self.user.revealed(request.octets)
+            octets = request.octets if self.user is None else self.user.reveal(request.octets)
             return self._call(octets) if self.digest is None else self._answering(octets, self.digest)
         except gevent.Timeout as timer:
             connected = self._socket is not None
@@ -141,10 +141,10 @@ class Connection:
 
     def _answering(self, octets: bytes, digest: Credentials) -> Answer:
         """Send a request with an answer to the robot's challenge, and again if it has a new challenge."""
-        answer = self._call(digest.revealed(octets))
+        answer = self._call(digest.reveal(octets))
         challenge = answer.headers.get(b"www-authenticate", b"").decode("latin-1")
         if answer.status == _CHALLENGE and digest.learn([("www-authenticate", challenge)]):
-            return self._call(digest.revealed(octets))
+            return self._call(digest.reveal(octets))
         return answer
 
     def _call(self, octets: bytes) -> Answer:
@@ -243,7 +243,7 @@ class Connection:
             if self._waiter is None:
                 return CallError("closed", "the robot closed an idle connection, or sent bytes without a request")
             if not data:
-                return self._ended()
+                return self._end()
             self._octets += len(data)
             if self._octets > _MAX_ANSWER:
                 return CallError("malformed", f"the response is longer than {_MAX_ANSWER} bytes")
@@ -253,7 +253,7 @@ class Connection:
             if self._complete or self.endpoint.scheme == "http":  # TLS may hold more than the socket shows
                 return None
 
-    def _ended(self) -> CallError | None:
+    def _end(self) -> CallError | None:
         """Handle the robot's close: a response without a length ends here (RFC 9112 section 6.3), any other is cut."""
         if self._octets and self._headers and not self._framed and not self._complete:
             self._complete = True

@@ -8,7 +8,7 @@ from typing import Any
 from conformance.documents.wsdl import WsdlError, describe, name, unread
 from conformance.transport.client import Connection
 from conformance.transport.fetching import Fetcher
-from conformance.transport.reach import Folder, Trust, UnreachableError, is_same, moved, server_of
+from conformance.transport.reach import Folder, Trust, UnreachableError, at_server, is_same, server_of
 from loadtests.clients.endpoint import Endpoint, EndpointError
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CATALOGUE, NAMESPACE
@@ -61,10 +61,10 @@ def address_in(content: bytes, location: str, element: str) -> str:
     Raises:
         WsdlError: not XML, not a WSDL, another service's WSDL, or no address in it.
     """
-    return _followed(_declared(content, location, element), location, Trust.of(location))
+    return _usable_address(_wsdl_address(content, location, element), location, Trust.of(location))
 
 
-def _declared(content: bytes, location: str, element: str) -> str:
+def _wsdl_address(content: bytes, location: str, element: str) -> str:
     """Return the address that a WSDL names, whatever its server.
 
     Raises:
@@ -103,9 +103,9 @@ def _with_addresses(robot: Robot, remarks: list[str]) -> Robot:
         location = robot.wsdl(call)
         if location is None or robot.address("soap", call) is not None or operation.service in found:
             continue
-        declared = _declared(fetch(location, robot), location, operation.element)
+        declared = _wsdl_address(fetch(location, robot), location, operation.element)
         trust = trust_of(robot)
-        found[operation.service] = used = _followed(declared, location, trust)
+        found[operation.service] = used = _usable_address(declared, location, trust)
         if not is_same(used, declared):
             remarks.append(
                 f"the WSDL names the address {declared}, on another server: {used} was measured, on the WSDL's own "
@@ -119,8 +119,8 @@ def _with_addresses(robot: Robot, remarks: list[str]) -> Robot:
     return replace(robot, **found)
 
 
-def _followed(declared: str, location: str, trust: Trust) -> str:
+def _usable_address(declared: str, location: str, trust: Trust) -> str:
     """Return the address to use: a WSDL from a server may name another server only if that is trusted."""
     if trust.trusts(declared):
         return trust.place(declared)
-    return moved(declared, declared, server_of(trust.place(location))) if "://" in location else declared
+    return at_server(declared, declared, server_of(trust.place(location))) if "://" in location else declared

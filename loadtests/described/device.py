@@ -76,7 +76,7 @@ class Named:
     wsdl: str | None = None
 
     @property
-    def shown(self) -> str:
+    def sources(self) -> str:
         """Return the descriptions as the result names them: URLs, or names of files."""
         sources = filter(None, (self.source, self.wsdl))
         return " and ".join(source if is_url(source) else Path(source).name for source in sources)
@@ -145,14 +145,14 @@ class Device:
                 wanted = DeviceOptions.of(options, out=Path(folder))
                 statement, contract, remarks = what_is_judged(named.source, named.statement, wanted)
                 run = Run(statement=statement, contract=contract, allow_motion=bool(options["allow_motion"]))
-                return cls._opened(run, connection_of(statement.endpoints), remarks)
+                return cls._open(run, connection_of(statement.endpoints), remarks)
         except (StatementError, ContractError, DescriptionError, NotPossibleError, OSError) as error:
             raise SettingsError(str(error)) from None
         except (UnreachableError, NoAnswerError) as error:
             raise CallError("refused", str(error)) from None
 
     @classmethod
-    def _opened(cls, run: Run, connection: Connection, remarks: tuple[str, ...]) -> Self:
+    def _open(cls, run: Run, connection: Connection, remarks: tuple[str, ...]) -> Self:
         """Return a device while its contract's folder exists."""
         # xmlschema and lxml take a third of a second, which the paper's robot need not pay.
         from conformance.scenarios.described_messages import DescribedMessages  # noqa: PLC0415
@@ -183,7 +183,7 @@ class Device:
                 contract, where, remarks = soap_contract(wsdl, None, where, connection, Path(folder), schemas=schemas)
                 statement = msgspec.structs.replace(said, endpoints=where, motion_map=None)
                 run = Run(statement=statement, contract=contract, allow_motion=self.api.run.allow_motion)
-                return self._opened(run, connection, remarks)
+                return self._open(run, connection, remarks)
         except (ContractError, DescriptionError, NotPossibleError, OSError) as error:
             raise SettingsError(str(error)) from None
         except (UnreachableError, NoAnswerError) as error:

@@ -42,7 +42,7 @@ class Chosen:
     notes: tuple[str, ...]
 
 
-def chosen(device: Device, named: Iterable[str]) -> Chosen:
+def choose(device: Device, named: Iterable[str]) -> Chosen:
     """Return the operations that the options name, or else the statement's [load], or else its [slo].
 
     Args:
@@ -61,9 +61,9 @@ def chosen(device: Device, named: Iterable[str]) -> Chosen:
     weights: dict[Operation, int] = {}
     notes = []
     for name, weight in wanted.items():
-        meant = _meant(device.half(name), known)
+        meant = _operations_meant(device.half(name), known)
         for operation in meant:
-            why = refused(device, operation)
+            why = refusal_of(device, operation)
             if why and meant == [operation] and is_literal(device.half(name), operation):
                 raise SettingsError(f"{device.name_of(operation)} is not called: {why}")
             if why:
@@ -83,7 +83,7 @@ def named_alike(name: str, device: Device) -> str:
     Raises:
         SettingsError: it means none, or several.
     """
-    found = _meant(device.half(name), operations_of(device.contract))
+    found = _operations_meant(device.half(name), operations_of(device.contract))
     if len(found) > 1:
         raise SettingsError(f"[slo] {name!r} means {len(found)} operations: name one, as in 'GET /state'")
     return device.name_of(found[0])
@@ -114,7 +114,7 @@ def _by_rates(levels: Mapping[str, ServiceLevel]) -> dict[str, int]:
     return {name: min(1000, round((rate or 1.0) / min(known))) for name, rate in rates.items()}
 
 
-def _meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
+def _operations_meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
     """Return the operations that a name means.
 
     Raises:
@@ -130,7 +130,7 @@ def _meant(name: str, known: tuple[Operation, ...]) -> list[Operation]:
     raise SettingsError(f"the description has no operation {name!r}: {hint}")
 
 
-def refused(device: Device, operation: Operation) -> str:
+def refusal_of(device: Device, operation: Operation) -> str:
     """Return why an operation is not measured; empty if it is."""
     reason = device.api.call_rules.decide(operation)
     if not reason.may:
@@ -170,7 +170,7 @@ def callable_robot(device: Device) -> tuple[list[Operation], Robot]:
     """
     base, known = device.api.client.base_url, operations_of(device.contract)
     found = tuple(
-        Described(each.label, each.method, base, (), declared_good(each), refused=refused(device, each))
+        Described(each.label, each.method, base, (), declared_good(each), refused=refusal_of(device, each))
         for each in known
     )
     allowed = [each for each, told in zip(known, found, strict=True) if not told.refused]

@@ -125,13 +125,13 @@ def _round(mapped: MappedDevice, motion: MotionMap, stops: Stops) -> None:
     with _others(mapped, stops):
         command, before = mapped.drive(speeds), list[Reading]()
         until = command.answered + lasts_s
-        while command.accepted and mapped.clock.now() < until and not mapped.room.is_over([speeds], before, rests_s):
+        while command.is_ok and mapped.clock.now() < until and not mapped.room.is_over([speeds], before, rests_s):
             before.append(mapped.read())
             command = mapped.drive(speeds) if drives.hold_s else command
-        if not command.accepted:
+        if not command.is_ok:
             raise NotPossibleError(f"a velocity was answered {command.exchange.came}")
         stop = mapped.stop()
-        if stop is None or not stop.accepted:
+        if stop is None or not stop.is_ok:
             raise NotPossibleError(f"the stop got {stop.exchange.came if stop else 'no id to name'}")
         after = mapped.watch(stop.sent + _RESTS_S, lambda seen: _still(mapped, seen))
     if not _moving(mapped, [*before, *after]):
@@ -188,7 +188,7 @@ def _others(mapped: MappedDevice, stops: Stops) -> Iterator[None]:
         while not over.is_set():
             began = time.monotonic()
             try:
-                made = mapped.binding.made(state, None)
+                made = mapped.binding.make(state, None)
                 good = client.send(made.method, made.target, headers=made.headers, body=made.body).response.ok
             except NoAnswerError:
                 good = False
@@ -249,7 +249,7 @@ class Stopping:
         connection = Connection(ca_file=Path(robot.ca_file) if robot.ca_file else None, token=robot.token)
         return cls(RestInterface(run, HttpClient(robot.rest or "", connection)))
 
-    def guarded(self) -> int | None:
+    def start_guard(self) -> int | None:
         """Start the guard; return the descriptor that the processes which send the load inherit, if there is a guard.
 
         The guard stops the device when all of them have ended.

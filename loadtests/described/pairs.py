@@ -17,7 +17,7 @@ from loadtests.clients.endpoint import EndpointError
 from loadtests.clients.robot import Robot, Stream
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.described.device import Device
-from loadtests.described.operations import chosen, named_alike, wanted_of
+from loadtests.described.operations import choose, named_alike, wanted_of
 from loadtests.described.requests import octets_of, robot_of
 from loadtests.settings.settings import SettingsError, Streams
 
@@ -50,7 +50,7 @@ class Choice:
         """
         if len(devices) == 1:
             (device,) = devices
-            found = chosen(device, named)
+            found = choose(device, named)
             names = {device.name_of(each): each for each in found.weights}
             weights = {name: found.weights[each] for name, each in names.items()}
             return cls(devices, weights, {name: (each,) for name, each in names.items()}, found.notes)
@@ -142,7 +142,7 @@ def _only(device: Device, name: str) -> Operation:
     """
     half = device.half(name)
     try:
-        found = list(chosen(device, [half]).weights)
+        found = list(choose(device, [half]).weights)
     except SettingsError as error:
         raise SettingsError(f"[load.pairs] {name}: {device.interface} = {half!r}: {error}") from None
     if len(found) > 1:
@@ -173,7 +173,7 @@ def _streams_of(device: Device, names: Iterable[str]) -> tuple[Stream, ...]:
                 raise SettingsError(f"--stream: {error}") from None
             found.append(Stream(name, "rosbridge" if topic else "websocket", name))
         else:
-            found += [_events(device, operation) for operation in chosen(device, [name]).weights]
+            found += [_events(device, operation) for operation in choose(device, [name]).weights]
     return tuple(found)
 
 

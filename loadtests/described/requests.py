@@ -16,7 +16,7 @@ from conformance.scenarios.described_messages import DescribedMessages, fields_o
 from conformance.scenarios.drawing import order_of
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError
 from conformance.scenarios.survey import Probe, Surveyor
-from conformance.transport.credentials import hidden
+from conformance.transport.credentials import hide_token
 from conformance.transport.exchange import NoAnswerError, Request
 from conformance.transport.reach import is_same
 from loadtests.clients.failures import CallError, Reply
@@ -32,14 +32,14 @@ _FIRST, _LAST = 200, 399  # statuses that are no errors (RFC 9110 section 15)
 _ANY_SUCCESS = range(200, 300)
 
 
-def _found(messages: DescribedMessages, operation: Operation) -> tuple[SoapPort, SoapOperation]:
+def _find(messages: DescribedMessages, operation: Operation) -> tuple[SoapPort, SoapOperation]:
     """Return an operation of the WSDL with its port."""
     return next(found for found in each(messages.found.ports) if label_of(*found) == operation.label)
 
 
 def at_hand(messages: DescribedMessages, operation: Operation) -> bool:
     """Return whether the port of an operation is at the server of the first one; others are not called."""
-    return is_same(_found(messages, operation)[0].url, messages.found.base)
+    return is_same(_find(messages, operation)[0].url, messages.found.base)
 
 
 def described_message(device: Device, messages: DescribedMessages, operation: Operation) -> Described:
@@ -48,7 +48,7 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
     Raises:
         SettingsError: no valid message can be made.
     """
-    port, own = _found(messages, operation)
+    port, own = _find(messages, operation)
     reply = Reply(local(own.response or ""))
     good, bad = list[bytes](), list[bytes]()
     for node in list(dict.fromkeys(_bodies(messages, own)))[: None if operation.safe else _TRIED]:
@@ -57,14 +57,14 @@ def described_message(device: Device, messages: DescribedMessages, operation: Op
             sent = device.api.client.send("POST", target_of(port), headers=fields_of(port, own), body=message)
             answer, request = sent.response, sent.request
             reply.require(answer.status, answer.header("location"), None, answer.body)
-            good.append(hidden(bytes_of(request)))
+            good.append(hide_token(bytes_of(request)))
         except NotPossibleError as error:
             raise SettingsError(str(error)) from None
         except NoAnswerError as none:
-            bad.append(hidden(bytes_of(none.unanswered.request)))
+            bad.append(hide_token(bytes_of(none.unanswered.request)))
             break  # each further call would wait for the same deadline
         except CallError:
-            bad.append(hidden(bytes_of(request)))
+            bad.append(hide_token(bytes_of(request)))
         if good and not operation.safe:
             break
     return Described(
@@ -142,7 +142,7 @@ def _described_of(device: Device, operations: Collection[Operation]) -> tuple[De
             surveyor.begin(operation)
     except PartialTraceError:
         raise CallError("closed", f"{device.api.client.base_url}: the device stopped responding") from None
-    return tuple(_described(surveyor, operation) for operation in operations)
+    return tuple(_describe(surveyor, operation) for operation in operations)
 
 
 def _listing(device: Device, operations: Collection[Operation]) -> list[Operation]:
@@ -159,7 +159,7 @@ def _listing(device: Device, operations: Collection[Operation]) -> list[Operatio
     ]
 
 
-def _described(surveyor: Surveyor, operation: Operation) -> Described:
+def _describe(surveyor: Surveyor, operation: Operation) -> Described:
     """Return an operation with a request for each set of values that the device accepts; with one, if it acts."""
     label = operation.label
     probes = [each for each in surveyor.probes if each.operation == label]

@@ -60,7 +60,7 @@ class Described:
             )
         if set(options["interfaces"]) - {"rest", "soap"} or set(options["clients"]) - {"wire"}:
             raise SettingsError("a device with a description is measured over REST or SOAP, with the client wire")
-        devices, against = _opened(named, options), options["against"]
+        devices, against = _open(named, options), options["against"]
         return cls(named, options, devices, _other(named, options, against) if against else ())
 
     def settings(self, command: str) -> Settings:
@@ -83,7 +83,7 @@ class Described:
     def _of_choice(self) -> Target:
         """Return the operations that the options name."""
         options = self.options
-        devices, others = (_selected(each, options["interfaces"]) for each in (self.devices, self.others))
+        devices, others = (_select(each, options["interfaces"]) for each in (self.devices, self.others))
         state = self._read_by_operators()
         choice = Choice.of(devices, options["operations"] or state)
         names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
@@ -99,12 +99,12 @@ class Described:
             moves=bool(changing),
             steps_move=names[step_operation(names)] in changing,
             other=choice.same(others).robot() if others else None,
-            description=self.named.shown,
+            description=self.named.sources,
             slo={name: level for name, level in levels.items() if name in names},
             notes=(
                 *(remark for each in devices for remark in each.remarks),
                 *choice.notes,
-                *_unmeasured(levels, names),
+                *_unmeasured_note(levels, names),
             ),
             streams=streams_to_hear(self.devices[0], options),
         )
@@ -149,9 +149,9 @@ class Described:
             Selection(tuple(names), ("rest",), ("wire",)),
             moves=moves,
             steps_move=moves,
-            description=self.named.shown,
+            description=self.named.sources,
             slo={name: level for name, level in levels.items() if name in names},
-            notes=(*device.remarks, *_unmeasured(levels, names)),
+            notes=(*device.remarks, *_unmeasured_note(levels, names)),
             streams=streams_to_hear(device, self.options),
             scenario=scenario,
         )
@@ -162,13 +162,13 @@ class Described:
         return self._stopping
 
 
-def _unmeasured(levels: Collection[str], names: Collection[str]) -> list[str]:
+def _unmeasured_note(levels: Collection[str], names: Collection[str]) -> list[str]:
     """Return a note on the service levels of operations that are not measured."""
     others = [name for name in levels if name not in names]
     return [f"not measured, so not judged: [slo] {', '.join(others)}"] if others else []
 
 
-def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
+def _open(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
     """Return a device by its descriptions; without its WSDL if the options select REST alone.
 
     Raises:
@@ -188,7 +188,7 @@ def _opened(named: Named, options: Mapping[str, Any]) -> tuple[Device, ...]:
     return both
 
 
-def _selected(devices: tuple[Device, ...], interfaces: Collection[str]) -> tuple[Device, ...]:
+def _select(devices: tuple[Device, ...], interfaces: Collection[str]) -> tuple[Device, ...]:
     """Return those with a selected interface; all if none is selected."""
     return tuple(each for each in devices if not interfaces or each.interface in interfaces)
 
@@ -203,12 +203,12 @@ def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Devi
     elsewhere = {**options, "base_url": None, "rest": None}
     if not is_url(against) and not against.endswith(_DESCRIPTIONS):
         own = Named.of((against,), {"openapi": None, "wsdl": None})
-        return _opened(own if own.source else Named(named.source, own.statement, named.wsdl), elsewhere)
+        return _open(own if own.source else Named(named.source, own.statement, named.wsdl), elsewhere)
     if named.wsdl is not None and set(options["interfaces"]) != {"rest"}:
         raise SettingsError(f"--against {against}: to compare REST and SOAP, name the other device's statement")
     if against.endswith(_DESCRIPTIONS) or is_wsdl(against):
-        return _opened(Named(against, named.statement), elsewhere)
-    return _opened(named, {**elsewhere, "base_url": against})
+        return _open(Named(against, named.statement), elsewhere)
+    return _open(named, {**elsewhere, "base_url": against})
 
 
 def _statement(device: Device) -> RobotStatement:

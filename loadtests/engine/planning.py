@@ -86,7 +86,7 @@ def users(settings: Settings, workers: int) -> int:
     if load.users is not None:
         return load.users
     each = int((load.rate or 0.0) / workers * _STALL_S)
-    return workers * (_MOST_USERS if steps.asked else min(_MOST_USERS, max(_LEAST_USERS, each)))
+    return workers * (_MOST_USERS if steps.has_searches else min(_MOST_USERS, max(_LEAST_USERS, each)))
 
 
 def until_decided(

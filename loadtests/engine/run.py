@@ -101,7 +101,7 @@ class Run:
                 raise RunAborted(ExitCode.INTERRUPTED, "interrupted before the measurement began")
             if findings.unreachable:
                 raise RunAborted(ExitCode.UNREACHABLE, f"{whose} cannot be reached: {told}")
-            if refused := findings.refused(whose):
+            if refused := findings.refusal_text(whose):
                 raise RunAborted(ExitCode.INCONCLUSIVE, f"{refused} {told}")
             if findings.failures:
                 raise RunAborted(ExitCode.INCONCLUSIVE, f"{whose} does not respond as {self._promise} says: {told}")
@@ -165,7 +165,7 @@ class Run:
             if settings.scenario is None:
                 self._pause(plan)
             self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, self.progress.say)
-            if settings.steps.asked and not self._over:
+            if settings.steps.has_searches and not self._over:
                 self._load_more(plan, executor)
 
     def _pause(self, plan: Plan) -> None:

@@ -45,7 +45,7 @@ def _fewest(plan: Plan) -> tuple[int, str] | None:
     """Return how many requests the series with the fewest gets, and its operation; None without a series."""
     schedule, found = Schedule(plan, 0, 1), []
     for interface, client in dict.fromkeys(name[1:] for name in plan.series_names()):
-        offered = plan.offered(interface, client)
+        offered = plan.choices(interface, client)
         total = sum(
             schedule.total(index)
             for index, segment in enumerate(plan.segments)

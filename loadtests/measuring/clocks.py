@@ -195,12 +195,12 @@ class RobotClock:
         """Take the stamp of data."""
         self.low_s = max(self.low_s, stamp.seconds - stamp.digit_s - received_s)
 
-    def told(self, stamp: Stamp, sent_s: float, received_s: float) -> None:
+    def add_stamp(self, stamp: Stamp, sent_s: float, received_s: float) -> None:
         """Record the time in a response at which the robot made it."""
         self.data(stamp, received_s)
         self.high_s = min(self.high_s, stamp.seconds + stamp.digit_s - sent_s)
 
-    def dated(self, date: bytes | None, sent_s: float, received_s: float) -> None:
+    def add_date(self, date: bytes | None, sent_s: float, received_s: float) -> None:
         """Take a response's `Date`, if it has one."""
         try:
             seconds = parsedate_to_datetime((date or b"").decode("latin-1")).timestamp()

@@ -45,7 +45,7 @@ class Findings:
         """Return whether a service could not be reached."""
         return any(failure.kind in UNREACHABLE for failure in self.failures.values())
 
-    def refused(self, whose: str) -> str:
+    def refusal_text(self, whose: str) -> str:
         """Return a sentence on the robot that refused the credentials of every request; empty if it did not."""
         statuses = {failure.refused for failure in self.failures.values()}
         if self.sizes or not statuses or 0 in statuses:

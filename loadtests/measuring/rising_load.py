@@ -37,7 +37,7 @@ class RisingLoad:
         self._operation = step_operation(self.first.operations)
         name = self.first.operations[self._operation]
         self._criterion = Criterion.of(self.settings.slo.get(name))
-        self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.offered(n, "wire")]
+        self._interfaces = [n for n in self.first.interfaces if self._operation in self.first.choices(n, "wire")]
 
     def _run(self, interface: str, rate: float) -> Step | None:
         """Offer a rate over an interface; None if the run was stopped."""

@@ -57,7 +57,7 @@ class RobotProcess:
                 here = connection.laddr
                 if connection.status == psutil.CONN_LISTEN and here and here.port == port and connection.pid:
                     process = psutil.Process(connection.pid)
-                    return cls(process, _shown(process.cmdline()), _cpu_s(process), time.monotonic())
+                    return cls(process, _masked_command(process.cmdline()), _cpu_s(process), time.monotonic())
         except (psutil.Error, OSError):
             return None
         return None
@@ -94,7 +94,7 @@ def is_here(host: str) -> bool:
     return address.is_loopback or host in own
 
 
-def _shown(words: list[str]) -> str:
+def _masked_command(words: list[str]) -> str:
     """Return a command line without secrets and without this machine's folders."""
     found = []
     for before, word in zip(["", *words], words, strict=False):
@@ -190,7 +190,7 @@ def describe(
             "name": output.about.get("name"),
             "vendor": output.about.get("vendor"),
             "version": output.about.get("version"),
-            **robot.shown,
+            **robot.addresses_by_name,
             **({"rosbridge": robot.rosbridge} if robot.rosbridge else {}),
             "servers": servers,
             "same_machine": same_machine(robot),

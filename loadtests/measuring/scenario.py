@@ -56,7 +56,7 @@ def read(scenario: Scenario) -> list[type[RobotUser]]:
         text = path.read_bytes()
         exec(compile(text, path, "exec"), vars(module))  # noqa: S102 -- the user's own file
     except (Exception, SystemExit) as error:  # noqa: BLE001 -- whatever it raises, its author has to hear of it
-        raise GeneratorError(f"{named} cannot be used: {_told(error, path)}") from None
+        raise GeneratorError(f"{named} cannot be used: {_error_text(error, path)}") from None
     if sha256(text).hexdigest() != scenario.sha256:
         raise GeneratorError(f"{named} differs from the master's: give each worker the same file")
     found = [type_ for type_ in vars(module).values() if isinstance(type_, type) and issubclass(type_, locust.User)]
@@ -79,7 +79,7 @@ def _wrong(user: type[locust.User]) -> str:
     return ""
 
 
-def _told(error: BaseException, path: Path) -> str:
+def _error_text(error: BaseException, path: Path) -> str:
     """Return an exception with the line of the scenario that it came from."""
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path]
     line = f" ({path.name}, line {frames[-1].lineno})" if frames else ""
@@ -180,7 +180,7 @@ class ScenarioSession(Recording):
         del user_instance, tb
         if isinstance(exception, RescheduleTask):
             return
-        self.recorder.fault(_told(exception, self._file))
+        self.recorder.fault(_error_text(exception, self._file))
         self.stop()
 
     def segment_at(self, moment_ns: int) -> int | None:

@@ -25,7 +25,7 @@ from websockets.http11 import Response
 from websockets.uri import parse_uri
 
 from loadtests.clients.endpoint import Endpoint
-from loadtests.clients.failures import CallError, connect_error, shown
+from loadtests.clients.failures import CallError, clip, connect_error
 from loadtests.clients.robot import Robot, Stream
 from loadtests.clients.rosbridge import bridge_endpoint
 from loadtests.clients.wire import now_ns
@@ -108,7 +108,7 @@ def listen(
     if polled is not None:
         polls = min(rate or _POLLS, _POLLS)
         jobs.append((Heard(polled, "polling", clock), lambda message: _poll(robot, message, stamp, told, polls)))
-    work = [gevent.spawn(_guarded, run, one) for one, run in jobs]
+    work = [gevent.spawn(_run_guarded, run, one) for one, run in jobs]
     until = time.monotonic() + seconds
     while time.monotonic() < until and not stopped() and not all(job.ready() for job in work):
         gevent.sleep(0.05)
@@ -116,7 +116,7 @@ def listen(
     return [one for one, _ in jobs]
 
 
-def _guarded(run: Callable[[Heard], None], one: Heard) -> None:
+def _run_guarded(run: Callable[[Heard], None], one: Heard) -> None:
     began = time.monotonic()
     try:
         run(one)
@@ -150,9 +150,9 @@ def _poll(robot: Robot, one: Heard, pointer: JSONPointer | None, told: JSONPoint
             answer.require_good(request.expects)
             one.take(answer.body, pointer)
             if one.clock is not None:
-                one.clock.dated(answer.headers.get(b"date"), sent_s, received_s)
+                one.clock.add_date(answer.headers.get(b"date"), sent_s, received_s)
                 if told is not None and (stamp := stamp_of(answer.body, told)) is not None:
-                    one.clock.told(stamp, sent_s, received_s)
+                    one.clock.add_stamp(stamp, sent_s, received_s)
 
 
 def _connect(endpoint: Endpoint, robot: Robot, url: str) -> Any:
@@ -200,7 +200,7 @@ class _Events:
 def _hear_events(robot: Robot, stream: Stream, one: Heard, pointer: JSONPointer | None) -> None:
     events = _Events(lambda message: one.take(message, pointer))
     with closing(_connect(Endpoint.parse(stream.url), robot, stream.url)) as plain:
-        plain.sendall(robot.fixed.revealed(stream.octets))
+        plain.sendall(robot.fixed.reveal(stream.octets))
         while data := plain.recv(_CHUNK):
             try:
                 events.parser.feed_data(data)
@@ -251,7 +251,7 @@ class _Messages:
         message = b"".join(self._pieces)
         self._pieces.clear()
         if self._topic:
-            message = _published(message, self._topic)
+            message = _message_in(message, self._topic)
         if message:
             self._take(message)
 
@@ -265,7 +265,7 @@ class _Bridged(msgspec.Struct):
     level: str = ""
 
 
-def _published(octets: bytes, topic: str) -> bytes:
+def _message_in(octets: bytes, topic: str) -> bytes:
     """Return the ROS message that a rosbridge has sent for a topic; empty for anything else.
 
     Raises:
@@ -274,9 +274,9 @@ def _published(octets: bytes, topic: str) -> bytes:
     try:
         message = msgspec.json.decode(octets, type=_Bridged)
     except (msgspec.DecodeError, RecursionError):
-        raise CallError("malformed", f"not a message of the rosbridge protocol: {shown(octets)}") from None
+        raise CallError("malformed", f"not a message of the rosbridge protocol: {clip(octets)}") from None
     if message.op == "status" and message.level == "error":
-        raise CallError("fault", f"rosbridge: {shown(bytes(message.msg))}")
+        raise CallError("fault", f"rosbridge: {clip(bytes(message.msg))}")
     return bytes(message.msg) if (message.op, message.topic) == ("publish", topic) else b""
 
 

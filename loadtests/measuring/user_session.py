@@ -48,7 +48,7 @@ class Session(Recording):
             Workload(robot, operations, seed, _documents(robot, operations) if library else {}, self._sent)
             for robot in robots
         ]
-        self.pacer = Pacer(int(timeout_s * NS), self.between, self._dropped)
+        self.pacer = Pacer(int(timeout_s * NS), self.between, self._drop)
         self.pacing = self.pacer.pacing
 
     @property
@@ -115,7 +115,7 @@ class Session(Recording):
         """End the plan now; requests under way may finish."""
         self.pacer.stop()
 
-    def _dropped(self, arrival: Arrival) -> None:
+    def _drop(self, arrival: Arrival) -> None:
         self.recorder.drop(arrival.segment + self.first, arrival.operation, now_ns() - arrival.due_ns)
 
     def close(self) -> None:

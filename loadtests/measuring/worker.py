@@ -192,7 +192,7 @@ class Worker:
         self.left.begin(plan, job["worker"])
         try:
             session.run(plan, job["worker"], now_ns() + job["lead_ns"] if origin is None else origin, job["ceiling"])
-            report = self._packed()
+            report = self._take_parts()
         finally:
             self._idle.set()
         self.runner.send_message("roaas_done", {"roaas": report})
@@ -230,7 +230,7 @@ class Worker:
             kept = f"what it had recorded is lost: {error}"
         _leave(ExitCode.INCONCLUSIVE, f"{why}: this worker ends; {kept}")
 
-    def _packed(self) -> dict[str, Any]:
+    def _take_parts(self) -> dict[str, Any]:
         """Return everything recorded since the last report, in parts."""
         session = self.session
         waiting, self._report = self._report, None
@@ -245,7 +245,7 @@ class Worker:
     def _pack(self) -> None:
         """Prepare the next report in a gap between blocks, where that delays no request."""
         if self._report is None and time.monotonic() - self._reported >= REPORT_S * 0.5:
-            self._report = self._packed()
+            self._report = self._take_parts()
 
     def _on_report(self, client_id: str, data: dict[str, Any]) -> None:
         del client_id

@@ -93,7 +93,7 @@ def _remarks(member: Member, missing: int | None) -> list[str]:
 
 def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[str, Any]:
     """Return the `plan` of latency.json; an undecided comparison had several parts of the plan's length."""
-    load, after, called = plan.load, settings.steps, plan.offered("rest", "wire")
+    load, after, called = plan.load, settings.steps, plan.choices("rest", "wire")
     return {
         "model": "open" if plan.open_model else "closed",
         "arrivals": load.arrivals if plan.open_model else None,
@@ -124,7 +124,7 @@ def plan_words(settings: Settings, plan: Plan, pacing: str, parts: int) -> dict[
         "connections": plan.connections,
         "pacing": pacing,
         "limits": {"max_rate": settings.limits.max_rate, "max_duration_s": settings.limits.max_duration_s},
-        "step_s": after.step_s if after.asked else None,
+        "step_s": after.step_s if after.has_searches else None,
     }
 
 
@@ -155,7 +155,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         if aborted or reasons
         else [overloaded.sentence()]
         if overloaded
-        else [*_undecided(settings, counted), *verdict.says_nothing(comparisons), *_silent(outcome)]
+        else [*_why_undecided(settings, counted), *verdict.says_nothing(comparisons), *_silent(outcome)]
     )
     workers, losses = process_figures(executor.members if executor else [])
     controls = aa_controls(measured)
@@ -191,7 +191,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         "interrupted": outcome.interrupted or outcome.dead_at is not None,
         "exit_code": code,
         "started": _stamp(outcome.started.at),
-        "finished": _stamp(outcome.started.ended),
+        "finished": _stamp(outcome.started.now),
         "environment": describe(outcome.robots[0], settings.output, outcome.findings.servers, outcome.robot_process)
         | {"machine": machine},
         "plan": plan_words(settings, plan, pacing, 1 + max(one.part for one in measured.plans)),
@@ -217,7 +217,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     return code, builtins
 
 
-def _undecided(settings: Settings, counted: counts.Counts) -> list[str]:
+def _why_undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     """Return why failed requests leave nothing to compare, unless a service level judges those of each operation."""
     levels = [settings.slo.get(name) for name in settings.selection.operations]
     judged = all(level is not None and level.error_rate is not None for level in levels)
@@ -259,7 +259,7 @@ def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) ->
     settings = outcome.settings.against
     if settings is None:
         return None
-    return against(measured, controls, settings.tolerance, len(settings.looks), outcome.robots[1].shown)
+    return against(measured, controls, settings.tolerance, len(settings.looks), outcome.robots[1].addresses_by_name)
 
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:
@@ -309,7 +309,7 @@ def _code(
 def _early_errors(findings: Findings) -> list[dict[str, Any]]:
     """Return the calls that failed before the run."""
     return [
-        figures.named(name)
+        figures.name_fields(name)
         | {"phase": "preflight", "kind": failure.kind, "message": str(failure)}
         | {"count": 1, "first_s": None, "last_s": None}
         for name, failure in findings.failures.items()

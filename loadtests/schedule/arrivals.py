@@ -23,14 +23,14 @@ class Schedule:
         self.plan = plan
         self.worker = worker
         self.workers = workers
-        self._counts = self._counted()
+        self._counts = self._arrival_counts()
         self._before = self._counted_before()
         self._turns = {
-            (segment.interface, segment.client): rotation(plan.offered(segment.interface, segment.client), plan.weights)
+            (segment.interface, segment.client): rotation(plan.choices(segment.interface, segment.client), plan.weights)
             for segment in plan.segments
         }
 
-    def _counted(self) -> list[int]:
+    def _arrival_counts(self) -> list[int]:
         """Return the arrivals of each segment over all workers: the rate times the time that the segment is open.
 
         With constant spacing, rounding errors do not add up over segments.

@@ -164,7 +164,7 @@ class Plan:
         """Return the plan that `as_message` wrote."""
         return msgspec.convert(message, cls)
 
-    def offered(self, interface: str, client: str) -> tuple[int, ...]:
+    def choices(self, interface: str, client: str) -> tuple[int, ...]:
         """Return the numbers of the operations that a client can call over an interface."""
         found = self.offers.get(f"{interface}/{client}")
         return tuple(range(len(self.operations))) if found is None else tuple(found)
@@ -175,7 +175,7 @@ class Plan:
             (self.operations[number], interface, client)
             for client in self.clients
             for interface in self.interfaces
-            for number in self.offered(interface, client)
+            for number in self.choices(interface, client)
         ]
 
     @property
@@ -260,7 +260,7 @@ class Plan:
         turns = [
             turn
             for turn in product(self.clients, self.interfaces, range(self.robots))
-            if self.offered(turn[1], turn[0])
+            if self.choices(turn[1], turn[0])
         ]
         if self.load.warmup_s <= 0:
             return []
@@ -298,7 +298,7 @@ class Plan:
             interface = self.interfaces[earlier % len(self.interfaces)]
             sides = [("duel", interface, "", 0), ("against", interface, "", 1)]
         else:
-            sides = [("duel", interface, "", 0) for interface in self.interfaces if self.offered(interface, client)]
+            sides = [("duel", interface, "", 0) for interface in self.interfaces if self.choices(interface, client)]
         if swapped:
             sides.reverse()
         if len(sides) == 1:

@@ -32,7 +32,7 @@ def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:
     clients = tuple(name for name in CLIENTS if name in (options.selection.clients or CLIENTS))
     other = None
     if options.against is not None:
-        interfaces, clients = _shared(options.against.endpoints, interfaces), clients[:1]
+        interfaces, clients = _shared_interfaces(options.against.endpoints, interfaces), clients[:1]
         _check_endpoints(options.against.endpoints)
         other = _robot(options.against.endpoints, interfaces)
     for key in ("operations", "pairs"):
@@ -51,7 +51,7 @@ def papers_robot(options: CliOptions, statement: RobotStatement) -> Target:
     )
 
 
-def _shared(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:
+def _shared_interfaces(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[str, ...]:
     """Return the interfaces that the robot of --against has too."""
     there = {"rest": bool(other.rest), "soap": other.publishers or other.subscribers}
     shared = tuple(name for name in interfaces if there[name])

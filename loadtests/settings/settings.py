@@ -52,7 +52,7 @@ class Steps:
     knee_searches: int = 0
 
     @property
-    def asked(self) -> bool:
+    def has_searches(self) -> bool:
         """Return whether there is anything to do after the comparison."""
         return bool(self.knee_searches)
 
@@ -268,7 +268,7 @@ def _take(given: dict[str, Any], names: list[str] | tuple[str, ...]) -> dict[str
     return {name: given.pop(name) for name in names if name in given}
 
 
-def _parsed(read: Callable[[str], Any], expected: str) -> Callable[[click.Context, click.Parameter, str | None], Any]:
+def _parser(read: Callable[[str], Any], expected: str) -> Callable[[click.Context, click.Parameter, str | None], Any]:
     """Return a callback that parses an option's text with `read`, or raises a usage error with `expected`."""
 
     def callback(_: click.Context, __: click.Parameter, value: str | None) -> Any:
@@ -287,5 +287,5 @@ def _stages(text: str) -> tuple[tuple[float, float], ...]:
     return tuple((float(each[1]), float(each[2]) * _UNITS[each[3]]) for each in found if each)
 
 
-STAGES = _parsed(_stages, "a list of stages such as 10:30s,100:1m,10:30s")
-SHARE = _parsed(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")
+STAGES = _parser(_stages, "a list of stages such as 10:30s,100:1m,10:30s")
+SHARE = _parser(lambda text: float(text.removesuffix("%")) / 100, "a percentage such as 5%")

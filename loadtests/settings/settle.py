@@ -123,7 +123,7 @@ def settle(options: CliOptions, statement: RobotStatement, target: Target | None
         ),
         output=Output(options.out, options.command, statement.robot, options.progress),
     )
-    return settings if options.against is None else _compared(settings, options, options.against, target)
+    return settings if options.against is None else _compare_settings(settings, options, options.against, target)
 
 
 @dataclass(frozen=True)
@@ -161,10 +161,10 @@ class _Allowed:
             )
 
 
-def _compared(settings: Settings, options: CliOptions, other: RobotStatement, target: Target) -> Settings:
+def _compare_settings(settings: Settings, options: CliOptions, other: RobotStatement, target: Target) -> Settings:
     """Return the settings of a run against another robot, whose own limits apply as well."""
     tolerance = options.tolerance
-    if settings.steps.asked:
+    if settings.steps.has_searches:
         raise SettingsError("--against compares two robots, and --knee loads one: run them one after the other")
     if not 0 < tolerance <= _MOST_TOLERANCE:
         raise SettingsError(f"--tolerance {tolerance:.3%} is out of range: above 0, at most {_MOST_TOLERANCE:.0%}")

@@ -19,8 +19,8 @@ import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.comparisons import AaControl, Ratio, compared
-from loadtests.statistics.figures import named, plain_quantiles, rounded_interval
+from loadtests.statistics.comparisons import AaControl, Ratio, compare_sides
+from loadtests.statistics.figures import name_fields, plain_quantiles, rounded_interval
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Measured, Side
 
@@ -79,12 +79,12 @@ class Judge:
         if control is not None and (control[0] > beyond or control[1] < 1 / beyond):
             return UNCLEAR  # this robot differs from itself by more than the tolerance
         low, high = interval
-        if _widened(ratio, low, self.together * self.looks) > beyond:
+        if _widen(ratio, low, self.together * self.looks) > beyond:
             return SLOWER
-        return NOT_SLOWER if _widened(ratio, high, self.looks) <= beyond else UNCLEAR
+        return NOT_SLOWER if _widen(ratio, high, self.looks) <= beyond else UNCLEAR
 
 
-def _widened(ratio: float, bound: float, together: int) -> float:
+def _widen(ratio: float, bound: float, together: int) -> float:
     """Return a bound of a ratio's interval at the confidence at which so many such bounds hold together."""
     alone, all_of_them = (NormalDist().inv_cdf(1 - (1 - _CONFIDENCE) / 2 / n) for n in (1, max(1, together)))
     return ratio * math.exp(math.log(max(bound, 1e-9) / ratio) * all_of_them / alone)
@@ -109,8 +109,8 @@ def against(
     for name in names:
         for quantile in _SHOWN:
             # The other robot comes first, so that the ratio is this robot's time over the other's.
-            fields = compared(measured, Side("against", name), Side("duel", name), quantile)
-            change = Change(**named(name), **fields)
+            fields = compare_sides(measured, Side("against", name), Side("duel", name), quantile)
+            change = Change(**name_fields(name), **fields)
             if quantile in JUDGED:
                 change.verdict = judge.verdict(change.ratio, change.ci95, known.get((*name, quantile)))
             changes.append(change)
@@ -130,7 +130,7 @@ def _series(measured: Measured, name: SeriesName) -> dict[str, Any]:
     """Return the other robot's figures, which are fewer than this robot's in `series`."""
     whole = measured.total(name, "against")
     units, seed = measured.units(name, "service", "against"), measured.plan.load.seed
-    return named(name) | {
+    return name_fields(name) | {
         "count": whole.service.total,
         "errors": whole.errors,
         "service_ms": plain_quantiles(measured.whole(name, "service", "against")),

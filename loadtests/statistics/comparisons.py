@@ -12,7 +12,7 @@ from typing import Any, Literal
 import msgspec
 
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.figures import named, rounded, rounded_interval, rounds_of
+from loadtests.statistics.figures import name_fields, rounded, rounded_interval, rounds_of
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import LEAST_ROUNDS, Compared, compare, pooled_interval, samples_for_point
 from loadtests.statistics.measured import Measured, Side
@@ -101,7 +101,7 @@ def comparison(
 ) -> SoapOverRest:
     """Compare SOAP and REST at one quantile, judged by `control`, the interval of the A/A control."""
     rest, soap = (Side("duel", (operation, interface, client)) for interface in WEB_SERVICES)
-    entry = SoapOverRest(operation=operation, client=client, **compared(measured, rest, soap, quantile, deviation))
+    entry = SoapOverRest(operation=operation, client=client, **compare_sides(measured, rest, soap, quantile, deviation))
     entry.between_runs, entry.noise_ci95 = rounded(deviation), rounded_interval(control)
     interval = None if entry.ci95 is None else (entry.ci95[0], entry.ci95[1])
     said = judge(entry.ratio, interval, control) if entry.ratio is not None else Judgement("none")
@@ -114,7 +114,7 @@ def aa_interval(measured: Measured, operation: str, quantile: str) -> Interval |
     """Return the interval of the ratio that SOAP and REST came to against themselves, both pooled."""
     client, seed = next(iter(measured.plan.clients), ""), measured.plan.load.seed
     parts = [
-        _enough(measured.paired(*_against_itself((operation, interface, client))), quantile, seed, stream=stream)
+        _enough(measured.pair_blocks(*_against_itself((operation, interface, client))), quantile, seed, stream=stream)
         for stream, interface in enumerate(WEB_SERVICES)
         if (operation, interface, client) in measured.plan.series_names()
     ]
@@ -129,10 +129,10 @@ def _against_itself(name: SeriesName) -> tuple[Side, Side]:
 def aa_controls(measured: Measured) -> list[AaControl]:
     """Return the `noise_floor` of latency.json: the A/A control of each interface; none without a client."""
     return [
-        AaControl(**named(name), **compared(measured, *_against_itself(name), quantile))
+        AaControl(**name_fields(name), **compare_sides(measured, *_against_itself(name), quantile))
         for client in measured.plan.clients[:1]
         for interface in measured.plan.interfaces
-        for number in measured.plan.offered(interface, client)
+        for number in measured.plan.choices(interface, client)
         for name in [(measured.plan.operations[number], interface, client)]
         for quantile in COMPARED
     ]
@@ -142,7 +142,7 @@ def further_interfaces(measured: Measured) -> list[OverRest]:
     """Return the `further_interfaces` of latency.json: those beside SOAP and REST, each over REST."""
     names = measured.plan.series_names()
     return [
-        OverRest(**named(name), **compared(measured, Side("duel", base), Side("duel", name), quantile))
+        OverRest(**name_fields(name), **compare_sides(measured, Side("duel", base), Side("duel", name), quantile))
         for name in names
         for base in [(name[0], BASE, name[2])]
         if name[1] not in WEB_SERVICES and base in names
@@ -155,23 +155,25 @@ def _samples(units: list[Unit]) -> int:
     return min((sum(unit.sides[side].total for unit in units) for side in (0, 1)), default=0)
 
 
-def _needed(quantile: str) -> int:
+def _samples_needed(quantile: str) -> int:
     return 2 if quantile == "mean" else samples_for_point(SHARES[quantile])
 
 
 def _enough(units: list[Unit], quantile: str, seed: int, *, stream: int = 0, deviation: float = 0.0) -> Compared | None:
     """Compare two sides where both have enough samples."""
-    enough = _samples(units) >= _needed(quantile)
+    enough = _samples(units) >= _samples_needed(quantile)
     return compare(units, quantile, seed, stream=stream, deviation=deviation) if enough else None
 
 
-def compared(measured: Measured, first: Side, second: Side, quantile: str, deviation: float = 0.0) -> dict[str, Any]:
+def compare_sides(
+    measured: Measured, first: Side, second: Side, quantile: str, deviation: float = 0.0
+) -> dict[str, Any]:
     """Compare two sides at one quantile; return the fields of a `Ratio`, without the sides' names."""
-    units = measured.paired(first, second)
+    units = measured.pair_blocks(first, second)
     result = _enough(units, quantile, measured.plan.load.seed, deviation=deviation)
     reason = None
     if result is None:
-        reason = f"{_samples(units)} samples on one side; {quantile} needs {_needed(quantile)}"
+        reason = f"{_samples(units)} samples on one side; {quantile} needs {_samples_needed(quantile)}"
     elif result.ci95 is None:
         reason = f"no interval: fewer than {LEAST_ROUNDS} rounds of blocks"
     return {
@@ -214,11 +216,11 @@ def judge(ratio: float, effect: Interval | None, control: Interval | None) -> Ju
     if not biased and ratio > reach and low > 1:
         return Judgement("differs")
     if biased and (bound := _beyond_bias(ratio, low, control)) > 1:
-        return Judgement("bounded", bound, _biased(control))
+        return Judgement("bounded", bound, _bias_text(control))
     bound = max(high, 1 / low) * (reach if biased else 1.0)
     if bound > _SHARP:
         return Judgement("none", bound, f"even a factor of {_SHARP:g} is not excluded")
-    inside = _biased(control) if biased else "an interface differs from itself by as much (A/A control)"
+    inside = _bias_text(control) if biased else "an interface differs from itself by as much (A/A control)"
     return Judgement("noise", bound, inside)
 
 
@@ -232,5 +234,5 @@ def _beyond_bias(ratio: float, low: float, control: Interval) -> float:
     return ratio / max(bias, 1 / bias) * math.exp(-math.hypot(math.log(ratio / low), uncertain))
 
 
-def _biased(control: Interval) -> str:
+def _bias_text(control: Interval) -> str:
     return f"the A/A control came to {min(control):.3f} to {max(control):.3f} times, which does not include 1"

@@ -54,7 +54,7 @@ class Series(msgspec.Struct, kw_only=True):
         return self.operation, self.interface, self.client
 
 
-def named(name: SeriesName) -> dict[str, Any]:
+def name_fields(name: SeriesName) -> dict[str, Any]:
     """Return a series' name in the fields of latency.json."""
     return dict(zip(("operation", "interface", "client"), name, strict=True))
 
@@ -113,7 +113,7 @@ def _one_series(measured: Measured, name: SeriesName, request: int | None, respo
     failed = (whole.failed_service, whole.failed_response)
     failed_service, failed_response = (part.encode() if part.total else None for part in failed)
     return Series(
-        **named(name),
+        **name_fields(name),
         count=whole.service.total,
         errors=whole.errors,
         late=whole.late,

@@ -58,20 +58,20 @@ class Found:
 def headline(found: Found) -> dict[str, str]:
     """Return the `headline` of latency.json: a few `words`, and a `sentence` that stands alone."""
     if found.interrupted:
-        return {"words": _INTERRUPTED, "sentence": f"{_INTERRUPTED}; until then: {_measured(found)[1]}"}
+        return {"words": _INTERRUPTED, "sentence": f"{_INTERRUPTED}; until then: {_result_words(found)[1]}"}
     if found.worthless:
         return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
     judged = _levels(found.levels)
     if found.overload is not None:
         sentence = found.overload.sentence()
-        return {"words": judged or _OVERLOADED, "sentence": f"{_OVERLOADED}: {sentence}.{_answered(found)}"}
+        return {"words": judged or _OVERLOADED, "sentence": f"{_OVERLOADED}: {sentence}.{_answered_text(found)}"}
     if found.undecided:
         return {"words": judged or _UNDECIDED, "sentence": f"{_UNDECIDED}, because {'; '.join(found.undecided)}."}
-    words, sentence = _measured(found)
+    words, sentence = _result_words(found)
     return {"words": judged or words, "sentence": sentence + _two_modes(found.series)}
 
 
-def _answered(found: Found) -> str:
+def _answered_text(found: Found) -> str:
     """Return a sentence on the requests that an overloaded robot answered: from when they were due, and when sent."""
     series = [entry for entry in found.series if entry.service_ms[DECIDING] is not None]
     if not series:
@@ -94,14 +94,14 @@ def _levels(outcomes: Sequence[str]) -> str | None:
     return "The service level is kept" if len(outcomes) == 1 else f"All {number} are kept"
 
 
-def _measured(found: Found) -> tuple[str, str]:
+def _result_words(found: Found) -> tuple[str, str]:
     """Return two forms of the result, a few words and a sentence, for a run without service levels or errors."""
     if found.against is not None:
         return _AGAINST[found.against.verdict], _other_robot(found, found.against)
     medians = [entry for entry in found.comparisons if entry.quantile == DECIDING]
     if medians:
         leading = min(medians, key=_rank)
-        words, sentence = _said(leading)
+        words, sentence = _median_words(leading)
         tail = next(
             entry
             for entry in found.comparisons
@@ -148,7 +148,7 @@ def _between(bounds: Sequence[float] | None, least: int = 2) -> str:
     return f"{low:.{digits}f} to {high:.{digits}f}"
 
 
-def _said(entry: SoapOverRest) -> tuple[str, str]:
+def _median_words(entry: SoapOverRest) -> tuple[str, str]:
     """Return two forms of the comparison of a median, a few words and a sentence."""
     sure = f"95 % interval {_between(entry.ci95)}"
     control = f"A/A control {_between(entry.noise_ci95)}"

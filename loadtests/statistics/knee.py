@@ -19,7 +19,7 @@ from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded, rounded_interval
-from loadtests.statistics.measured import Measured, counted
+from loadtests.statistics.measured import Measured, counted_times
 from loadtests.statistics.recorder import Recorder
 
 _MOST_P99_MS = 50.0
@@ -107,7 +107,7 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
     started = whole.service.total + whole.errors
     if started and whole.errors / started > _MOST_ERRORS:
         reasons.append(f"{whole.errors} of {started} requests failed")
-    response, lag = counted(whole, "response"), measured.spans("step", name).lag
+    response, lag = counted_times(whole, "response"), measured.spans("step", name).lag
     for quantile, below in criterion.limits.items():
         value = response.figure_ms(quantile)
         if value is not None and value >= below:
@@ -147,21 +147,21 @@ class Search:
     tried: list[Step] = field(default_factory=list)
 
     @property
-    def kept(self) -> float | None:
+    def floor(self) -> float | None:
         """Return the highest rate that has met the criterion so far: misses below it were chance."""
         return max((rate for rate, trial in self.results.items() if trial.meets), default=None)
 
     @property
-    def missed(self) -> float | None:
+    def ceiling(self) -> float | None:
         """Return the lowest rate above it that has missed the criterion."""
-        return min(self._missed(), default=None)
+        return min(self._rates_missed(), default=None)
 
-    def _missed(self) -> list[float]:
-        return [rate for rate, trial in self.results.items() if not trial.meets and rate > (self.kept or 0.0)]
+    def _rates_missed(self) -> list[float]:
+        return [rate for rate, trial in self.results.items() if not trial.meets and rate > (self.floor or 0.0)]
 
     def next_rate(self) -> float | None:
         """Return the rate to try next; None when the bracket is narrow enough, or a limit is reached."""
-        kept, missed = self.kept, self.missed
+        kept, missed = self.floor, self.ceiling
         if kept is None and missed is None:
             return self._within(self.near[0] / _NEAR if self.near else self.lowest)
         if missed is None:
@@ -172,7 +172,7 @@ class Search:
         if missed / kept > RESOLUTION:
             return math.sqrt(kept * missed)
         above = self._within(missed * _CONFIRMED)
-        confirmed = any(missed < rate <= above for rate in self._missed())
+        confirmed = any(missed < rate <= above for rate in self._rates_missed())
         return None if confirmed or above <= missed else above
 
     def learn(self, rate: float, *trials: Step) -> None:
@@ -182,7 +182,7 @@ class Search:
 
     def estimate(self) -> float | None:
         """Return the knee, between the ends of the bracket; None where an end was not found."""
-        return None if self.kept is None or self.missed is None else math.sqrt(self.kept * self.missed)
+        return None if self.floor is None or self.ceiling is None else math.sqrt(self.floor * self.ceiling)
 
     def _within(self, rate: float) -> float:
         return min(max(rate, self.lowest), self.highest)
@@ -193,12 +193,12 @@ def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[
     found = [(search, estimate) for search in searches if (estimate := search.estimate()) is not None]
     estimates = [estimate for _, estimate in found]
     trials = [trial for search in searches for trial in search.tried]
-    missed = [search.results[search.missed] for search, _ in found if search.missed is not None]
+    missed = [search.results[search.ceiling] for search, _ in found if search.ceiling is not None]
     busy = sum(trial.limited_by_generator for trial in missed)
-    kept = [search.kept for search in searches if search.kept is not None]
+    kept = [search.floor for search in searches if search.floor is not None]
     failing = [trial.offered_rate for trial in trials if trial.errors or trial.dropped]
-    lowest = min((search.kept or 0.0 for search, _ in found), default=0.0)
-    highest = max((search.missed or 0.0 for search, _ in found), default=0.0)
+    lowest = min((search.floor or 0.0 for search, _ in found), default=0.0)
+    highest = max((search.ceiling or 0.0 for search, _ in found), default=0.0)
     return {
         "interface": interface,
         "criterion": criterion,
@@ -206,7 +206,7 @@ def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[
         "rate": rounded(math.exp(sum(map(math.log, estimates)) / len(estimates))) if estimates else None,
         "interval": rounded_interval((lowest, highest)) if estimates else None,
         "confidence": rounded(1 - 2.0 ** (1 - len(estimates))) if estimates else None,
-        "brackets": [[rounded(search.kept), rounded(search.missed)] for search in searches],
+        "brackets": [[rounded(search.floor), rounded(search.ceiling)] for search in searches],
         "held_up_to": rounded(max(kept, default=None)) if not estimates and kept else None,
         "errors_from": rounded(min(failing, default=None)),
         "reason": missed[0].reason if missed else None,
@@ -216,7 +216,7 @@ def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[
     }
 
 
-def _decided(trials: Sequence[Step]) -> bool:
+def _is_decided(trials: Sequence[Step]) -> bool:
     """Return whether a rate is known to be kept or missed: a miss counts where the generator was not the limit."""
     if not trials:
         return False
@@ -232,13 +232,13 @@ def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[
         search = Search(*limits, near=near)
         while (rate := search.next_rate()) is not None:
             trials: list[Step] = []
-            while not _decided(trials):
+            while not _is_decided(trials):
                 trial = attempt(rate)
                 if trial is None:
                     return found
                 trials.append(trial)
             search.learn(rate, *trials)
         found.append(search)
-        if search.kept is not None and search.missed is not None:
-            near = (search.kept, search.missed)
+        if search.floor is not None and search.ceiling is not None:
+            near = (search.floor, search.ceiling)
     return found

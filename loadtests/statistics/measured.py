@@ -14,7 +14,7 @@ from loadtests.statistics.recorder import Cell, Recorder, Spans
 from loadtests.statistics.rounds import Unit
 
 
-def counted(cell: Cell, time: str, floor_ns: int | None = None) -> Histogram:
+def counted_times(cell: Cell, time: str, floor_ns: int | None = None) -> Histogram:
     """Return a cell's `service` or `response` times, failed requests included.
 
     A failed request counts with no less than `floor_ns`, by default the slowest response of the cell.
@@ -118,7 +118,7 @@ class Measured:
         for block in self.blocks(name, phase, label=label):
             cells[block.pair].merge(block.cell)
         floor = max((getattr(cell, time).highest_ns for cell in cells.values()), default=0)
-        return {pair: counted(cell, time, floor) for pair, cell in cells.items()}
+        return {pair: counted_times(cell, time, floor) for pair, cell in cells.items()}
 
     def units(self, name: SeriesName, time: str, phase: str = "duel") -> list[Unit]:
         """Return the units that a series' intervals are resampled from."""
@@ -128,7 +128,7 @@ class Measured:
         """Return the times of all requests of a series, failed ones included."""
         return Histogram.sum_of(self.pairs(phase, name, time).values())
 
-    def paired(self, first: Side, second: Side) -> list[Unit]:
+    def pair_blocks(self, first: Side, second: Side) -> list[Unit]:
         """Return the pairs of blocks that hold two sides, with the service times of both."""
         one, other = (self.pairs(side.phase, side.name, label=side.label) for side in (first, second))
         return [Unit(pair[0], (one[pair], other[pair])) for pair in sorted(set(one) & set(other))]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from loadtests.statistics.figures import named, rounded
+from loadtests.statistics.figures import name_fields, rounded
 from loadtests.statistics.histogram import Floats, Histogram, edges_us, quantiles_us
 from loadtests.statistics.measured import Measured
 
@@ -144,10 +144,10 @@ def heat_map(measured: Measured) -> dict[str, Any]:
         "width_s": rounded(width_s),
         "edges_ms": [rounded(edge) for edge in edges.tolist()],
         "series": [
-            named(name)
+            name_fields(name)
             | {
                 "columns": [
-                    {"t_s": rounded(number * width_s), "counts": _binned(histogram, edges)}
+                    {"t_s": rounded(number * width_s), "counts": _bin(histogram, edges)}
                     for number, histogram in sorted(columns.items())
                 ]
             }
@@ -156,7 +156,7 @@ def heat_map(measured: Measured) -> dict[str, Any]:
     }
 
 
-def _binned(histogram: Histogram, edges: Floats) -> list[int]:
+def _bin(histogram: Histogram, edges: Floats) -> list[int]:
     bins, counts = histogram.arrays()
     lower, width = edges_us(bins)
     found, _ = np.histogram((lower + width / 2) / 1e3, edges, weights=counts)

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import special
 
 from loadtests.schedule.plan import SERIES
-from loadtests.statistics.figures import Series, named, plain_quantiles, rounded
+from loadtests.statistics.figures import Series, name_fields, plain_quantiles, rounded
 from loadtests.statistics.histogram import Floats, Histogram
-from loadtests.statistics.measured import Measured, counted
+from loadtests.statistics.measured import Measured, counted_times
 from loadtests.statistics.recorder import Cell, Recorder
 from loadtests.statistics.rounds import lag_correlation, widening
 
@@ -33,13 +33,13 @@ def time_series(measured: Measured) -> dict[str, Any]:
         for block in measured.blocks(name, *_PHASES):
             seconds[int(block.start_s / width + 1e-9)].merge(block.cell)
         points = [_point(round(second * width, 3), cell) for second, cell in sorted(seconds.items())]
-        found.append(named(name) | {"points": points})
+        found.append(name_fields(name) | {"points": points})
     return {"width_s": width, "series": found}
 
 
 def _point(at_s: float, cell: Cell) -> dict[str, Any]:
     """Return the figures of one second of a series, for latency.json."""
-    response = counted(cell, "response")
+    response = counted_times(cell, "response")
     return {"t_s": at_s, "count": cell.service.total, "errors": cell.errors} | {
         f"{name}_ms": rounded(response.figure_ms(name)) for name in ("p50", "p99", "max")
     }
@@ -120,7 +120,7 @@ def add_growth(measured: Measured, entries: Sequence[Series]) -> list[str]:
     said = []
     for entry in entries if not measured.plan.load.stages else ():
         found = growth(
-            [(block.start_s, counted(block.cell, "response")) for block in measured.blocks(entry.name, "duel")]
+            [(block.start_s, counted_times(block.cell, "response")) for block in measured.blocks(entry.name, "duel")]
         )
         entry.growth, usual = found, entry.response_ms["p50"]
         if found is None or usual is None or not found["steady"] or abs(found["over_run_ms"]) < _WORTH * usual:
@@ -141,7 +141,7 @@ def errors(recorder: Recorder, operations: tuple[str, ...]) -> list[dict[str, An
     for (number, operation, kind), failure in sorted(recorder.failures.items(), key=lambda item: -item[1].count):
         phase, interface, client = SERIES[number]
         found.append(
-            named((operations[operation], interface, client))
+            name_fields((operations[operation], interface, client))
             | {
                 "phase": phase,
                 "kind": kind,
@@ -168,9 +168,9 @@ def stage_figures(measured: Measured) -> list[dict[str, Any]]:
             cells[load.stage_at(middle_s)].append(block.cell)
         before = 0.0
         for number, (rate, seconds) in enumerate(load.stages):
-            response = Histogram.sum_of(counted(cell, "response") for cell in cells[number])
+            response = Histogram.sum_of(counted_times(cell, "response") for cell in cells[number])
             found.append(
-                named(name)
+                name_fields(name)
                 | {
                     "stage": number + 1,
                     "from_rate": rounded(before),

@@ -18,7 +18,7 @@ from loadtests.schedule.plan import SeriesName
 from loadtests.schedule.plan import share as share_of_requests
 from loadtests.statistics.figures import quantiles, rounded, rounded_interval
 from loadtests.statistics.histogram import SHARES, Floats, Histogram, edges_us
-from loadtests.statistics.measured import Block, Measured, counted
+from loadtests.statistics.measured import Block, Measured, counted_times
 from loadtests.statistics.rounds import Interval
 
 KEPT, BROKEN, NOT_KNOWN = "kept", "broken", "not known"
@@ -73,7 +73,7 @@ def levels(measured: Measured, wanted: Mapping[str, ServiceLevel]) -> list[Level
 
 def _level(measured: Measured, name: SeriesName, limit: str, most: float, at_rate: float | None) -> Level:
     blocks = list(measured.blocks(name, *_PHASES))
-    whole = Histogram.sum_of(counted(block.cell, "response") for block in blocks)
+    whole = Histogram.sum_of(counted_times(block.cell, "response") for block in blocks)
     if limit == _ERRORS:
         allowed, counts = most, [(block.cell.errors + block.cell.dropped, _requests(block)) for block in blocks]
         value = sum(failed for failed, _ in counts) / whole.total if whole.total else None
@@ -81,7 +81,7 @@ def _level(measured: Measured, name: SeriesName, limit: str, most: float, at_rat
         quantile = limit.removesuffix("_ms")
         allowed, value = 1 - SHARES[quantile], quantiles(whole)[0][quantile]
         floor = max((block.cell.response.highest_ns for block in blocks), default=0)
-        counts = [(_above(counted(block.cell, "response", floor), most), _requests(block)) for block in blocks]
+        counts = [(_above(counted_times(block.cell, "response", floor), most), _requests(block)) for block in blocks]
     beyond, interval = sum(count for count, _ in counts), share_interval(counts)
     rate = _rate(measured, name, blocks)
     outcome, why = _outcome(interval, allowed, rate, at_rate)
@@ -116,7 +116,7 @@ def _rate(measured: Measured, name: SeriesName, blocks: Sequence[Block]) -> floa
     """Return the requests per second of a series: as scheduled, or in the closed model as sent."""
     plan = measured.plan
     if plan.load.rate is not None and not plan.load.stages:
-        offered = len(plan.offered(name[1], name[2]))
+        offered = len(plan.choices(name[1], name[2]))
         return plan.load.rate * share_of_requests(plan.operations.index(name[0]), plan.weights, offered)
     seconds = sum(block.segment.active_s for block in blocks)
     return sum(map(_requests, blocks)) / seconds if seconds else None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from conformance.cli.contract import contract_option, loaded
+from conformance.cli.contract import contract_option, load_pack
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.extras import lacking_soap
 from conformance.commandline.help_pages import inert
@@ -118,14 +118,14 @@ def selftest(context: click.Context, /, **options: Any) -> None:
     if options["results"]:
         if not options["against"]:
             raise click.UsageError("--results are compared with those of --against: give both")
-        sys.exit(int(_is_worse(loaded(options["pack"]), _read(options["against"]), options["results"])))
+        sys.exit(int(_is_worse(load_pack(options["pack"]), _read(options["against"]), options["results"])))
     options["before"] = _read(options["against"]) if options["against"] else None
     if options["generated"] and options["adversary"]:
         raise click.UsageError("--generated and --adversary are two kinds of sample: give one of them")
     if options["api"]:
         _by_api(context, options)
         return
-    contract = loaded(options["pack"])
+    contract = load_pack(options["pack"])
     try:
         if options["generated"] or options["adversary"]:
             _by_rule(context, contract, options)
@@ -151,9 +151,9 @@ def _read(paths: Iterable[Path]) -> dict[str, Table]:
 
 def _is_worse(contract: Contract, before: dict[str, Table], results: Iterable[Path]) -> bool:
     """Print requirements and devices that are worse than in earlier results; return whether any is."""
-    from proof.selftest.against import lost  # noqa: PLC0415 - see _by_hand()
+    from proof.selftest.against import losses  # noqa: PLC0415 - see _by_hand()
 
-    said = lost(before, _read(results), contract.renamed)
+    said = losses(before, _read(results), contract.ids_by_alias)
     click.echo("\n".join([*map(inert, said), f"{len(said)} differences to the worse" if said else "nothing is worse"]))
     return bool(said)
 
@@ -166,7 +166,7 @@ def _by_hand(contract: Contract, options: dict[str, Any]) -> None:
 
     if options["short"]:
         options.update(seeds=min(options["seeds"], 1), compare=False, variants=False)
-    chosen = _chosen(self_test_of(contract), options)
+    chosen = _choose(self_test_of(contract), options)
     if options["listed"]:
         for mutant in chosen:
             click.echo(f"{mutant.name:34} {mutant.says} [{', '.join(mutant.catches)}]")
@@ -189,7 +189,7 @@ def _target(contract: Contract, name: str) -> GoodDevice:
         raise click.UsageError(str(error)) from error
 
 
-def _chosen(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
+def _choose(needs: SelfTest, options: dict[str, Any]) -> list[Mutant]:
     """Return the hand-written mutants that the options select.
 
     Raises:

@@ -53,7 +53,7 @@ def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) ->
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.adversary import compose, kinds_in_requests  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
@@ -61,7 +61,7 @@ def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) ->
     every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
     every = tuple(mutant for mutant in every if mutant.exchange.name in called)
     if options["adversary"]:
-        every = composed(every, kinds_in_requests(contract))
+        every = compose(every, kinds_in_requests(contract))
     fitting = [mutant for mutant in every if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if not fitting:
         raise click.UsageError(f"no mutant of an operation that may be called has a name like {', '.join(patterns)}")
@@ -79,7 +79,7 @@ def run_api(
 ) -> None:
     """Judge the unchanged device and the mutants, and add the results to the report."""
     from proof.selftest.comparison import best_settings  # noqa: PLC0415 - see selftest.py
-    from proof.selftest.generated.adversary import Recorder, unreached  # noqa: PLC0415 - as above
+    from proof.selftest.generated.adversary import Recorder, unreached_names  # noqa: PLC0415 - as above
     from proof.selftest.generated.judging import judge  # noqa: PLC0415 - as above
     from proof.selftest.mutant_run import DescribedPool, run_unchanged  # noqa: PLC0415 - as above
 
@@ -101,7 +101,7 @@ def run_api(
                 chosen,
                 efforts=efforts,
                 seed=options["seed"],
-                unreached=unreached(chosen, seen.messages),
+                unreached=unreached_names(chosen, seen.messages),
                 tell=progress.by_rule,
             )
             report.notes.append(
@@ -121,14 +121,14 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import composed, kinds_in_requests  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.adversary import compose, kinds_in_requests  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.catalogue import generated_mutants, open_place  # noqa: PLC0415 - as above
     from proof.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     patterns = options["patterns"] or ("*",)
     every = generated_mutants(contract)
     if options["adversary"]:
-        made = composed(every, kinds_in_requests(contract))
+        made = compose(every, kinds_in_requests(contract))
         every = tuple(mutant for mutant in made if open_place(contract, mutant) is None)
     fitting = [mutant for mutant in every if any(fnmatch.fnmatch(mutant.name, pattern) for pattern in patterns)]
     if not fitting:
@@ -142,7 +142,7 @@ def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[
     Raises:
         RobotError: the device does not start.
     """
-    from proof.selftest.generated.adversary import Recorder, unreached  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.adversary import Recorder, unreached_names  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.judging import judge  # noqa: PLC0415 - see selftest.py
     from proof.selftest.mutant_run import RobotPool, run_unchanged  # noqa: PLC0415 - see selftest.py
     from proof.selftest.robots import target_of  # noqa: PLC0415 - see selftest.py
@@ -155,7 +155,7 @@ def run_generated(report: Report, mutants: list[GeneratedMutant], options: dict[
         if options["adversary"]:
             click.echo("a whole run of the good device shows which faults would alter anything", err=True)
             run_unchanged(pool, efforts[-1], change=seen)
-        never = unreached(mutants, seen.messages) if seen.messages else frozenset()
+        never = unreached_names(mutants, seen.messages) if seen.messages else frozenset()
         report.generated_results = judge(pool, mutants, efforts=efforts, unreached=never, tell=progress.by_rule)
         if compared:
             compare(report, pool, [mutant.as_mutant() for mutant in mutants], progress)

@@ -44,7 +44,7 @@ class Progress:
         line = f"[{self._done}/{self.total}] {result.mutant.name}: {result.outcome}{by} ({result.seconds:.1f} s)"
         click.echo(line, err=True)
 
-    def compared(self, comparison: Comparison, result: ToolResult) -> None:
+    def tell_compared(self, comparison: Comparison, result: ToolResult) -> None:
         """Report the result of another tool on a mutant."""
         comparison.results.append(result)
         said = f"killed: {result.findings[0]}" if result.killed else "survived"
@@ -88,7 +88,7 @@ def compare(
     for tool in filter(None, (plain, beside)):
         one = comparison.Comparison(tool.name)
         report.compared.append(one)
-        one.good = comparison.compare(pool, mutants, tool, chosen, partial(progress.compared, one))
+        one.good = comparison.compare(pool, mutants, tool, chosen, partial(progress.tell_compared, one))
     report.notes.append(
         f"Schemathesis ran with all checks, --max-examples {chosen.examples}, phases {chosen.phases}, and at most "
         f"{chosen.limit_s:g} s for each mutant; findings that it has of the good device as well do not count."

@@ -17,7 +17,7 @@ def _holder(value: Any, path: str) -> tuple[Any, Any]:
     return value, int(last) if isinstance(value, list) else last
 
 
-def found(value: Any, path: str) -> Any:
+def value_at(value: Any, path: str) -> Any:
     """Return the member's value."""
     holder, name = _holder(value, path)
     return holder[name]
@@ -47,7 +47,7 @@ def swapped(one: str, other: str) -> Callable[[Any], None]:
     """Return an edit that swaps the values of two members."""
 
     def edit(value: Any) -> None:
-        first, second = found(value, one), found(value, other)
+        first, second = value_at(value, one), value_at(value, other)
         field(one, second)(value)
         field(other, first)(value)
 

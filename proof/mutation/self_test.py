@@ -192,10 +192,10 @@ def self_test_of(contract: Contract) -> SelfTest:
         raise ContractError(f"{contract.directory}: {named or MODULE} cannot be imported: {error}") from error
     if not isinstance(found, SelfTest):
         raise ContractError(f"{contract.directory}: {named or MODULE} has no SELFTEST, a SelfTest of {__name__}")
-    return replace(found, mutants=tuple(_renewed(mutant, contract.renamed) for mutant in found.mutants))
+    return replace(found, mutants=tuple(_with_present_ids(mutant, contract.ids_by_alias) for mutant in found.mutants))
 
 
-def _renewed(mutant: Mutant, renamed: Mapping[str, str]) -> Mutant:
+def _with_present_ids(mutant: Mutant, renamed: Mapping[str, str]) -> Mutant:
     """Return a mutant with the present ids of the requirements that must kill it."""
     return replace(mutant, catches=tuple(dict.fromkeys(renamed.get(id_, id_) for id_ in mutant.catches)))
 
@@ -227,7 +227,7 @@ def check_installed(*modules: str) -> None:
         raise NotInstalledError(f"not installed: pip install {' '.join(lacking)}")
 
 
-def built(*sources: Path) -> Path:
+def build(*sources: Path) -> Path:
     """Build a Go program, unless the built file is newer than all source files, and return its path.
 
     Raises:

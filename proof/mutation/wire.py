@@ -38,7 +38,7 @@ class ClientConnection:
 
     def wait(self) -> bool:
         """Wait for bytes of the next request; return False if the connection ended."""
-        self._waiting = self._waiting or _received(self._sock)
+        self._waiting = self._waiting or _receive(self._sock)
         return bool(self._waiting)
 
     def request(self) -> Request | None:
@@ -104,7 +104,7 @@ class RobotConnection:
         response = None
         while response is None:
             try:
-                response = parser.feed(_received(sock))
+                response = parser.feed(_receive(sock))
             except h11.RemoteProtocolError as error:
                 raise IncompleteMessageError from error
         if request.is_last or response.is_last:
@@ -118,7 +118,7 @@ class RobotConnection:
             self._sock = None
 
 
-def _received(sock: socket.socket) -> bytes:
+def _receive(sock: socket.socket) -> bytes:
     """Return the next bytes, empty at the end of the connection."""
     try:
         return sock.recv(_PIECE)

@@ -29,7 +29,7 @@ def xml(body: bytes) -> Any:
         return None
 
 
-def named(root: Any, name: str) -> list[Any]:
+def find_named(root: Any, name: str) -> list[Any]:
     """Return the elements with a local name, in document order."""
     return [node for node in root.iter() if isinstance(node.tag, str) and etree.QName(node).localname == name]
 
@@ -38,13 +38,13 @@ def each(name: str, edit: Callable[[Any], object], which: slice = slice(None)) -
     """Return an edit that applies ``edit`` to the elements with a local name, or to the slice ``which`` of them."""
 
     def apply(root: Any) -> None:
-        for node in named(root, name)[which]:
+        for node in find_named(root, name)[which]:
             edit(node)
 
     return apply
 
 
-def gone(node: Any) -> None:
+def remove(node: Any) -> None:
     """Remove an element from its tree."""
     node.getparent().remove(node)
 

@@ -22,7 +22,7 @@ _NO_CHANCE: Final = 0.05
 Table = dict[str, tuple[int, dict[str, int]]]
 
 
-def gathered(runs: Iterable[Mapping[str, Any]]) -> dict[str, Table]:
+def gather(runs: Iterable[Mapping[str, Any]]) -> dict[str, Table]:
     """Return how often each requirement noticed each mutant and blamed each good device, of the runs of a self-test."""
     seen: dict[str, Counter[str]] = defaultdict(Counter)
     by: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
@@ -47,7 +47,7 @@ def gathered(runs: Iterable[Mapping[str, Any]]) -> dict[str, Table]:
     }
 
 
-def lost(before: Mapping[str, Table], after: Mapping[str, Table], names: Mapping[str, str]) -> list[str]:
+def losses(before: Mapping[str, Table], after: Mapping[str, Table], names: Mapping[str, str]) -> list[str]:
     """Return a sentence on each mutant that is no longer noticed as surely, and on each good device newly blamed.
 
     Args:
@@ -101,11 +101,11 @@ def read(paths: Iterable[Path]) -> dict[str, Table]:
                 table: {name: (int(count), {**by}) for name, (count, by) in names.items()}
                 for table, names in tables.items()
             }
-        return gathered(documents)
+        return gather(documents)
     except (AttributeError, LookupError, TypeError) as error:
         raise ValueError(f"no results of a self-test: {error!r}") from error
 
 
-def stored(tables: Mapping[str, Table]) -> bytes:
+def file_content(tables: Mapping[str, Table]) -> bytes:
     """Return the content of a yardstick's file."""
     return gzip.compress(json.dumps({"format": _FORMAT, **tables}, indent=0, sort_keys=True).encode(), mtime=0)

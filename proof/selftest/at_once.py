@@ -59,7 +59,7 @@ def each_at_once(
     """
     lock, interrupted = threading.Lock(), threading.Event()
 
-    def reported(item: _Item) -> _Result:
+    def judge_and_tell(item: _Item) -> _Result:
         result = judge(item)
         with lock:
             if not interrupted.is_set():
@@ -67,7 +67,7 @@ def each_at_once(
         return result
 
     with ThreadPoolExecutor(at_once) as executor:
-        judged = [executor.submit(reported, item) for item in items]
+        judged = [executor.submit(judge_and_tell, item) for item in items]
         try:
             return [future.result() for future in judged]
         except BaseException:

@@ -176,7 +176,7 @@ def robot_of(job: Job, folder: Path) -> RobotUnderTest:
     run = Run(
         statement=statement,
         contract=contract,
-        claims=statement.claimed(contract),
+        claims=statement.claims_of(contract),
         # A described device may belong to somebody, so it is not moved.
         allow_motion=contract.is_claimed,
         seed=job.seed,
@@ -200,7 +200,7 @@ class _EnoughKnown(Judge):
         ledger = run.contract.ledger
         self._enough = frozenset(id_ for id_ in enough if id_ in ledger and ledger[id_].binds(claimed))
 
-    def failed(self, requirement: str) -> None:
+    def on_failure(self, requirement: str) -> None:
         """Note whether the run already knows enough."""
         if requirement in self._enough and not self._run.aborted:
             self._run.aborted = f"{requirement} has failed, which is enough to know"

@@ -159,14 +159,14 @@ def compare(
             beyond = _findings(tool, description, proxy.before(robot).rest, settings, mutant.token) - good
         finally:
             pool.give(robot, proxy)
-        return ToolResult(mutant.name, bool(beyond), _said(beyond))
+        return ToolResult(mutant.name, bool(beyond), _codes(beyond))
 
     tried = [mutant for mutant in mutants if mutant.interface == "rest" and not mutant.probe]
     each_at_once(one, tried, pool.size, tell)
-    return _said(good)
+    return _codes(good)
 
 
-def _said(findings: Findings) -> tuple[str, ...]:
+def _codes(findings: Findings) -> tuple[str, ...]:
     return tuple(sorted(f"{operation} {code}" for operation, code in findings))
 
 

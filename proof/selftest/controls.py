@@ -12,7 +12,7 @@ from conformance.verdict.verdicts import NOT_SEEN
 from proof.mutation.self_test import GoodDevice, NotInstalledError, self_test_of
 from proof.selftest.at_once import each_at_once
 from proof.selftest.certifying import Outcome, job_at, run_job
-from proof.selftest.link import linked
+from proof.selftest.link import link_to
 from proof.selftest.proxy import Proxy
 from proof.selftest.robots import Robot, RobotError, check_available, running
 from proof.selftest.servers.fronts import FRONTS, Front, behind
@@ -171,14 +171,14 @@ def _judge(
             if isinstance(case.variant, Front):
                 robot = stack.enter_context(behind(case.variant, robot))
             if isinstance(case.variant, Variant):
-                robot, varied = _varied(stack, case.variant, robot, case.seed)
+                robot, varied = _vary(stack, case.variant, robot, case.seed)
                 more |= varied
             return run_job(job_at(robot, domain_id=robot.domain_id, **more)), ""
     except (NotInstalledError, CertificateError) as error:
         return None, str(error)
 
 
-def _varied(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: int) -> tuple[Robot, dict[str, object]]:
+def _vary(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: int) -> tuple[Robot, dict[str, object]]:
     """Put a variant (proxy, TLS, link) in front of a device; return its new addresses and the job's additional options.
 
     Raises:
@@ -195,7 +195,7 @@ def _varied(stack: contextlib.ExitStack, variant: Variant, robot: Robot, seed: i
         raise NotInstalledError(f"{variant.host} cannot be listened on: {error}") from error
     stack.callback(proxy.close)
     if variant.link is not None:
-        addresses = stack.enter_context(linked(variant.link, seed, *proxy.listens.values()))
+        addresses = stack.enter_context(link_to(variant.link, seed, *proxy.listens.values()))
         proxy.seen_at(
             **{side: f"http://{host}:{port}" for side, (host, port) in zip(proxy.listens, addresses, strict=True)}
         )

@@ -77,10 +77,10 @@ def disagreements(contract: Contract) -> list[str]:
     for id_, checks in checks_by_requirement(contract).items():
         if id_ not in known and id_ not in generic_ledger():
             problems.append(f"{checks[0]} judges {id_!r}, which the ledger does not have")
-    return list(dict.fromkeys([*problems, *_misnamed(mutants, known)]))
+    return list(dict.fromkeys([*problems, *_naming_faults(mutants, known)]))
 
 
-def _misnamed(mutants: Iterable[Mutant], known: Iterable[str]) -> Iterable[str]:
+def _naming_faults(mutants: Iterable[Mutant], known: Iterable[str]) -> Iterable[str]:
     names = [mutant.name for mutant in mutants]
     for mutant in mutants:
         for id_ in set(mutant.catches) - set(known):
@@ -118,12 +118,12 @@ def page(contract: Contract) -> str:
                 item.origin,
                 f"{item.text} If not: {item.breaks}" if item.breaks else item.text,
                 item.source,
-                _listed(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
-                _listed(binding.mutants),
+                _as_list(binding.checks) or (f"untestable: {item.untestable}" if item.untestable else ""),
+                _as_list(binding.mutants),
             )
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join([*lines, *page_part(contract)]) + "\n"
 
 
-def _listed(names: tuple[str, ...]) -> str:
+def _as_list(names: tuple[str, ...]) -> str:
     return "<br>".join(f"`{name}`" for name in names)

@@ -88,7 +88,7 @@ class Direction:
 
 
 @contextlib.contextmanager
-def linked(link: Link, seed: int, *targets: Address) -> Iterator[list[Address]]:
+def link_to(link: Link, seed: int, *targets: Address) -> Iterator[list[Address]]:
     """Relay connections to each target over the link until the context ends; yield the relay's addresses in order.
 
     Raises:
@@ -132,7 +132,7 @@ class _Relay:
         await asyncio.gather(*(server.serve_forever() for server in servers))
 
     async def _listen(self, target: Address) -> asyncio.Server:
-        async def accepted(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async def on_accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             # The loop itself holds tasks weakly: one in which both ways wait for the outage to end would be collected.
             task = asyncio.current_task()
             self._under_way.add(task)
@@ -141,7 +141,7 @@ class _Relay:
             finally:
                 self._under_way.discard(task)
 
-        return await asyncio.start_server(accepted, "127.0.0.1", 0)
+        return await asyncio.start_server(on_accept, "127.0.0.1", 0)
 
     async def _relay(self, target: Address, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         now = asyncio.get_running_loop().time()

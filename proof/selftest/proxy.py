@@ -180,7 +180,7 @@ class Proxy:
                     self.requests += 1
                     nth += 1
                     item.nth, item.beside = nth, beside
-                    response = self._changed(item, forward)
+                    response = self._change(item, forward)
                     last = last or item.is_last or response.is_last
                     client.respond(response, last=last and item is together[-1])
                 if last:
@@ -206,7 +206,7 @@ class Proxy:
                 self.incomplete_request(side, incomplete.octets, forward)
             return None
 
-    def _changed(self, request: Request, forward: Forward) -> Response:
+    def _change(self, request: Request, forward: Forward) -> Response:
         try:
             return self.change(request, forward)
         except (OSError, IncompleteMessageError, HangUpError):

@@ -6,7 +6,7 @@ from typing import Any
 
 from conformance.commandline.out_folder import write_atomically, write_json
 from conformance.contract.pack import DEFAULT_PACK, Contract
-from conformance.verdict.finding import counted
+from conformance.verdict.finding import count_of
 from proof.selftest.comparison import Comparison
 from proof.selftest.controls import ControlResult
 from proof.selftest.generated import report
@@ -178,7 +178,7 @@ class Report:
             requirements = {id_ for result in self.tried for id_ in result.mutant.catches if id_ not in result.survived}
             lines.append(
                 f"{tried - missed} of {tried} mutants killed ({100 * (tried - missed) / tried:.1f} %), "
-                f"by {counted(len(requirements), 'requirement')}"
+                f"by {count_of(len(requirements), 'requirement')}"
             )
         not_tried = [result for result in self.mutant_results if result.not_tried]
         if not_tried:
@@ -215,6 +215,6 @@ class Report:
             ours |= {result.mutant.name for result in self.generated_results if result.outcome == KILLED}
             lines.append(
                 f"Of {len(other.results)} mutants of REST, {other.tool} killed {len(other.killed)}, this suite "
-                f"{len(ours & other.tried)}; of the good device it reports {counted(len(other.good), 'finding')}"
+                f"{len(ours & other.tried)}; of the good device it reports {count_of(len(other.good), 'finding')}"
             )
         return "\n".join([*lines, *self.notes])

@@ -100,7 +100,7 @@ def running(contract: Contract, device: GoodDevice, domain_id: int = 0, seed: in
     check_available(contract, device)
     with contextlib.ExitStack() as stack:
         own = stack.enter_context(own_domain(domain_id)) if device.on_ros else None
-        process = stack.enter_context(_started(device.command(Start(own or 0, seed))))
+        process = stack.enter_context(_start(device.command(Start(own or 0, seed))))
         rest, soap = _ready(process, device.name)
         wsdls = self_test_of(contract).wsdls(soap) if soap else ("", "")
         yield Robot(contract.directory, device, rest, *wsdls, domain_id=own)
@@ -131,18 +131,18 @@ def own_domain(first: int) -> Iterator[int]:
 
 
 @contextlib.contextmanager
-def _started(command: list[str]) -> Iterator[subprocess.Popen[str]]:
+def _start(command: list[str]) -> Iterator[subprocess.Popen[str]]:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     # The command is the pack's.
     process = subprocess.Popen(  # noqa: S603
         command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment
     )
-    with process, stopped(process):
+    with process, stop_after(process):
         yield process
 
 
 @contextlib.contextmanager
-def stopped(process: subprocess.Popen[Any]) -> Iterator[None]:
+def stop_after(process: subprocess.Popen[Any]) -> Iterator[None]:
     """Stop a process when the context ends; kill it when it does not stop."""
     try:
         yield

@@ -83,7 +83,7 @@ def _slow(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-def _prefixed(request: Request, forward: Forward) -> Response:
+def _add_prefix(request: Request, forward: Forward) -> Response:
     """Add the path prefix to the server URL in the OpenAPI description."""
     response = forward(request)
     if request.side == "rest" and request.path.endswith("/openapi.json"):
@@ -103,7 +103,7 @@ def _closing(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _guarded(name: str, value: str, scheme: str) -> Callable[[], Change]:
+def _require_field(name: str, value: str, scheme: str) -> Callable[[], Change]:
     """Return a change that responds 401 to every request without a header of this value (RFC 9110 15.5.2)."""
 
     def change(request: Request, forward: Forward) -> Response:
@@ -149,25 +149,25 @@ def _uptime(request: Request, forward: Forward) -> Response:
 VARIANTS = (
     *(Variant(link.name, link.says, link=link) for link in LINKS),
     Variant("slow", "every response takes 300 ms more", lambda: _slow),
-    Variant("prefix", f"everything is under {_PREFIX}", lambda: _prefixed, prefix=_PREFIX),
+    Variant("prefix", f"everything is under {_PREFIX}", lambda: _add_prefix, prefix=_PREFIX),
     Variant("close", "HTTP/1.0, and every connection is closed", lambda: _closing),
     Variant("tls", "HTTPS with a certificate of the robot's own", tls=True),
     Variant(
         "token",
         "a bearer token is required",
-        _guarded("Authorization", f"Bearer {_SECRET}", "Bearer"),
+        _require_field("Authorization", f"Bearer {_SECRET}", "Bearer"),
         secrets={"token_file": _SECRET},
     ),
     Variant(
         "basic",
         "a user's name and password are required",
-        _guarded("Authorization", f"Basic {base64.b64encode(_BASIC.encode()).decode()}", "Basic"),
+        _require_field("Authorization", f"Basic {base64.b64encode(_BASIC.encode()).decode()}", "Basic"),
         secrets={"basic_file": _BASIC},
     ),
     Variant(
         "api-key",
         "an API key is required",
-        _guarded("X-Api-Key", _SECRET, "ApiKey"),
+        _require_field("X-Api-Key", _SECRET, "ApiKey"),
         secrets={"api_key_file": _SECRET},
         endpoints={"api_key": "header X-Api-Key"},
     ),

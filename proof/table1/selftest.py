@@ -21,7 +21,7 @@ from proof.mutation.self_test import (
     OpenPlace,
     SelfTest,
     Start,
-    built,
+    build,
     check_installed,
     program,
 )
@@ -147,7 +147,7 @@ def _in_javascript(_: Start) -> list[str]:
 
 
 def _in_go(_: Start) -> list[str]:
-    return [str(built(*sorted((_ROBOTS / "golang").glob("*.go")))), str(CONTRACT_DIR)]
+    return [str(build(*sorted((_ROBOTS / "golang").glob("*.go")))), str(CONTRACT_DIR)]
 
 
 def _statement(name: str) -> Path:
@@ -214,7 +214,7 @@ class _Behind:
         del self._known[request.body]
 
 
-def _extended(request: Request, forward: Forward) -> Response:
+def _extend(request: Request, forward: Forward) -> Response:
     """Add a method of the vendor's own at the pose, and ignore the status in a goal that is put back."""
     if _OWN(request):
         return plain(204)(request)
@@ -279,7 +279,7 @@ SELFTEST = SelfTest(
     variants=(
         HarmlessChange("behind", "SOAP is a message or two behind REST", _Behind),
         HarmlessChange(
-            "extended", "POST at the pose is the vendor's own; a goal's status may be sent", lambda: _extended
+            "extended", "POST at the pose is the vendor's own; a goal's status may be sent", lambda: _extend
         ),
         HarmlessChange("full-queue", "every twentieth delivery is put off for a second by 503 or 429", _FullQueue),
     ),

@@ -101,7 +101,7 @@ class Base:
         now = time.monotonic()
         seconds = min((now - self._moved_at) * self._time_scale, _LONGEST_STEP_S)
         self._moved_at = now
-        command = self._commands.arrived(now)
+        command = self._commands.take_arrived(now)
         if command is not None:
             self._commanded_at, self._setpoint = command
         if now - self._commanded_at > HOLD_S:
@@ -113,7 +113,7 @@ class Base:
             self._report(after)
             return
         self.motion = self._realism.slipped(before, after)
-        self._belief = self._realism.believed(self._belief, before, after, self.motion, seconds)
+        self._belief = self._realism.estimate(self._belief, before, after, self.motion, seconds)
         period = 1 / (self._realism.character.odometry_hz * self._time_scale)
         if now - self._reported_at >= period:
             self._reported_at = max(self._reported_at + period, now - period)
@@ -121,7 +121,7 @@ class Base:
 
     def _report(self, motion: Motion) -> None:
         stamp = divmod(self._clock.now().nanoseconds, _NANOSECONDS)
-        self._publisher.publish(self._odometry.filled(stamp, motion))
+        self._publisher.publish(self._odometry.fill(stamp, motion))
         self._frames.publish(stamp, motion)
 
 
@@ -135,7 +135,7 @@ class SerializedOdometry:
         self._twist_at = len(self._data) - _COVARIANCE - self._twist.size
         self._pose_at = self._twist_at - _COVARIANCE - self._pose.size
 
-    def filled(self, stamp: tuple[int, int], motion: Motion) -> bytes:
+    def fill(self, stamp: tuple[int, int], motion: Motion) -> bytes:
         """Return the serialized message with a stamp (seconds, nanoseconds) and a motion filled in."""
         data, half = self._data, motion.yaw / 2
         self._stamp.pack_into(data, _STAMP_AT, *stamp)

@@ -109,7 +109,7 @@ class Delivery:
         mission = self._missions.add(request, divmod(time.time_ns(), 1_000_000_000))
         if mission.state is MissionState.QUEUED and self._begin_later.is_canceled():
             self._begin()
-        self._changed()
+        self._report_changes()
 
     def _note_goals(self) -> None:
         """Process a status report of the navigation's goals, including those of other clients."""
@@ -123,7 +123,7 @@ class Delivery:
         # were cancelled before any request, even if a request was read before that report.
         if canceled and self._knows_goals and self._missions.active is None:
             self._missions.abandon()
-            self._changed()
+            self._report_changes()
         self._knows_goals = True
         if self._goals.losses != self._losses:
             self._losses = self._goals.losses
@@ -147,13 +147,13 @@ class Delivery:
             (x, y, math.atan2(y - from_y, x - from_x))
             for (from_x, from_y), (x, y) in itertools.pairwise((stops[-1], *stops))
         ]
-        self._changed()
+        self._report_changes()
         self._next_leg()
 
     def _next_leg(self) -> None:
         if not self._legs:
             self._missions.finish(MissionState.DONE)
-            self._changed()
+            self._report_changes()
             self._begin()
             return
         header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frames.map)
@@ -184,17 +184,17 @@ class Delivery:
             self._fail(f"the navigation gave up a leg: {outcome.result.error_msg or outcome.result.error_code}")
         else:
             self._missions.abandon()
-            self._changed()
+            self._report_changes()
 
     def _fail(self, reason: str) -> None:
         """End the active mission as failed, and begin the next one after a pause."""
         self._leg = ""
         self._missions.finish(MissionState.FAILED, reason)
-        self._changed()
+        self._report_changes()
         # After a pause, so that a queue of impossible missions does not keep the planner busy.
         self._begin_later.reset()
 
-    def _changed(self) -> None:
+    def _report_changes(self) -> None:
         """Publish the missions that changed, at most 20 times a second."""
         if time.monotonic() - self._reported_at >= _REPORT_PERIOD_S:
             self._report()

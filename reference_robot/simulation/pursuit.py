@@ -61,17 +61,17 @@ class Pursuit:
             self._turned_at = float(goal_x), float(goal_y)
             arrived = abs(error) < self._straight
             turn = 3.0 * error + math.copysign(0.1, error)
-            return self._turned(0.0 if arrived else turn, off, (x, y, yaw), arrived=arrived)
+            return self._turn(0.0 if arrived else turn, off, (x, y, yaw), arrived=arrived)
         target_x, target_y, remaining = self._target(x, y)
         course = wrap(math.atan2(target_y - y, target_x - x) - yaw)
         if abs(course) > _TURN_ON_SPOT:
-            return self._turned(3.0 * course, remaining, (x, y, yaw))
+            return self._turn(3.0 * course, remaining, (x, y, yaw))
         self._turned_at = None
         # Slower near the goal, so that the robot stops there, and off the course, so that it cuts no corners.
         linear = min(self._kinematics.cruise, 2.5 * off + 0.05) * math.cos(course) ** 4
         return Command(linear, within(3.0 * course, self._kinematics.turn), remaining, arrived=False)
 
-    def _turned(
+    def _turn(
         self, angular: float, remaining: float, pose: tuple[float, float, float], *, arrived: bool = False
     ) -> Command:
         """Return the velocity that turns the robot where it is."""

@@ -68,7 +68,7 @@ class Realism:
         stays = self.character.slip
         return replace(after, x=after.x - stays * (after.x - before.x), y=after.y - stays * (after.y - before.y))
 
-    def believed(self, belief: Motion, before: Motion, after: Motion, body: Motion, seconds: float) -> Motion:
+    def estimate(self, belief: Motion, before: Motion, after: Motion, body: Motion, seconds: float) -> Motion:
         """Return the motion that the robot estimates after one step, from encoders, gyroscope and localisation.
 
         Args:
@@ -114,7 +114,7 @@ class Delayed:
             arrives = max(arrives, self._underway[-1][0])
         self._underway.append((arrives, command))
 
-    def arrived(self, now: float) -> tuple[float, tuple[float, ...]] | None:
+    def take_arrived(self, now: float) -> tuple[float, tuple[float, ...]] | None:
         """Remove all commands that have arrived by ``now``; return the newest with its arrival time, or None."""
         newest = None
         while self._underway and self._underway[0][0] <= now:

@@ -78,13 +78,13 @@ class Patrol:
             return
         self._begin.cancel()
         pose = stamped_pose(next(self._places), Header(frame_id=self._frame))
-        self._navigate.send_goal_async(NavigateToPose.Goal(pose=pose)).add_done_callback(self._accepted)
+        self._navigate.send_goal_async(NavigateToPose.Goal(pose=pose)).add_done_callback(self._on_accepted)
 
-    def _accepted(self, sent: Any) -> None:
+    def _on_accepted(self, sent: Any) -> None:
         handle = sent.result()
         if handle is not None and handle.accepted:
-            handle.get_result_async().add_done_callback(self._ended)
+            handle.get_result_async().add_done_callback(self._on_end)
 
-    def _ended(self, result: Any) -> None:
+    def _on_end(self, result: Any) -> None:
         if result.result().status == GoalStatus.STATUS_SUCCEEDED:
             self._begin.reset()

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from reports.attestation.envelope import ENVELOPE_NAME
-from reports.attestation.outcomes import named
+from reports.attestation.outcomes import first_names
 from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Statement
 from reports.errors import ResultUnreadableError, ResultUnsignableError
 
@@ -57,7 +57,7 @@ def digests_in(directory: Path, *, described: bool) -> dict[str, str]:
     return found
 
 
-def compared(statement: Statement, directory: Path, statement_name: str | None) -> Iterator[Compared]:
+def compare(statement: Statement, directory: Path, statement_name: str | None) -> Iterator[Compared]:
     """Compare the signed files that are in a folder with their digests, and yield one comparison for each.
 
     Args:
@@ -86,10 +86,10 @@ def remarks_on(statement: Statement, directory: Path, statement_name: str | None
     there = frozenset(_names_in(directory))
     files = [subject.name for subject in statement.subject if not subject.name.startswith(_NO_FILES)]
     if missing := [name for name in files if name not in there]:
-        yield f"Signed, but not in {directory}: {named(missing)}. They were not compared."
+        yield f"Signed, but not in {directory}: {first_names(missing)}. They were not compared."
     added = sorted(there - _places(statement, statement_name).keys() - {ENVELOPE_NAME})
     if added:
-        yield f"In {directory}, but not signed: {named(added)}. Nothing is proved about them."
+        yield f"In {directory}, but not signed: {first_names(added)}. Nothing is proved about them."
 
 
 def _places(statement: Statement, statement_name: str | None) -> dict[str, str]:

@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 from reports.attestation.outcomes import (
     TESTED,
-    demanded,
+    demanded_entries,
     departures,
+    first_names,
     musts_of,
-    named,
     outcomes_of,
     statement_contradictions,
 )
 from reports.attestation.policy import OWN, Known, Policy
-from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Run, Statement, passed, seed_of
+from reports.attestation.statement import CONTRACT_SUBJECT, STATEMENT_SUBJECT, Run, Statement, passed_classes, seed_of
 
 SKEW = dt.timedelta(minutes=5)
 """How far the vendor's clock may be ahead of ours."""
@@ -80,7 +80,7 @@ def _verdict(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
         " or ".join(policy.verdicts),
         "ask the vendor for a run without failures and with every claimed class tested, or accept other verdicts",
     )
-    yield _classes(run, _required(policy, known), known)
+    yield _classes(run, _required_classes(policy, known), known)
     accepted = f": {', '.join(run.accepted)}" if run.accepted else ""
     used = run.baseline is not None or bool(run.accepted) or run.accepted_until is not None
     yield Point(
@@ -94,13 +94,13 @@ def _verdict(run: Run, policy: Policy, known: Known) -> Iterator[Point]:
     yield Point("interrupted", not run.interrupted, text, "a complete run", "ask the vendor to certify again")
 
 
-def _required(policy: Policy, known: Known) -> tuple[str, ...]:
+def _required_classes(policy: Policy, known: Known) -> tuple[str, ...]:
     return known.profiles.get(policy.profile, ()) if policy.classes is None else policy.classes
 
 
 def _classes(run: Run, wanted: tuple[str, ...], known: Known) -> Point:
     """Return the check that each required class was claimed, tested and passed, in these words."""
-    there = passed(run)
+    there = passed_classes(run)
     unclaimed = [name for name in wanted if run.classes.get(name, "not-claimed") == "not-claimed"]
     text, remedies = [f"{', '.join(there) or 'none'} passed"], []
     if unclaimed:
@@ -115,12 +115,12 @@ def _classes(run: Run, wanted: tuple[str, ...], known: Known) -> Point:
         musts = musts_of(run, known.ledger, (name,))
         if verdict == "inconclusive":
             untested = [id_ for id_, value in musts.items() if value not in TESTED]
-            first = f", such as {named(untested)}" if untested else ""
+            first = f", such as {first_names(untested)}" if untested else ""
             text.append(f"claimed, but not tested in full: {name}{first}")
             remedies.append(f"certify {name} again with what its tests need (certificate.html names it)")
         elif verdict == "fail":
             failed = [id_ for id_, value in musts.items() if value == "fail"]
-            first = f" ({named(failed)})" if failed else ""
+            first = f" ({first_names(failed)})" if failed else ""
             text.append(f"tested, and failed: {name}{first}")
             remedies.append(f"the robot has to meet {name} first")
         else:
@@ -156,7 +156,9 @@ def _suite(statement: Statement, policy: Policy, known: Known) -> Iterator[Point
     other = sorted(name for name in signed.keys() | own.keys() if signed.get(name) != own.get(name))
     same = run.suite.digest == known.suite
     text = (
-        f"not the files of the installed contract: {named(other)}" if other else "the files of the installed contract"
+        f"not the files of the installed contract: {first_names(other)}"
+        if other
+        else "the files of the installed contract"
     )
     yield Point(
         "contract",
@@ -190,7 +192,7 @@ def _requirements(statement: Statement, policy: Policy, known: Known) -> Iterato
         problems.append("the certificate does not list its requirements: a former version of RoAAS signed it")
     elif is_known or same:
         problems += departures(run, known.ledger, name, same=same)
-        count = len(demanded(run, known.ledger, name, same=same))
+        count = len(demanded_entries(run, known.ledger, name, same=same))
     else:
         problems.append("not known: the installed suite has no such ledger")
     there = sum(1 for _ in outcomes_of(run))
@@ -204,7 +206,7 @@ def _requirements(statement: Statement, policy: Policy, known: Known) -> Iterato
         "do not rely on the certificate; ask the vendor for one that `roaas certify --sign` made, or that `roaas sign` "
         "of this version made from the result",
     )
-    musts = musts_of(run, known.ledger, _required(policy, known))
+    musts = musts_of(run, known.ledger, _required_classes(policy, known))
     tested = sum(verdict in TESTED for verdict in musts.values())
     yield Point(
         "tested",
@@ -224,7 +226,7 @@ def _extent(run: Run, policy: Policy) -> Iterator[Point]:
     yield Point(
         "motion", run.motion_allowed or not policy.motion, moved, "a robot that may move", f"{remedy} (--allow-motion)"
     )
-    black_box = [name for name in passed(run) if run.views.get(name) == "black box"]
+    black_box = [name for name in passed_classes(run) if run.views.get(name) == "black box"]
     text = f"ROS topics not observed: {', '.join(black_box)}" if black_box else "observed where a passed class uses it"
     yield Point(
         "ros",
@@ -259,7 +261,7 @@ def _extent(run: Run, policy: Policy) -> Iterator[Point]:
     struck = extent.left_out is not None
     text = f"--minutes {extent.left_out:g} ended it before everything was tried" if struck else "nothing left out"
     yield Point("left_out", not struck, text, "a run that no time limit cut short", f"{remedy} without --minutes")
-    text = f"the suite could not judge {named(extent.suite_errors)}" if extent.suite_errors else "none"
+    text = f"the suite could not judge {first_names(extent.suite_errors)}" if extent.suite_errors else "none"
     yield Point(
         "suite_errors", not extent.suite_errors, text, "no error of the suite", f"{remedy} with a newer version"
     )
@@ -267,11 +269,11 @@ def _extent(run: Run, policy: Policy) -> Iterator[Point]:
 
 def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
     demanded_age = f"at most {policy.max_age_days:g} days old, in UTC, and not in the future"
-    if run.ended is None:
+    if run.ended_at is None:
         text, met = f"{run.finished[:40]!r} is not a time in UTC", False
     else:
-        age = now - run.ended
-        text = f"the run ended on {run.ended:%Y-%m-%d %H:%M} UTC"
+        age = now - run.ended_at
+        text = f"the run ended on {run.ended_at:%Y-%m-%d %H:%M} UTC"
         text += f", {age.days} days ago" if age.days > 0 else ""
         met = -SKEW <= age <= dt.timedelta(days=policy.max_age_days)
     yield Point("max_age_days", met, text, demanded_age, "ask the vendor to certify again")

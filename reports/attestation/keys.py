@@ -71,7 +71,7 @@ def signer_of(path: Path) -> CryptoSigner:
         ) from error
     if not isinstance(key, Ed25519PrivateKey):
         raise KeyUnusableError(f"{path}: not an Ed25519 key; `roaas keygen` makes one")
-    return CryptoSigner(key, _named(key.public_key()))
+    return CryptoSigner(key, _with_key_id(key.public_key()))
 
 
 def public_key(path: Path) -> SSlibKey:
@@ -91,7 +91,7 @@ def public_key(path: Path) -> SSlibKey:
         raise KeyUnusableError(f"{path}: more than one key; give a file with the one key that you trust")
     if _is_weak(key):
         raise KeyUnusableError(f"{path}: a weak key, for which anybody can sign; do not trust it")
-    return _named(key)
+    return _with_key_id(key)
 
 
 def _is_weak(key: Ed25519PublicKey) -> bool:
@@ -110,7 +110,7 @@ def fingerprint(key: Ed25519PublicKey) -> str:
     return hashlib.sha256(key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)).hexdigest()
 
 
-def _named(key: Ed25519PublicKey) -> SSlibKey:
+def _with_key_id(key: Ed25519PublicKey) -> SSlibKey:
     return SSlibKey.from_crypto(key, keyid=fingerprint(key))
 
 

@@ -15,7 +15,7 @@ from reports.attestation.statement import (
     Extent,
     Run,
     Statement,
-    passed,
+    passed_classes,
     property_name,
     seed_of,
 )
@@ -60,7 +60,7 @@ def outcomes_of(run: Run) -> Iterator[tuple[str, str, str]]:
                 yield id_, level, verdict
 
 
-def named(names: Collection[str]) -> str:
+def first_names(names: Collection[str]) -> str:
     """Return up to three names in words, and how many there are beside."""
     first = ", ".join(list(names)[:_NAMED])
     return first if len(names) <= _NAMED else f"{first} and {len(names) - _NAMED} more"
@@ -78,7 +78,7 @@ def contradictions(run: Run) -> list[str]:
     ]
     twice = [id_ for id_, count in Counter(one[0] for one in listed).items() if count > 1]
     if twice:
-        found.append(f"{named(twice)} is listed more than once")
+        found.append(f"{first_names(twice)} is listed more than once")
     counts = Counter(verdict for _, _, verdict in listed)
     if run.outcomes and counts != Counter(run.requirements):
         said, there = (dict(sorted(item.items())) for item in (run.requirements, counts))
@@ -88,7 +88,7 @@ def contradictions(run: Run) -> list[str]:
         if level == "MUST" and verdict == "fail" and run.classes.get(name) == "pass":
             found.append(f"class {name} passed, although {id_} failed")
     if unlisted := sorted({*run.accepted, *run.intermittent} - verdicts.keys()):
-        found.append(f"{named(unlisted)} is accepted or intermittent, but not listed")
+        found.append(f"{first_names(unlisted)} is accepted or intermittent, but not listed")
     claimed = {name for name, verdict in run.classes.items() if verdict != "not-claimed"}
     if run.verdict == "conformant" and ({run.classes[name] for name in claimed} != {"pass"}):
         found.append("the run is conformant, although not all claimed classes passed")
@@ -100,18 +100,18 @@ def contradictions(run: Run) -> list[str]:
 def _beyond(run: Run, extent: Extent, claimed: set[str]) -> Iterator[str]:
     """Yield findings of a run on things that it did not test, in words."""
     if unclaimed := sorted(claimed - {*extent.claims}):
-        yield f"{named(unclaimed)} has a verdict, but was not claimed"
+        yield f"{first_names(unclaimed)} has a verdict, but was not claimed"
     if not extent.requests and any(verdict == "pass" for _, _, verdict in outcomes_of(run)):
         yield "requirements passed, although no request was sent"
     if run.verdict == "conformant" and extent.suite_errors:
-        yield f"the run is conformant, although the suite could not judge {named(extent.suite_errors)}"
+        yield f"the run is conformant, although the suite could not judge {first_names(extent.suite_errors)}"
 
 
 def statement_contradictions(statement: Statement) -> list[str]:
     """Return contradictions in a signed statement, in words; empty if there are none."""
     predicate, run = statement.predicate, statement.predicate.roaas
     found = contradictions(run)
-    if sorted(predicate.properties) != sorted(PROPERTY + property_name(name) for name in passed(run)):
+    if sorted(predicate.properties) != sorted(PROPERTY + property_name(name) for name in passed_classes(run)):
         found.append("its properties are not the classes that passed")
     if predicate.verifier.id != f"urn:roaas:suite:{run.suite.version}:{run.suite.digest}":
         found.append("its verifier is not the suite that it names")
@@ -122,11 +122,11 @@ def statement_contradictions(statement: Statement) -> list[str]:
         found.append("its policies are not the files of the contract")
     names = [subject.name for subject in statement.subject]
     if twice := [name for name, count in Counter(names).items() if count > 1]:
-        found.append(f"it has two digests of {named(twice)}")
+        found.append(f"it has two digests of {first_names(twice)}")
     return found
 
 
-def demanded(run: Run, ledger: Mapping[str, Entry], set_: str, *, same: bool) -> dict[str, Entry]:
+def demanded_entries(run: Run, ledger: Mapping[str, Entry], set_: str, *, same: bool) -> dict[str, Entry]:
     """Return the requirements that a run must list, by id: all of the same suite's ledger, or those of a frozen set."""
     return {
         id_: entry
@@ -146,12 +146,12 @@ def departures(run: Run, ledger: Mapping[str, Entry], set_: str, *, same: bool) 
     """
     present = {alias: id_ for id_, entry in ledger.items() for alias in (id_, *entry.aliases)} if not same else {}
     there = {present.get(id_, id_): (level, verdict) for id_, level, verdict in outcomes_of(run)}
-    wanted = demanded(run, ledger, set_, same=same)
+    wanted = demanded_entries(run, ledger, set_, same=same)
     found = []
     if missing := [id_ for id_ in wanted if id_ not in there]:
-        found.append(f"{len(missing)} of {len(wanted)} requirements are not listed: {named(missing)}")
+        found.append(f"{len(missing)} of {len(wanted)} requirements are not listed: {first_names(missing)}")
     if same and (unknown := [id_ for id_ in there if id_ not in ledger]):
-        found.append(f"the suite has no requirement {named(unknown)}")
+        found.append(f"the suite has no requirement {first_names(unknown)}")
     for id_, entry in wanted.items():
         level, verdict = there.get(id_, (entry.level, "pass"))
         if level != entry.level:
@@ -161,7 +161,7 @@ def departures(run: Run, ledger: Mapping[str, Entry], set_: str, *, same: bool) 
         if ended and entry.level == "MUST" and (verdict == "fail" or (counts and verdict not in _KEPT)):
             found.append(f"class {ended[0]} passed, although the MUST {id_} ended with {verdict!r}")
     if same and (unbound := sorted(run.classes.keys() - {name for one in ledger.values() for name in one.classes})):
-        found.append(f"the suite has no class {named(unbound)}")
+        found.append(f"the suite has no class {first_names(unbound)}")
     return found
 
 

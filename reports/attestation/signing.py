@@ -12,7 +12,7 @@ from securesystemslib.signer import Signer
 from reports.attestation.envelope import strict_json
 from reports.attestation.files import DESCRIPTION, RECORDED, digests_in
 from reports.attestation.keys import signer_of
-from reports.attestation.outcomes import Entry, contradictions, departures, named
+from reports.attestation.outcomes import Entry, contradictions, departures, first_names
 from reports.attestation.policy import Known
 from reports.attestation.statement import PAYLOAD_TYPE, Statement, run_of, sha256, statement_of
 from reports.errors import ResultUnsignableError
@@ -51,7 +51,7 @@ class Notary:
         Raises:
             ResultUnsignableError: it is not, for example because somebody edited it.
         """
-        problems = [*_edited(octets, result), *_disagreeing(result), *_replaced(path.parent, result)]
+        problems = [*_edit_notes(octets, result), *_disagreeing(result), *_replaced_files(path.parent, result)]
         known = msgspec.convert(self._known(), Known)
         run = run_of(result)
         problems += contradictions(run)
@@ -87,14 +87,14 @@ class Notary:
         )
 
 
-def _edited(octets: bytes, result: Mapping[str, Any]) -> list[str]:
+def _edit_notes(octets: bytes, result: Mapping[str, Any]) -> list[str]:
     try:
         return [] if strict_json(octets) == result else ["the file changed while it was read"]
     except ValueError as error:
         return [f"{error}"]
 
 
-def _replaced(directory: Path, result: Mapping[str, Any]) -> list[str]:
+def _replaced_files(directory: Path, result: Mapping[str, Any]) -> list[str]:
     """Return the files of the description in a result's folder that are not those that the device was judged by."""
     judged = {
         f"{DESCRIPTION}/{name}": digest.removeprefix("sha256:")
@@ -102,7 +102,7 @@ def _replaced(directory: Path, result: Mapping[str, Any]) -> list[str]:
     }
     there = digests_in(directory, described="api" in result)
     other = [name for name, digest in there.items() if name not in RECORDED and judged.get(name) != digest]
-    return [f"the device was not judged by these files: {named(other)}"] if other else []
+    return [f"the device was not judged by these files: {first_names(other)}"] if other else []
 
 
 def _unlike(result: Mapping[str, Any], ledger: Mapping[str, Entry]) -> list[str]:

@@ -136,7 +136,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return "description" in self.classes if self.extent is None else self.extent.operations is not None
 
     @property
-    def ended(self) -> dt.datetime | None:
+    def ended_at(self) -> dt.datetime | None:
         """Return `finished` as a datetime, or None if the text is not a time in UTC."""
         try:
             moment = dt.datetime.fromisoformat(self.finished)
@@ -192,11 +192,11 @@ def statement_of(result: Mapping[str, Any], octets: bytes, files: Mapping[str, s
         subjects.append(_subject(STATEMENT_SUBJECT, digests["statement"]))
     run = run_of(result)
     verifier = Verifier(f"urn:roaas:suite:{run.suite.version}:{run.suite.digest}", contract)
-    predicate = Predicate(verifier, run.finished, [PROPERTY + property_name(name) for name in passed(run)], run)
+    predicate = Predicate(verifier, run.finished, [PROPERTY + property_name(name) for name in passed_classes(run)], run)
     return Statement(STATEMENT_TYPE, [*subjects, *contract], PREDICATE_TYPE, predicate)
 
 
-def passed(run: Run) -> list[str]:
+def passed_classes(run: Run) -> list[str]:
     """Return the names of the classes that passed without a failure that the baseline file accepts."""
     accepted = {id_.partition("/")[0] for id_ in run.accepted}
     return [name for name, verdict in run.classes.items() if verdict == "pass" and name not in accepted]

@@ -14,7 +14,7 @@ from securesystemslib.exceptions import VerificationError
 from securesystemslib.signer import Key, Signature
 
 from reports.attestation.envelope import open_envelope, statement_in, strict_json
-from reports.attestation.files import compared, remarks_on
+from reports.attestation.files import compare, remarks_on
 from reports.attestation.judging import Point, judge
 from reports.attestation.policy import Known, Policy
 from reports.attestation.statement import PAYLOAD_TYPE, RESULT_SUBJECT, Statement, run_of
@@ -75,7 +75,7 @@ def verify(
         return Verification(statement, tuple(points))
     result = _result_in(directory)
     name = _statement_name(result)
-    points += (_file(*one) for one in compared(statement, directory, name))
+    points += (_file(*one) for one in compare(statement, directory, name))
     points.append(_agreement(statement, result))
     return Verification(statement, tuple(points), tuple(remarks_on(statement, directory, name)))
 

@@ -137,7 +137,7 @@ def _is_declared(code: str, declared: list[str]) -> bool:
     return not {code, f"{code[:1]}XX", f"{code[:1]}xx", "default"}.isdisjoint(declared)
 
 
-def described(result: Mapping[str, Any]) -> Described | None:
+def description_of(result: Mapping[str, Any]) -> Described | None:
     """Return what a result tells of the device's own description; None if it was judged by a contract.
 
     An operation has the findings that name it, and those of the web server whose request is a call of it.

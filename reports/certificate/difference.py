@@ -113,12 +113,12 @@ class Difference:
     @property
     def is_explained(self) -> bool:
         """Return whether something is known to have changed between the runs."""
-        return any(_changed(self.old, self.new))
+        return any(_changes(self.old, self.new))
 
     @property
     def origin(self) -> str:
         """Return in a sentence what changed between the runs: suite, statement, motion map, description or device."""
-        changed = list(_changed(self.old, self.new))
+        changed = list(_changes(self.old, self.new))
         if not changed:
             return (
                 "Suite, statement, motion map and description are the same in both runs. A changed verdict comes from "
@@ -150,7 +150,7 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     ]
     order = list(Kind)
     changes.sort(key=lambda change: (order.index(change.kind), change.id))
-    still = sum(_failed(item) and id_ in now and _failed(now[id_]) for id_, item in before.items())
+    still = sum(_has_failed(item) and id_ in now and _has_failed(now[id_]) for id_, item in before.items())
     return Difference(old, new, tuple(changes), tuple(_circumstances(old, new)), still)
 
 
@@ -198,33 +198,33 @@ def _kinds(old: Requirement | None, new: Requirement | None) -> Iterator[Kind]:
 
 def _course(old: Requirement, new: Requirement) -> Iterator[Kind]:
     """Yield the kinds of change that follow from a requirement's old and new verdict."""
-    if old["verdict"] == "not-claimed" and _judged(new):
+    if old["verdict"] == "not-claimed" and _is_judged(new):
         yield Kind.FIRST_JUDGED
-    elif _failed(new):
+    elif _has_failed(new):
         if "expected_failure" in new:
             if "expected_failure" not in old:
                 yield Kind.ACCEPTED
-        elif not _failed(old):
+        elif not _has_failed(old):
             yield Kind.NEW_WARNING if new["verdict"] == "warn" else Kind.NEW_FAILURE
         elif "expected_failure" in old and new["verdict"] == "fail":
             yield Kind.NEW_FAILURE
-    elif _failed(old):
-        yield Kind.FIXED if _judged(new) else Kind.OUT_OF_SIGHT
-    elif _judged(old) and not _judged(new):
+    elif _has_failed(old):
+        yield Kind.FIXED if _is_judged(new) else Kind.OUT_OF_SIGHT
+    elif _is_judged(old) and not _is_judged(new):
         yield Kind.LOST
-    elif _judged(new) and not _judged(old):
+    elif _is_judged(new) and not _is_judged(old):
         yield Kind.FIRST_JUDGED
 
 
-def _failed(item: Requirement) -> bool:
+def _has_failed(item: Requirement) -> bool:
     return item["verdict"] in {"fail", "warn"}
 
 
-def _judged(item: Requirement) -> bool:
+def _is_judged(item: Requirement) -> bool:
     return item["verdict"] in {"pass", "fail", "warn"}
 
 
-def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+def _changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     """Yield what differs of what judges and what is judged, with the versions if they differ."""
     files = "the description" if "api" in new else "the contract"
     for name, version, digest in (

@@ -126,12 +126,13 @@ def changes_text(found: DescriptionChanges) -> str:
     for heading, changes in found.groups:
         lines += ["", f"{heading} ({len(changes)}):"]
         lines += [
-            f"  {on_a_line(_named(operations), 400)}: {on_a_line(text, 400)}" for text, operations in changes.items()
+            f"  {on_a_line(_first_names(operations), 400)}: {on_a_line(text, 400)}"
+            for text, operations in changes.items()
         ]
     return "\n".join(lines)
 
 
-def _named(operations: list[str]) -> str:
+def _first_names(operations: list[str]) -> str:
     more = f" and {len(operations) - _OPERATIONS_NAMED} more" if len(operations) > _OPERATIONS_NAMED else ""
     return ", ".join(operations[:_OPERATIONS_NAMED]) + more
 

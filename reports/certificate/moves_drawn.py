@@ -132,7 +132,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     is_drive = "wanted" in move
     wanted = [(x_of(command["sent"]), command["targets"]) for command in commands if _ok(command)]
     lines = []
-    for name in _shown(readings, move.get("wanted")):
+    for name in _drawn_axes(readings, move.get("wanted")):
         key = "speeds" if name in readings[0].get("speeds", {}) else "values"
         seen = [
             ((reading["sent"] + reading["received"]) / 2, reading[key][name])
@@ -152,7 +152,7 @@ def _picture(move: Mapping[str, Any], named: Iterable[str], ranges: Mapping[str,
     )
 
 
-def _shown(readings: Sequence[Mapping[str, Any]], velocities: Mapping[str, float] | None) -> list[str]:
+def _drawn_axes(readings: Sequence[Mapping[str, Any]], velocities: Mapping[str, float] | None) -> list[str]:
     """Return what is drawn: of a drive its velocities, and positions too where one of them is told by its axis."""
     told = _axes(readings, "speeds") if velocities is not None else []
     others = [axis for axis in _axes(readings, "values") if axis not in told]

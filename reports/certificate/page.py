@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import segno
 from markupsafe import Markup
 
-from reports.certificate.described import WORDS, Described, described
+from reports.certificate.described import WORDS, Described, description_of
 from reports.certificate.moves_drawn import Picture
 from reports.certificate.states_shown import Grid
 from reports.findings import FOLDED, QUESTIONS, Finding, by_cause, by_requirement, by_topic, findings
@@ -179,7 +179,7 @@ class Certificate:
     @property
     def described(self) -> Described | None:
         """Return the operations of a device that is judged by its own description, otherwise None."""
-        return described(self.result)
+        return description_of(self.result)
 
     @property
     def robot(self) -> str:
@@ -289,7 +289,7 @@ class Certificate:
 def certificate(result: Mapping[str, Any]) -> Certificate:
     """Return a valid `roaas-result/1` document as a `Certificate`, the object that the page templates use."""
     classes = tuple(sorted(_classes(result), key=lambda c: _CLASS_ORDER.index(c.verdict)))
-    return Certificate(result, classes, tuple(_untested(classes)))
+    return Certificate(result, classes, tuple(_untested_groups(classes)))
 
 
 def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
@@ -309,7 +309,7 @@ def _classes(result: Mapping[str, Any]) -> Iterator[ClassSummary]:
         )
 
 
-def _untested(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
+def _untested_groups(classes: tuple[ClassSummary, ...]) -> Iterator[Untested]:
     groups: dict[tuple[str, int | None], list[Mapping[str, Any]]] = {}
     told: set[str] = set()
     for summary in classes:
@@ -345,7 +345,7 @@ def certificate_print(result: Mapping[str, Any], seal: Seal) -> str:
 
 def verdict_words(result: Mapping[str, Any]) -> dict[str, str]:
     """Return the words for each verdict in a result."""
-    return {**VERDICT_WORDS, **WORDS, "not-claimed": "Not judged"} if described(result) else VERDICT_WORDS
+    return {**VERDICT_WORDS, **WORDS, "not-claimed": "Not judged"} if description_of(result) else VERDICT_WORDS
 
 
 def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -355,7 +355,7 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         "result": result,
         "sections": result.get("contract_sections", {}),
         "words": verdict_words(result),
-        "described": described(result),
+        "described": description_of(result),
         "views": VIEWS,
         "by_cause": by_cause,
         "by_topic": by_topic,
@@ -364,7 +364,7 @@ def page_values(result: Mapping[str, Any]) -> dict[str, Any]:
         "by_requirement": by_requirement,
         "findings": findings,
         # The matrix of operations links to each finding.
-        "shown_failures": ALL_FAILURES if described(result) else SHOWN_FAILURES,
+        "shown_failures": ALL_FAILURES if description_of(result) else SHOWN_FAILURES,
         "shown_body": SHOWN_BODY,
         "shown_curl": SHOWN_CURL,
         "shown_ids": SHOWN_IDS,

@@ -147,7 +147,7 @@ def diff(door: FrontDoor, old: str, new: str, out: Path | None, *, allow_files: 
             pages = {"diff.html": difference_html(found, names), "diff.md": difference_markdown(found, names)}
             text = difference_text(found)
         click.echo(text)
-    described = _described(old), _described(new)
+    described = _description_at(old), _description_at(new)
     if described[0] and described[1]:
         changed = description_changes(door.description_changes(*described, allow_files=allow_files))
         worse |= bool(changed.breaking)
@@ -174,7 +174,7 @@ def _is_result(path: Path) -> bool:
     return not isinstance(document, dict) or not {"openapi", "swagger"} & document.keys()
 
 
-def _described(source: str) -> str:
+def _description_at(source: str) -> str:
     """Return the description that an argument is, or that is beside the result; empty if there is none."""
     if _is_description(source):
         return source

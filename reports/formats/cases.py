@@ -223,7 +223,7 @@ def places_of(result: Mapping[str, Any], case: Case) -> list[Place]:
     return list(_places(result, case))
 
 
-def _described(lines: Mapping[str, int], case: Case) -> int | None:
+def _line_of(lines: Mapping[str, int], case: Case) -> int | None:
     """Return the line of the first operation of the case's findings, in the description; None if it is not there."""
     for finding in case.findings:
         named = [item["operation"] for item in finding.failure.get("operations", ())]
@@ -237,12 +237,12 @@ def _places(result: Mapping[str, Any], case: Case) -> Iterator[Place]:
     known = result.get("places", {})
     statement, ledger = known.get("statement"), known.get("ledger")
     described = known.get("description")
-    if described and (line := _described(described["lines"], case)):
+    if described and (line := _line_of(described["lines"], case)):
         yield Place(described["file"], line)
     if statement:
         yield Place(statement["file"], statement["classes"].get(case.class_name, statement["line"]))
     stated = [item for item in (ledger, known.get("generic_ledger")) if item and case.name in item["lines"]]
     if stated:
         yield Place(stated[0]["file"], stated[0]["lines"][case.name])
-    elif not (statement or (described and _described(described["lines"], case))):
+    elif not (statement or (described and _line_of(described["lines"], case))):
         yield Place(ledger["file"] if ledger else _UNKNOWN, 1)

@@ -143,7 +143,7 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
         for change in _changes(old_series[key], new_series[key], noise, threshold)
     ]
     together = sum(change.interval is not None for change in drafts)
-    changes = tuple(_settled(change, together, threshold) for change in drafts)
+    changes = tuple(_settle(change, together, threshold) for change in drafts)
     return Comparison(old, new, old_series, new_series, changes, tuple(_remarks(old, new, old_series, new_series)))
 
 
@@ -201,7 +201,7 @@ def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], thres
             yield Change(operation, interface, client, time, quantile, before, after, ratio, interval, limit)
 
 
-def _settled(change: Change, together: int, asked: float) -> Change:
+def _settle(change: Change, together: int, asked: float) -> Change:
     """Widen a change's interval so that `together` intervals hold simultaneously, and set its verdict.
 
     `asked` is the threshold that the user gave.
@@ -295,20 +295,20 @@ def _remarks(
         alone = [f"{one.name} ({one.data['client']})" for key, one in series.items() if key not in other]
         if alone:
             yield f"Only in the {word} result: {', '.join(alone)}."
-    before, after = (_failed(series) for series in (old_series, new_series))
+    before, after = (_failed_share(series) for series in (old_series, new_series))
     if after > before:
         yield f"More requests failed: {after:.2%} now, {before:.2%} before."
-    yield from _uncounted(old_series, new_series)
+    yield from _uncounted_notes(old_series, new_series)
     yield from _knees(old, new)
 
 
-def _uncounted(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
+def _uncounted_notes(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
     for word, series in (("old", old_series), ("new", new_series)):
         if any(one.data["errors"] and "counted" not in one.data for one in series.values()):
             yield f"The {word} result is of an earlier version: its times do not include failed requests."
 
 
-def _failed(series: AllSeries) -> float:
+def _failed_share(series: AllSeries) -> float:
     failed = sum(int(one.data["errors"]) for one in series.values())
     return failed / max(1, failed + sum(int(one.data["count"]) for one in series.values()))
 

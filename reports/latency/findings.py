@@ -58,13 +58,13 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
     return [
         *work(series),
         *cold(series),
-        *repeated(series),
+        *repeat_text(series),
         *_further(result),
-        *_stalled(result),
+        *_stall_text(result),
         *_two_modes(series),
-        *_searched(result),
-        *_failed(result, series),
-        *_noted(result),
+        *_knee_text(result),
+        *_failure_text(result, series),
+        *_note_text(result),
     ]
 
 
@@ -79,7 +79,7 @@ def _further(result: Mapping[str, Any]) -> Iterator[str]:
             )
 
 
-def _stalled(result: Mapping[str, Any]) -> Iterator[str]:
+def _stall_text(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield one sentence on all stalls and the longest; overlapping stalls of several series count as one."""
     moments: list[list[Stall]] = []
     for stall in sorted(stalls(result), key=lambda stall: stall.start_s):
@@ -119,7 +119,7 @@ def _two_modes(series: AllSeries) -> Iterator[str]:
         yield f"Requests over five times the median: {', '.join(far)}."
 
 
-def _searched(result: Mapping[str, Any]) -> Iterator[str]:
+def _knee_text(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield a sentence on the knee (highest sustainable rate) of each interface that was searched by bisection."""
     for knee in result.get("knee_search", []):
         name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
@@ -137,7 +137,7 @@ def _searched(result: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
+def _failure_text(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
     errors = sum(one.data["errors"] for one in series.values())
     if not errors and not result.get("errors"):
         return
@@ -150,7 +150,7 @@ def _failed(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
     yield f"{counted(errors, 'request')} of {errors + answered:,} failed; {told}."
 
 
-def _noted(result: Mapping[str, Any]) -> Iterator[str]:
+def _note_text(result: Mapping[str, Any]) -> Iterator[str]:
     """Yield the notes stored in the result as sentences, with a capital letter and a period."""
     yield from (f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note)
 
@@ -195,7 +195,7 @@ def _behind(spacing_s: float) -> str:
     return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
-def repeated(series: AllSeries) -> Iterator[str]:
+def repeat_text(series: AllSeries) -> Iterator[str]:
     """Yield a remark for each series with repeats, on the range of their medians.
 
     It also says how many of the repeats' intervals do not contain the overall median.

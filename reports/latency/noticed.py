@@ -17,7 +17,7 @@ _BEYOND = {"p99": "1 of 100", "p95": "1 of 20", "p90": "1 of 10"}
 _MOST = 6
 
 
-def noticed(result: Mapping[str, Any]) -> list[str]:
+def sentences(result: Mapping[str, Any]) -> list[str]:
     """Return sentences for each series of the leading client, the slowest first, and what else limits them."""
     own = [item for item in result["series"] if item["client"] == "wire"] or result["series"]
     told = [item for item in own if item["count"] and item["response_ms"]["p50"] is not None]

@@ -12,7 +12,7 @@ from reports.latency.figures.ratios import SPANS, Ratio, means, ratios, spans
 from reports.latency.figures.spectrum import spectrum
 from reports.latency.figures.timeline import blocks, heat, timeline
 from reports.latency.findings import PAPER, remarks, verdict
-from reports.latency.noticed import noticed
+from reports.latency.noticed import sentences
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
 from reports.pages.page import html_page, markdown_page
 
@@ -71,7 +71,7 @@ def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
         "result": result,
         "series": list(series.values()),
         "verdict": verdict(result, series),
-        "noticed": noticed(result),
+        "noticed": sentences(result),
         "remarks": remarks(result, series),
         "paper": paper_rows(result, series),
         "reasons": _missing(series),

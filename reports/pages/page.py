@@ -86,7 +86,7 @@ def suite_version() -> str:
 def _environment(*, html: bool) -> Environment:
     environment = Environment(
         loader=FileSystemLoader(TEMPLATE_DIR),
-        bytecode_cache=_compiled(),
+        bytecode_cache=_template_cache(),
         autoescape=html,  # noqa: S701 - off for Markdown alone, where HTML entities would be shown as such
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -108,7 +108,7 @@ def _environment(*, html: bool) -> Environment:
     return environment
 
 
-def _compiled() -> FileSystemBytecodeCache | None:
+def _template_cache() -> FileSystemBytecodeCache | None:
     """Return Jinja's folder for compiled templates, which is the user's own, or None where there is none."""
     try:
         return FileSystemBytecodeCache()

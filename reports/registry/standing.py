@@ -15,7 +15,7 @@ import msgspec
 
 from reports.attestation.judging import SKEW, Point, judge
 from reports.attestation.policy import Known, Policy
-from reports.attestation.statement import Run, passed, sha256
+from reports.attestation.statement import Run, passed_classes, sha256
 from reports.certificate.difference import Difference, difference
 from reports.registry.entries import Certificate
 
@@ -70,7 +70,7 @@ class Standing:
     @property
     def trusted(self) -> list[str]:
         """Return the classes that passed without an accepted failure; empty if the certificate does not count."""
-        return passed(self.certificate.run) if self.stands else []
+        return passed_classes(self.certificate.run) if self.stands else []
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def histories(
     found = []
     for (name, _), group in sorted(by_robot.items()):
         judged = judged_by(name)
-        latest_first = sorted(group, key=lambda one: (_past(one.run.ended, now), one.digest), reverse=True)
+        latest_first = sorted(group, key=lambda one: (_past(one.run.ended_at, now), one.digest), reverse=True)
         found.append(History(tuple(_standing(one, *judged, now, first=not at) for at, one in enumerate(latest_first))))
     return found
 
@@ -143,12 +143,12 @@ def _standing(certificate: Certificate, policy: Policy, known: Known, now: dt.da
         certificate,
         (*_own(certificate, first=first), *(_word(point, certificate, now) for point in counted)),
         tuple(f"{_word(point, certificate, now)}: {point.found}" for point in counted),
-        _after(certificate.run.ended, policy.max_age_days),
+        _after(certificate.run.ended_at, policy.max_age_days),
     )
 
 
 def _word(point: Point, certificate: Certificate, now: dt.datetime) -> str:
-    ended = certificate.run.ended
+    ended = certificate.run.ended_at
     if point.name != "max_age_days" or (ended is not None and ended <= now):
         return _WORDS[point.name]
     return "not dated in UTC" if ended is None else "dated in the future"

@@ -13,13 +13,13 @@ import msgspec
 from click.testing import CliRunner, Result
 from securesystemslib.dsse import Envelope
 
-from conformance.engine.suite import known, suite_version
+from conformance.engine.suite import suite_facts, suite_version
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, signer_of
 from reports.attestation.statement import PAYLOAD_TYPE, sha256, statement_of
 from roaas import main
 
 _EXAMPLE = Path(__file__).parents[1] / "reports" / "data" / "result-example.json"
-COUNT = len(known()["ledger"])
+COUNT = len(suite_facts()["ledger"])
 """Number of requirements of the installed suite's default contract."""
 Changing = Callable[[dict[str, Any]], object]
 
@@ -27,7 +27,7 @@ Changing = Callable[[dict[str, Any]], object]
 @cache
 def _conformant() -> dict[str, Any]:
     result: dict[str, Any] = json.loads(_EXAMPLE.read_text(encoding="utf-8"))
-    suite, pattern = known(), result["requirements"][0]
+    suite, pattern = suite_facts(), result["requirements"][0]
     del result["causes"]
     classes = suite["profiles"]["full"]
     result |= {

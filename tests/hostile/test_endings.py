@@ -21,7 +21,7 @@ from small_device import REFUSED, answers, described, error, reading, small_devi
 
 import conformance.api.rest.guard
 from conformance.contract.pack import Contract
-from conformance.engine.resending import written
+from conformance.engine.resending import as_json
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
 from proof.selftest.variants import certificate
@@ -374,7 +374,7 @@ def test_a_replay_that_is_killed_leaves_the_robot_at_rest(tmp_path):
     with small_device(described({}), {"/robot/velocity/": {"PUT": drive}, "/robot/pose/": {"GET": drive}}) as url:
         body = json.dumps({"linear": still | {"x": 0.3}, "angular": still}).encode()
         put = Request("PUT", f"{url}/robot/velocity/", (("Content-Type", "application/json"),), body)
-        sequence = written([Sent(0.0, put), Sent(9.0, Request("GET", f"{url}/robot/pose/", ()))])  # killed in the pause
+        sequence = as_json([Sent(0.0, put), Sent(9.0, Request("GET", f"{url}/robot/pose/", ()))])  # killed in the pause
         response = {"status": 500, "headers": {}, "body": None}
         found = {"number": 1, "message": "500", "response": response, "sequence": sequence}
         document = {

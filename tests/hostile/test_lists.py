@@ -6,7 +6,7 @@ import pytest
 from aiohttp import web
 from small_device import answers, certified, described, small_device
 
-from conformance.api.rest.listing import identity_of, listed, members_of, page_of
+from conformance.api.rest.listing import identity_of, items_of, members_of, page_of
 from conformance.transport.exchange import Response
 
 _DEEP: dict[str, object] = {"items": []}
@@ -39,7 +39,7 @@ _ITEM = {"properties": {"id": {}, "state": {"enum": ["on", "off", 1]}, "size": {
 def test_any_json_is_read_as_a_list_or_as_none(name):
     body = json.dumps(LISTS[name]).encode()
     page = page_of(Response(200, (("Content-Type", "application/json"), ("X-Total-Count", "²")), body, 1.0))
-    assert (page is None) == (listed(json.loads(body)) is None)
+    assert (page is None) == (items_of(json.loads(body)) is None)
     assert page is None or (len(page.identities) == len(page.items) and all(map(identity_of, page.items)))
     assert page is None or all(isinstance(members_of(one), dict) for one in page.items)
 

@@ -16,7 +16,7 @@ from processes import ended
 from schemathesis.specs.openapi.examples import get_strategies_from_examples
 from soap_devices import CAMERA, CAMERA_XSD
 
-from conformance.api.rest.generated import _loaded
+from conformance.api.rest.generated import _load_schema
 from conformance.commandline.secret_file import read_secret
 from conformance.documents.description import DescriptionError
 from conformance.documents.json_shape import shape_of
@@ -455,11 +455,11 @@ def test_what_generates_requests_and_what_judges_responses_fetch_nothing(elsewhe
     taken = {"content": {"application/json": {"schema": schema, "examples": examples}}}
     answers = {"default": {"description": "", "content": {"application/json": {"schema": {"$ref": elsewhere.url}}}}}
     paths = {"/a": {"post": {"requestBody": taken, "responses": answers}}}
-    for one in _loaded({**openapi(), "paths": paths}).get_all_operations():
+    for one in _load_schema({**openapi(), "paths": paths}).get_all_operations():
         get_strategies_from_examples(one.ok())
     number = {"name": "n", "in": "query", "schema": {"$schema": f"{elsewhere.url}/four", "type": "integer"}}
     paths = {"/a": {"get": {"parameters": [number], "responses": answers}}}
-    for one in _loaded({"$schema": f"{elsewhere.url}/five", **openapi(), "paths": paths}).get_all_operations():
+    for one in _load_schema({"$schema": f"{elsewhere.url}/five", **openapi(), "paths": paths}).get_all_operations():
         find(one.ok().as_strategy(), lambda _: True, settings=settings(database=None))
     with pytest.raises(Exception, match="Retrieval is disabled"):
         shape_of({"anyOf": [{"$ref": f"{elsewhere.url}/three"}]}).problem(1)

@@ -23,7 +23,7 @@ from processes import ended
 
 from conformance.contract.pack import DEFAULT_PACK, Contract
 from conformance.engine.permission import moves
-from conformance.engine.resending import written
+from conformance.engine.resending import as_json
 from conformance.statement.statement import StatementError, load_statement
 from conformance.transport import raw
 from conformance.transport.exchange import Request
@@ -242,7 +242,7 @@ ACTING = {
 
 
 def _failure(url, *, method="GET", path="/a", headers=(), body=b"", raw=None):
-    sequence = written([Sent(0.0, Request(method, f"{url}{path}", headers, body, raw))])
+    sequence = as_json([Sent(0.0, Request(method, f"{url}{path}", headers, body, raw))])
     return {"message": "m", "number": 1, "response": {"status": 500, "headers": {}, "body": ""}, "sequence": sequence}
 
 

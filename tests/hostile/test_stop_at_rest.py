@@ -108,6 +108,6 @@ def test_a_refused_stop_is_told_if_the_run_has_moved_the_device(belt, tmp_path):
     assert moves == belt.may_move
     assert run.stop_undelivered.startswith(f"{UNDELIVERED}: POST /stop got status" if moves else "")
     assert bool(run.stop_undelivered) == moves
-    value = overall({"http": (ClassValue.PASS, "")}, enough=run.decided)
+    value = overall({"http": (ClassValue.PASS, "")}, enough=run.is_decided)
     assert value is (Overall.INCONCLUSIVE if moves else Overall.CONFORMANT)
     assert (UNDELIVERED in verdict_line(run, value, ())) == moves

@@ -8,7 +8,7 @@ from lxml import etree
 from toy_api import LOGIN, TOKEN
 
 from reports.formats.ci_systems import latency_junit
-from reports.latency.noticed import noticed
+from reports.latency.noticed import sentences
 from reports.latency.page import latency_html, latency_markdown
 
 SHORT = "--rate 200 --duration 1 --warmup 0.1"
@@ -67,7 +67,7 @@ def test_operations_with_weights_values_and_service_levels(device, load, tmp_pat
     assert not result["trustworthy"] or "1 of 4 service levels broken" in latency_html(result)
     suite = etree.fromstring(latency_junit(result).encode())
     assert (suite.get("tests"), suite.get("failures")) == ("5", "1")
-    told = noticed(result | {"trustworthy": True})
+    told = sentences(result | {"trustworthy": True})
     assert any("requests failed: at this load, one every" in line for line in told)
 
 

@@ -22,7 +22,7 @@ def reads(api: RestInterface, most: int = _READS) -> list[Call]:
     Those that the survey found to answer 2xx come first, of these the ones that never took a second. A response that
     does not end is none that two can share.
     """
-    found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allowed(api, item)]
+    found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allows(api, item)]
     if own := _wsdl_path(api):
         return [Call(Operation("the WSDL", "GET", own), {})]
     ranked = sorted(
@@ -68,7 +68,7 @@ def _with(call: Call, names: list[str], text: str) -> Call:
     return call
 
 
-def answered(api: RestInterface, *ids: str, most: int = _READS) -> list[Call]:
+def working_reads(api: RestInterface, *ids: str, most: int = _READS) -> list[Call]:
     """Send each of reads(), at most so many, and return those with status 200: a robot may lack an extension.
 
     What can be deleted is left out if there is anything else: a robot's own goal may end between two requests. If there
@@ -82,7 +82,7 @@ def answered(api: RestInterface, *ids: str, most: int = _READS) -> list[Call]:
     return found
 
 
-def allowed(api: RestInterface, operation: Operation) -> bool:
+def allows(api: RestInterface, operation: Operation) -> bool:
     """Return whether the operation may be sent in this run."""
     return api.call_rules.decide(operation).may
 
@@ -92,14 +92,14 @@ def callable_operations(api: RestInterface) -> dict[tuple[str, str], Operation]:
     found = (
         operation
         for operation in operations_of(api.run.contract)
-        if allowed(api, operation) and operation.label not in api.streams
+        if allows(api, operation) and operation.label not in api.streams
     )
     return {(operation.method, operation.template.rstrip("/")): operation for operation in found}
 
 
 def usable_operations(api: RestInterface, wanted: Callable[[Operation], bool]) -> list[Operation]:
     """Return the operations that ``wanted`` selects and this run may send; for a slow robot, a few of them."""
-    usable = [item for item in operations_of(api.run.contract) if wanted(item) and allowed(api, item)]
+    usable = [item for item in operations_of(api.run.contract) if wanted(item) and allows(api, item)]
     return api.run.effort.subsample(usable, 2)
 
 
@@ -109,11 +109,11 @@ def record_unusable(api: RestInterface, ids: Sequence[str], wanted: Callable[[Op
     Without such operations in the contract, the requirements do not apply; without permission, they are not tested.
     """
     found = [item for item in operations_of(api.run.contract) if wanted(item)]
-    for id_ in ids if not any(allowed(api, item) for item in found) else ():
+    for id_ in ids if not any(allows(api, item) for item in found) else ():
         if found:
             api.run.judge.skip(id_, NO_MOTION)
         else:
-            api.run.judge.unclaimed(id_, f"the contract has no operation that {what}")
+            api.run.judge.note_unclaimed(id_, f"the contract has no operation that {what}")
 
 
 def applicable_operations(

@@ -134,14 +134,14 @@ def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
         if item.where in {"path", "query"} and (item.required or item.examples):
             given[item.name] = item.examples[0] if item.examples else sample(item.schema)
     if given:
-        given = _fitted(api, operation, given)
+        given = _fit(api, operation, given)
     by_name = {item.name: item for item in operation.parameters if item.where in {"path", "query"}}
     call = Call(operation, {name: value_text(by_name[name], value) for name, value in given.items()})
     if media_type not in operation.bodies:
         return call
     body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
     plain = [item for item in body.examples if not isinstance(item, str)]
-    value = _fitted(api, operation, plain[0] if plain else sample(body.schema))
+    value = _fit(api, operation, plain[0] if plain else sample(body.schema))
     if is_made(media_type):
         octets = file_of(media_type)
     elif media_type == XML:
@@ -156,6 +156,6 @@ def root_name(schema: Schema) -> str:
     return str(schema.get("xml", {}).get("name", ""))
 
 
-def _fitted(api: RestInterface, operation: Operation, value: Any) -> Any:
+def _fit(api: RestInterface, operation: Operation, value: Any) -> Any:
     """Return a value adapted to this robot: within its limits, near its position."""
     return api.device.fit(api, operation.id, value)

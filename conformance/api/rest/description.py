@@ -136,7 +136,7 @@ class KeptExchanges(Listener):
         self._api = api
         self._lengths: set[tuple[str, int, int]] = set()
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Keep an exchange if it is of another length than those before."""
         request, answer = exchange.request, exchange.response
         if not answer.ok or request.raw is not None or request.method in {"HEAD", "OPTIONS"}:
@@ -172,7 +172,7 @@ def contradiction(api: RestInterface, theirs: Described, context: RequestContext
         said = validity_by(own, path, query, request.media_type, request.body)
         if said.verdict == INVALID:
             return f"a request that the description forbids: {said.why}"
-    schema = (own.declared(answer.status) or {}).get(answer.media_type)
+    schema = (own.schemas_for(answer.status) or {}).get(answer.media_type)
     text = read_json(answer.body) if schema and is_json(answer.media_type) else None
     try:
         problem = shape_of(schema).problem(text.value) if schema and text and not text.problem else ""

@@ -51,7 +51,7 @@ class Driven(Listener):
 
     def sends(self, method: str, url: str) -> None:
         """Note the values in a request that is sent now."""
-        self.moves += self._may_move(method, self._called(method, url))
+        self.moves += self._may_move(method, self._operation_of(method, url))
         self._note(method, url, b"", taken=False)
 
     @staticmethod
@@ -60,14 +60,14 @@ class Driven(Listener):
             return method not in SAFE_METHODS
         return operation.motion or (method not in SAFE_METHODS and not (operation.stop or operation.reads))
 
-    def _called(self, method: str, url: str) -> Operation | None:
+    def _operation_of(self, method: str, url: str) -> Operation | None:
         path = url.removeprefix(self._base_url).partition("?")[0]
         return matching(self._contract, method, path) if url.startswith(self._base_url) else None
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Keep the values of a request, or forget them if the device refused it."""
         request = exchange.request
-        called = self._called(request.method, request.url)
+        called = self._operation_of(request.method, request.url)
         if called is not None and called.stop and exchange.response.ok and self._stops_all:
             self.moves = self.refused = 0
         elif exchange.response.status in _REFUSED and self.moves and self._may_move(request.method, called):
@@ -76,7 +76,7 @@ class Driven(Listener):
         if exchange.response.status not in _REFUSED:
             self._note(request.method, request.url, request.body, taken=True)
             return
-        for name, value in self._named(request.method, request.url, request.body):
+        for name, value in self._ids_in(request.method, request.url, request.body):
             if self._values[name].get(value) is False:
                 del self._values[name][value]
             refused = self._refused[name]
@@ -86,13 +86,13 @@ class Driven(Listener):
                 del refused[next(iter(refused))]
 
     def _note(self, method: str, url: str, body: bytes, *, taken: bool) -> None:
-        for name, value in self._named(method, url, body):
+        for name, value in self._ids_in(method, url, body):
             known = self._values[name]
             known[value] = known.pop(value, False) or taken
             if len(known) > _MOST:
                 del known[next((one for one, is_taken in known.items() if not is_taken), next(iter(known)))]
 
-    def _named(self, method: str, url: str, body: bytes) -> Iterator[tuple[str, Any]]:
+    def _ids_in(self, method: str, url: str, body: bytes) -> Iterator[tuple[str, Any]]:
         """Yield name and value of each id in a request that a stop also takes; nothing for a stop itself."""
         if not self._names or method in SAFE_METHODS or not url.startswith(self._base_url):
             return

@@ -57,7 +57,7 @@ def take_snapshots(api: RestInterface, calls: Iterable[Call]) -> dict[str, tuple
     return {id_: (steady(flatten(one) for one in exchanges), exchanges[-1]) for id_, exchanges in taken.items()}
 
 
-def changed(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
+def deltas(before: Snapshot, after: Snapshot) -> dict[str, tuple[Any, Any]]:
     """Return the values that changed, with old and new; missing places count only where the status is the same."""
     if before.get("status") != after.get("status"):
         return {"status": (before.get("status"), after.get("status"))} if "status" in before else {}

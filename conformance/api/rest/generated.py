@@ -70,7 +70,7 @@ class Target:
             feedback=NO_FEEDBACK,
         )
 
-    def fuzzed(self, *, negative: bool) -> SearchStrategy[Any]:
+    def strategy(self, *, negative: bool) -> SearchStrategy[Any]:
         """Return a strategy for Schemathesis cases that fit the schemas, or violate them."""
         mode = GenerationMode.NEGATIVE if negative else GenerationMode.POSITIVE
         strategy: SearchStrategy[Any] = self.operation.as_strategy(generation_mode=mode)
@@ -88,7 +88,7 @@ def targets(contract: Contract, *, undeclared: bool = False) -> tuple[Target, ..
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        schema = _loaded(contract.openapi, undeclared=undeclared)
+        schema = _load_schema(contract.openapi, undeclared=undeclared)
         found = []
         for result in schema.get_all_operations():
             operation: Any = result.ok() if isinstance(result, Ok) else None
@@ -98,7 +98,7 @@ def targets(contract: Contract, *, undeclared: bool = False) -> tuple[Target, ..
         return tuple(found)
 
 
-def _loaded(document: dict[str, Any], *, undeclared: bool = False) -> Any:
+def _load_schema(document: dict[str, Any], *, undeclared: bool = False) -> Any:
     """Return the Schemathesis schema of a document without its credentials: the client adds those of the run.
 
     A case that left them out would be judged by a request that was sent with them.

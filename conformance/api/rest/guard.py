@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.stops import stop_once
-from conformance.transport.client import Draft, drafted
+from conformance.transport.client import Draft, draft_requests
 from conformance.transport.credentials import Kind
 from conformance.transport.exchange import SAFE_METHODS
 
@@ -98,7 +98,7 @@ class Guard:
 
     def _drafts(self) -> Iterable[Draft]:
         """Return the requests that stop the device, as the end of the run would send them now."""
-        with self._api.run.limit.lifted(), drafted() as drafts:
+        with self._api.run.limit.lift(), draft_requests() as drafts:
             stop_once(self._api)
         return drafts
 
@@ -131,11 +131,11 @@ class Guard:
         if connection.log_in is None or auth is None:
             return None
         if self._login is None:
-            with drafted() as drafts, contextlib.suppress(Exception):
+            with draft_requests() as drafts, contextlib.suppress(Exception):
                 connection.log_in()
             self._login = _told_of(drafts[-1]) if drafts else {}
         is_quoted = connection.credentials.items[-1].kind is Kind.QUERY
-        sent = connection.credentials.items[-1].sent
+        sent = connection.credentials.items[-1].as_sent
         return {**self._login, "token": auth.token, "sent": sent, "is_quoted": is_quoted} if self._login else None
 
 

@@ -44,7 +44,7 @@ _UNAUTHORIZED = 401
 
 
 @contextlib.contextmanager
-def _sent(request: dict[str, Any], contexts: Contexts, deadline_s: float) -> Iterator[socket.socket]:
+def _send(request: dict[str, Any], contexts: Contexts, deadline_s: float) -> Iterator[socket.socket]:
     """Send one request over a new connection, and return the response."""
     with socket.create_connection((request["host"], request["port"]), deadline_s) as link:
         tls = contexts.get(request["tls"])
@@ -67,7 +67,7 @@ def _response(stop: dict[str, Any], contexts: Contexts, deadline_s: float) -> tu
     end = b"\r\n\r\n" if stop.get("digest") else b"\n"
     came = b""
     try:
-        with _sent(stop, contexts, deadline_s) as link:
+        with _send(stop, contexts, deadline_s) as link:
             while end not in came and len(came) < _LONGEST_HEAD:
                 part = link.recv(_LONGEST_HEAD)
                 if not part:
@@ -106,7 +106,7 @@ def _log_in(told: dict[str, Any], contexts: Contexts) -> None:
 
     login = told["login"]
     try:
-        with _sent(login, contexts, told["deadline_s"]) as link, http.client.HTTPResponse(link) as response:
+        with _send(login, contexts, told["deadline_s"]) as link, http.client.HTTPResponse(link) as response:
             response.begin()
             token = json.loads(response.read(_LONGEST_LOGIN))
         for part in login["token"].split("/")[1:]:

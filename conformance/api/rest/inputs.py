@@ -69,7 +69,7 @@ class Inputs:
         return replace(self, **changed)
 
 
-def written(operation: Operation, inputs: Inputs) -> Outgoing:
+def request_of(operation: Operation, inputs: Inputs) -> Outgoing:
     """Return the request that carries the inputs (OpenAPI 3.1, 4.8.12.2: styles of parameters)."""
     path, query, headers = operation.template, [], [("Accept", inputs.accept)] if inputs.accept else []
     cookies = []
@@ -131,7 +131,7 @@ def body_verdict(operation: Operation, inputs: Inputs) -> str:
 
 
 def _verdict(operation: Operation, inputs: Inputs) -> str:
-    request = written(operation, inputs)
+    request = request_of(operation, inputs)
     path, _, query = request.target.partition("?")
     return validity_by(operation, path, query, request.content_type, request.body, request.headers).verdict
 
@@ -146,7 +146,7 @@ def usual_inputs(operation: Operation, values: Values) -> list[Inputs]:
     bodies: list[tuple[str, Any]] = []
     for name, body in list(operation.bodies.items())[:1] if operation.bodies else []:
         found = values.body(body.schema, body.examples, operation)
-        found = [values.unique.renewed(operation, value, body.schema) for value in found]
+        found = [values.unique.with_new_values(operation, value, body.schema) for value in found]
         bodies = [(name, _with_files(value, body, name)) for value in found]
     if bodies:
         base = replace(base, media_type=bodies[0][0], body=bodies[0][1])
@@ -174,18 +174,18 @@ def _type_of_part(name: str, part: Schema, body: Body) -> str:
     return (given or str(part.get("contentMediaType", ""))).partition(",")[0].partition(";")[0].strip()
 
 
-def renewed(operation: Operation, inputs: Inputs, values: Values, place: str = "") -> Inputs:
+def with_new_values(operation: Operation, inputs: Inputs, values: Values, place: str = "") -> Inputs:
     """Return the inputs of a creation with new unique values, except for the member at a place."""
     if operation.method != "POST" or inputs.media_type not in operation.bodies:
         return inputs
     schema, keep = operation.bodies[inputs.media_type].schema, place.removeprefix("body /")
-    return replace(inputs, body=values.unique.renewed(operation, inputs.body, schema, keep=keep))
+    return replace(inputs, body=values.unique.with_new_values(operation, inputs.body, schema, keep=keep))
 
 
 def whole_body(operation: Operation, values: Values) -> tuple[str, Any]:
     """Return the media type and a body with all optional members; an empty media type without a body."""
     for name, body in operation.bodies.items():
-        whole = values.filled(sample(body.schema, whole=True), body.schema, operation)
-        whole = values.unique.renewed(operation, whole, body.schema)
+        whole = values.fill(sample(body.schema, whole=True), body.schema, operation)
+        whole = values.unique.with_new_values(operation, whole, body.schema)
         return name, _with_files(whole, body, name)
     return "", NOTHING

@@ -20,8 +20,8 @@ from conformance.api.rest.variations import (
     Kind,
     Steps,
     Variation,
+    clip,
     place_of,
-    shown,
     with_member,
 )
 from conformance.documents.json_schema import Schema, kinds_of
@@ -82,7 +82,7 @@ def _invalid_parameters(operation: Operation, usual: Inputs) -> Iterator[Variati
         for value, why in _wrong_values(item.schema, usual.at(item.where).get(item.name)):
             if parameter_verdict(operation, item, value) == INVALID:
                 changed = usual.having(item.where, item.name, value)
-                says = f"{shown(value)} as {place}, {why}"
+                says = f"{clip(value)} as {place}, {why}"
                 yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
                 if item.where == "query" and why in _BEYOND:
                     beside = _beside(operation, changed)
@@ -119,7 +119,7 @@ def _invalid_part(usual: Inputs, value: Any, schema: Schema, here: Steps) -> Ite
     place = place_of(here)
     for wrong, why in _invalid_values(schema):
         body = with_member(usual.body, here, wrong)
-        says, changed = f"{shown(wrong)} as {place}, {why}", replace(usual, body=body)
+        says, changed = f"{clip(wrong)} as {place}, {why}", replace(usual, body=body)
         yield Variation(Kind.INVALID, says, place, changed, is_common=why in _COMMON)
     if len(here) <= DEPTH:
         yield from _invalid_parts(usual, value, schema, here)
@@ -213,7 +213,7 @@ def _invalid_fields(usual: Inputs, body: dict[str, Any], schema: Schema) -> Iter
             yield Variation(Kind.MISSING, f"no field {name}", place, replace(usual, body=less))
         for value, why in _wrong_values(part, body.get(name)):
             changed = replace(usual, body={**body, name: value})
-            yield Variation(Kind.INVALID, f"{shown(value)} as {place}, {why}", place, changed)
+            yield Variation(Kind.INVALID, f"{clip(value)} as {place}, {why}", place, changed)
 
 
 def _wrong_values(schema: Schema, usual: Any) -> Iterator[tuple[Any, str]]:
@@ -226,12 +226,12 @@ def _wrong_values(schema: Schema, usual: Any) -> Iterator[tuple[Any, str]]:
             yield {key: item for key, item in usual.items() if key != name}, f"without {name}"
         for name, part in merged.get("properties", {}).items():
             for value, why in _wrong_scalars(part):
-                yield {**usual, name: value}, f"whose {name} is {shown(value)}, {why}"
+                yield {**usual, name: value}, f"whose {name} is {clip(value)}, {why}"
     elif "array" in kinds:
         yield from ((value, why) for value, why in _beyond(merged) if isinstance(value, list))
         items = merged.get("items")
         for value, why in _wrong_scalars(items) if isinstance(items, dict) else ():
-            yield [value, *(usual[1:] if isinstance(usual, list) else ())], f"with {shown(value)}, {why}"
+            yield [value, *(usual[1:] if isinstance(usual, list) else ())], f"with {clip(value)}, {why}"
     yield from _wrong_scalars(schema)
 
 

@@ -14,7 +14,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined, path_of
-from conformance.verdict.finding import listed
+from conformance.verdict.finding import few_of
 
 # _NAMED: ids, paths and operations that a line of the summary names; the result has all. _ID: characters of an id.
 _NAMED: Final = 3
@@ -50,7 +50,7 @@ class LeftBehind:
         # A thing that is written again becomes the last one written.
         self._last.pop(operation.label, None)
         self._last[operation.label] = answer.status
-        made = self.made(operation, path, exchange)
+        made = self.created_path(operation, path, exchange)
         if operation.method == "DELETE":
             ours = [text for text in self._created if text == path or text.startswith(f"{path.rstrip('/')}/")]
             for text in ours:
@@ -69,7 +69,7 @@ class LeftBehind:
         elif exchange.response.ok and "?" not in exchange.request.url:
             self._read[path] = exchange.response.body
 
-    def made(self, operation: Operation, path: str, exchange: Exchange) -> str:
+    def created_path(self, operation: Operation, path: str, exchange: Exchange) -> str:
         """Return the path of the thing that a request created; empty if it created none, or one without a path."""
         answer = exchange.response
         location = answer.header("location") or ""
@@ -115,7 +115,7 @@ class LeftBehind:
             ),
         )
         return {
-            "lines": [f"{what}: {listed(found, _NAMED)}" for what, found in lines if found],
+            "lines": [f"{what}: {few_of(found, _NAMED)}" for what, found in lines if found],
             "created": [{"operation": label, "ids": ids} for label, ids in created.items()],
             "changed": [{"operation": label, "path": path} for path, label in changed.items()],
             "deleted": [{"operation": label, "ids": ids} for label, ids in deleted.items()],

@@ -15,7 +15,7 @@ from conformance.api.rest.samples import fits
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, is_xml
-from conformance.documents.parameter_reading import VALID, decoded_query, judged, pairs_of
+from conformance.documents.parameter_reading import VALID, decoded_query, judge_texts, pairs_of
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import UnreadableError, flat, read
 from conformance.transport.exchange import Exchange, Response
@@ -141,7 +141,7 @@ class Listing:
         return {name: text for name, text in found.items() if isinstance(text, str)}
 
     @cached_property
-    def known(self) -> frozenset[str]:
+    def known_names(self) -> frozenset[str]:
         """The names of all parameters whose part is known."""
         parts = (
             self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values(),
@@ -177,7 +177,7 @@ class Listing:
             return None
         return Sorting(plain_name(suffix[1]), suffix[2].lower() == "desc")
 
-    def sent(self, target: str) -> dict[str, str] | None:
+    def query_texts(self, target: str) -> dict[str, str] | None:
         """Return the query's texts by name; None if a parameter occurs twice, is invalid, or is not declared."""
         declared = {parameter.name: parameter for parameter in self.operation.parameter("query")}
         try:
@@ -187,7 +187,7 @@ class Listing:
             return None
         if len(texts) < len(pairs) or not texts.keys() <= declared.keys():
             return None
-        valid = all(judged(declared[name], [text], decoded_query) == VALID for name, text in pairs)
+        valid = all(judge_texts(declared[name], [text], decoded_query) == VALID for name, text in pairs)
         return texts if valid else None
 
     def most(self, sent: Mapping[str, str]) -> int:
@@ -197,7 +197,7 @@ class Listing:
         if self.limit.name in sent:
             return number_of(sent[self.limit.name])
         default = flat(self.limit.schema).get("default")
-        is_plain = sent.keys() <= self.known and (self.cursor is None or self.cursor.name not in sent)
+        is_plain = sent.keys() <= self.known_names and (self.cursor is None or self.cursor.name not in sent)
         return default if is_plain and isinstance(default, int) and not isinstance(default, bool) else 0
 
 
@@ -261,13 +261,13 @@ def identity_of(item: Any) -> str:
     return json.dumps(item if found is None else found, sort_keys=True)
 
 
-def listed(value: Any) -> list[Any] | None:
+def items_of(value: Any) -> list[Any] | None:
     """Return the items of a list: the body, or the only list in an envelope; None if there is no such list."""
-    found = _found(value, 0)
+    found = _find_list(value, 0)
     return None if found is None else found[1]
 
 
-def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
+def _find_list(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
     """Return the names on the way to a list, and the list."""
     if isinstance(value, list):
         return (), value
@@ -280,7 +280,9 @@ def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
         chosen = (usual or lists)[0]
         return (chosen,), value[chosen]
     inner = (
-        [(name, _found(one, depth + 1)) for name, one in named.items() if isinstance(one, dict)] if not lists else []
+        [(name, _find_list(one, depth + 1)) for name, one in named.items() if isinstance(one, dict)]
+        if not lists
+        else []
     )
     found = [(name, one) for name, one in inner if one is not None]
     usual = [one[0] for wrapper in _WRAPPERS for one in found if plain_name(one[0]) == wrapper]
@@ -293,7 +295,7 @@ def _found(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | None:
 def page_of(response: Response, operation: Operation | None = None) -> Page | None:
     """Return the list in a successful JSON response, or in an XML response by the operation's schema, or None."""
     value: Any = _value_of(response, operation) if response.ok and response.body and not response.cut else None
-    found = _found(value, 0)
+    found = _find_list(value, 0)
     if found is None:
         return None
     around, inner = [], value
@@ -321,7 +323,7 @@ def _value_of(response: Response, operation: Operation | None) -> Any:
     if is_json(response.media_type):
         text = read_json(response.body)
         return None if text.malformed else text.value
-    schema = (operation.declared(response.status) or {}).get(response.media_type) if operation is not None else None
+    schema = (operation.schemas_for(response.status) or {}).get(response.media_type) if operation is not None else None
     if schema is None or not is_xml(response.media_type):
         return None
     try:

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.calls import JSON, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import INVALID, VALID, Validity, validity
@@ -36,12 +36,12 @@ class MotionGuard:
         operation = said.operation
         if operation is None:
             return item if self._may_reach(item) else None
-        if not allowed(self._api, operation):
+        if not allows(self._api, operation):
             return None
         if not operation.motion:
             return item
         if said.verdict == VALID:
-            return self._fitted(item, operation)
+            return self._fit(item, operation)
         if not self._api.device.is_known:
             return item
         # A body without any rule is not sent to a robot; a body that the robot must refuse is sent with low numbers.
@@ -60,7 +60,7 @@ class MotionGuard:
         """Return whether a request with a method that its resource does not support may be sent."""
         return self._api.run.allow_motion or item.method in {"GET", "HEAD", "OPTIONS", "TRACE"} or not item.body
 
-    def _fitted(self, item: Outgoing, operation: Operation) -> Outgoing | None:
+    def _fit(self, item: Outgoing, operation: Operation) -> Outgoing | None:
         """Return a valid request of a moving operation with sensible values; None after _ACCEPTED of them."""
         if self._valid[operation.id] >= _ACCEPTED:
             return None
@@ -73,14 +73,14 @@ class MotionGuard:
         text = read_json(item.body)
         if not item.body or text.problem or item.media_type != JSON:
             return item
-        return replace(item, body=json_text(_slowed(text.value)).encode())
+        return replace(item, body=json_text(_slow_down(text.value)).encode())
 
 
-def _slowed(value: Any) -> Any:
+def _slow_down(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _slowed(item) for name, item in value.items()}
+        return {name: _slow_down(item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_slowed(item) for item in value]
+        return [_slow_down(item) for item in value]
     if isinstance(value, float) and abs(value) > _SLOW:
         return _SLOW
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1:

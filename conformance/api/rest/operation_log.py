@@ -66,16 +66,16 @@ class OperationLog(Listener):
             if is_json(name)
         }
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Count a response."""
         operation = self._operation(exchange.request)
         if operation is not None:
             record = self._count(operation, exchange.request)
             record.statuses[exchange.response.status] += 1
-            record.succeeded += self._succeeded(exchange)
+            record.succeeded += self._is_success(exchange)
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
             self._look_into(operation, record, exchange)
-            if self._services is None or self._succeeded(exchange):
+            if self._services is None or self._is_success(exchange):
                 self._left.follow(operation, exchange)
 
     def by_hand(self, exchange: Exchange) -> None:
@@ -87,13 +87,13 @@ class OperationLog(Listener):
             record.statuses[exchange.response.status] += 1
             self._left.follow(operation, exchange)
 
-    def unanswered(self, request: Unanswered) -> None:
+    def on_no_response(self, request: Unanswered) -> None:
         """Count a request without a response."""
         operation = self._operation(request.request)
         if operation is not None:
             self._count(operation, request.request).unanswered += 1
 
-    def _succeeded(self, exchange: Exchange) -> bool:
+    def _is_success(self, exchange: Exchange) -> bool:
         answer = exchange.response
         if self._services is not None and _FAULT.search(answer.body):
             return False
@@ -189,7 +189,7 @@ class OperationLog(Listener):
         why = next((f": {item.label}: {reason}" for item, reason in reasons.items() if not reason.may), "")
         return f"no operation could be called{why}"
 
-    def concerned(self, request: Request) -> set[str]:
+    def labels_of(self, request: Request) -> set[str]:
         """Return the labels of a request's operation, or of all operations of its resource if it has none."""
         if self._services is not None:
             operation = self._operation(request)
@@ -200,7 +200,7 @@ class OperationLog(Listener):
         own = resource.operations.get("GET" if request.method == "HEAD" else request.method)
         return {own.label} if own else {item.label for item in resource.operations.values()}
 
-    def uncalled(self, rules: CallRules) -> list[str]:
+    def uncalled_labels(self, rules: CallRules) -> list[str]:
         """Return the labels of the operations that may be called and were sent nothing."""
         operations = operations_of(self._contract)
         return [

@@ -37,7 +37,7 @@ def patched(document: Any, operations: Any) -> Any:
     """
     found = copy.deepcopy(document)
     for operation in operations if isinstance(operations, list) else ():
-        found = _applied(found, operation)
+        found = _apply(found, operation)
     return found
 
 
@@ -46,13 +46,13 @@ def partly_patched(document: Any, operations: Any) -> Iterator[Any]:
     found = copy.deepcopy(document)
     for operation in operations if isinstance(operations, list) else ():
         try:
-            found = _applied(found, operation)
+            found = _apply(found, operation)
         except PatchError:
             continue
         yield found
 
 
-def _applied(document: Any, operation: Any) -> Any:
+def _apply(document: Any, operation: Any) -> Any:
     given = operation if isinstance(operation, dict) else {}
     kind, path, value = given.get("op"), given.get("path"), copy.deepcopy(given.get("value"))
     says = f"{kind} of {path}"
@@ -67,15 +67,15 @@ def _applied(document: Any, operation: Any) -> Any:
         if not isinstance(origin, str) or path.startswith(f"{origin}/"):
             raise PatchError(says)
         value = copy.deepcopy(_at(document, origin, says))
-        document = _changed(document, origin, _MISSING, says) if kind == "move" else document
+        document = _with_change(document, origin, _MISSING, says) if kind == "move" else document
     elif kind in {"remove", "replace"}:
         _at(document, path, says)
         if kind == "remove":
-            return _changed(document, path, _MISSING, says)
-        return _changed(document, path, value, says, replaces=True)
+            return _with_change(document, path, _MISSING, says)
+        return _with_change(document, path, value, says, replaces=True)
     elif kind != "add":
         raise PatchError(says)
-    return _changed(document, path, value, says)
+    return _with_change(document, path, value, says)
 
 
 def same(one: Any, other: Any) -> bool:
@@ -105,7 +105,7 @@ def _at(document: Any, path: str, says: str) -> Any:
     return document
 
 
-def _changed(document: Any, path: str, value: Any, says: str, *, replaces: bool = False) -> Any:
+def _with_change(document: Any, path: str, value: Any, says: str, *, replaces: bool = False) -> Any:
     """Return a document with a value put, inserted or, if it is _MISSING, removed at a place."""
     steps = _steps(path, says)
     if not steps:

@@ -5,7 +5,7 @@ from http import HTTPStatus
 from typing import Final
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.parameters import wrong_texts
@@ -32,7 +32,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
     """
     operation = call.operation
     exchange, there = None, None
-    if operation.safe and allowed(api, operation):
+    if operation.safe and allows(api, operation):
         exchange = call.send(api)
         there = _by_itself(call, exchange)
     if there is None:
@@ -40,7 +40,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
         there = _by_options(call, exchange)
         is_open = there is None or exchange.response.status == HTTPStatus.NOT_FOUND
         refused = _to_be_refused(call)
-        if is_open and known and refused is not None and allowed(api, operation):
+        if is_open and known and refused is not None and allows(api, operation):
             exchange = refused.send(api)
             there = _by_itself(call, exchange)
     status = exchange.response.status if exchange is not None else 0
@@ -66,7 +66,7 @@ def _to_be_refused(call: Call) -> Call | None:
 def _by_itself(call: Call, exchange: Exchange) -> bool | None:
     """Return whether a response shows that the operation exists; None if the resource may just be empty."""
     status = exchange.response.status
-    may_be_empty = call.operation.declared(status) is not None or (
+    may_be_empty = call.operation.schemas_for(status) is not None or (
         not call.operation.safe and "{" in call.operation.template
     )
     if status == HTTPStatus.NOT_FOUND and may_be_empty:

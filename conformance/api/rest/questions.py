@@ -8,7 +8,7 @@ from http import HTTPStatus
 from typing import Final
 from urllib.parse import quote
 
-from conformance.api.rest.applicable import allowed, answered
+from conformance.api.rest.applicable import allows, working_reads
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import CRASHES
@@ -58,14 +58,14 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
         api: the robot's REST interface.
         more: further questions, of the contract pack.
     """
-    others = [*_refused(api), *_unknown(), *more]
+    others = [*_refused_reads(api), *_unknown(), *more]
     alone = _reads(api)
     alone += [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in others]
     usual = [(item, answer.status) for item, answer in alone if not item.mismatch(answer)]
     return [_of_status(item, status) for item, status in usual if status not in CRASHES | BUSY]
 
 
-def misplaced(api: RestInterface, question: Question, answer: Response) -> str:
+def mismatch_of(api: RestInterface, question: Question, answer: Response) -> str:
     """Return why a response cannot belong to this request; empty if it can.
 
     The question is sent alone once more: the robot's state may have changed meanwhile, as when a goal ends. A crash
@@ -99,12 +99,12 @@ def _of_status(question: Question, status: int) -> Question:
 def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
     """Return a question for each resource in each format, and the response to it alone."""
     found: list[tuple[Question, Response]] = []
-    for call in answered(api):
+    for call in working_reads(api):
         for media_type in call.operation.formats:
             answer = call.send(api, ("Accept", media_type)).response
             alike = api.device.answers_alike(call.operation.template) and not call.operation.motion
             mismatch = _shape_of(call, media_type, answer, entries=alike)
-            comes_and_goes = call.operation.declared(HTTPStatus.NOT_FOUND) is not None
+            comes_and_goes = call.operation.schemas_for(HTTPStatus.NOT_FOUND) is not None
             found.append((Question(call.path, media_type, mismatch, comes_and_goes), answer))
     return found
 
@@ -154,7 +154,7 @@ def _names_in(answer: Response) -> frozenset[str]:
     return frozenset(first) if isinstance(first, dict) else frozenset()
 
 
-def _marked(number: int) -> Callable[[Response], str]:
+def _mark_test(number: int) -> Callable[[Response], str]:
     """Return a test whether a response names another client's question."""
     own = f"{_MARK}{number}-".encode()
 
@@ -169,22 +169,22 @@ def _marked(number: int) -> Callable[[Response], str]:
     return mismatch
 
 
-def _refused(api: RestInterface) -> list[Question]:
+def _refused_reads(api: RestInterface) -> list[Question]:
     """Return reads with a text of their own in place of a number, which a refusal may name."""
     numbers = itertools.count(_UNKNOWN)
     found = []
     for operation in operations_of(api.run.contract):
         named = [item.name for item in operation.parameter("query") if is_numeric(item.schema)]
-        if operation.method != "GET" or not allowed(api, operation) or not named:
+        if operation.method != "GET" or not allows(api, operation) or not named:
             continue
         call = example_call(api, operation)
         for name in named[:2]:
             number = next(numbers)
             path = call.having(name, f"{_MARK}{number}-").path
-            found.append(Question(path, JSON, _marked(number)))
+            found.append(Question(path, JSON, _mark_test(number)))
     return found
 
 
 def _unknown() -> list[Question]:
     """Return questions for unknown paths."""
-    return [Question(f"/{quote(f'{_MARK}{number}-')}/", JSON, _marked(number)) for number in range(_UNKNOWN)]
+    return [Question(f"/{quote(f'{_MARK}{number}-')}/", JSON, _mark_test(number)) for number in range(_UNKNOWN)]

@@ -53,10 +53,10 @@ def sample(schema: Schema, depth: int = 0, *, whole: bool = False) -> Any:
         depth: how deep the value lies in another one.
         whole: whether objects get their optional members too.
     """
-    return _made(schema, depth, (_OPTIONAL, _REQUIRED), whole=whole)
+    return _make(schema, depth, (_OPTIONAL, _REQUIRED), whole=whole)
 
 
-def _made(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> Any:
+def _make(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> Any:
     """Return a value with at most these numbers of optional and of required parts."""
     schema = flat(_not_null(schema))
     named = [schema[key] for key in ("example", "const", "default") if key in schema]
@@ -102,13 +102,13 @@ def _object(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -
     names = required if len(required) <= room[1] and depth < _DEPTH else []
     names = names + optional if whole and len(names) + len(optional) <= room[0] and depth < _DEPTH else names
     if len(names) < room[1] and depth < _DEPTH:
-        names = _demanded(schema, names, optional)
+        names = _demanded_names(schema, names, optional)
     share = _share(room, len(names))
-    made = {name: _made(properties.get(name, {}), depth + 1, share, whole=whole) for name in names}
+    made = {name: _make(properties.get(name, {}), depth + 1, share, whole=whole) for name in names}
     return {**made, **_discriminating(schema, made)}
 
 
-def _demanded(schema: Schema, names: list[str], optional: list[str]) -> list[str]:
+def _demanded_names(schema: Schema, names: list[str], optional: list[str]) -> list[str]:
     """Return the names with those that other keywords than ``required`` demand."""
     dependent, least = schema.get("dependentRequired", {}), schema.get("minProperties", 0)
     found = dict.fromkeys(names)
@@ -130,11 +130,11 @@ def _discriminating(schema: Schema, made: dict[str, Any]) -> dict[str, Any]:
 def _array(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> list[Any]:
     prefix = schema.get("prefixItems", [])
     least = max(int(schema.get("minItems", 0)), 1 if whole else 0)
-    items = [_made(part, depth + 1, room, whole=False) for part in prefix]
+    items = [_make(part, depth + 1, room, whole=False) for part in prefix]
     rest = schema.get("items") if isinstance(schema.get("items"), dict) else {}
     count = min(least, schema.get("maxItems", least), 64, room[1]) - len(items)
     for _ in range(count):
-        item = _made(rest or {}, depth + 1, _share(room, count), whole=False)
+        item = _make(rest or {}, depth + 1, _share(room, count), whole=False)
         items.append(_another(rest or {}, item, items) if schema.get("uniqueItems") else item)
     return items
 

@@ -15,8 +15,8 @@ from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.api.call_rules import words_of
-from conformance.api.rest.applicable import allowed
-from conformance.api.rest.inputs import Inputs, usual_inputs, written
+from conformance.api.rest.applicable import allows
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import REFUSALS
 from conformance.api.rest.values import Values
@@ -116,7 +116,7 @@ class _Refusals(Listener):
 
     seen = False
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Look at the status of a response."""
         self.seen = self.seen or exchange.response.status in REFUSALS
 
@@ -175,8 +175,8 @@ def _is_moving(api: RestInterface) -> bool:
     for turn in range(2):
         time.sleep(turn * _AGAIN_S)
         seen.append({})
-        for operation in [one for one in reads if allowed(api, one) and one.label not in api.streams][:_READS]:
-            request = written(operation, usual_inputs(operation, api.values or Values())[0])
+        for operation in [one for one in reads if allows(api, one) and one.label not in api.streams][:_READS]:
+            request = request_of(operation, usual_inputs(operation, api.values or Values())[0])
             with suppress(NoAnswerError, NotPermittedError):
                 answer = api.client.send("GET", request.target, headers=request.headers, timeout_s=_DEADLINE_S).response
                 value = read_json(answer.body).value if answer.ok and is_json(answer.media_type) else None
@@ -219,7 +219,7 @@ def _send(api: RestInterface, operation: Operation) -> str:
         if time.monotonic() > until:
             break
         moved = inputs in driven
-        request = written(operation, inputs)
+        request = request_of(operation, inputs)
         try:
             exchange = api.client.send(
                 request.method, request.target, headers=request.headers, body=request.body, timeout_s=_DEADLINE_S

@@ -12,7 +12,7 @@ from conformance.api.rest.references import refers, singular
 from conformance.api.rest.samples import FORMATS, alike_and_apart, fits
 from conformance.api.rest.values import IDS
 from conformance.documents.json_schema import Schema, is_number, kinds_of
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -59,14 +59,14 @@ def path_chosen(item: Operation, turn: int) -> str:
     return "" if id_ is None else item.template.replace(f"{{{parameter.name}}}", str(id_))
 
 
-def identified(value: Any, item: Operation) -> tuple[str, Any]:
+def id_member(value: Any, item: Operation) -> tuple[str, Any]:
     """Return the member of a representation that identifies it in an item's path, and its value; else nothing."""
     parameter = item.parameter("path")[-1]
     plain, thing = plain_name(parameter.name), singular(collection_of(item.template).rpartition("/")[2])
     names = [plain]
     if plain.endswith(_NUMBERED) or plain == thing:
         names += [*IDS[:2], "pk", f"{thing}id", *IDS[2:]]
-    members = {plain_name(name): (name, one) for name, one in represented(value, names).items()}
+    members = {plain_name(name): (name, one) for name, one in object_in(value, names).items()}
     found = [members[name] for name in names if name in members]
     usable = (pair for pair in found if isinstance(pair[1], str | int) and fits(parameter.schema, pair[1]))
     return next(usable, ("", None))
@@ -74,11 +74,11 @@ def identified(value: Any, item: Operation) -> tuple[str, Any]:
 
 def identifier_of(value: Any, item: Operation) -> str:
     """Return the identifier of a representation as an item's path has it, in lower case; empty if there is none."""
-    found = identified(value, item)[1]
+    found = id_member(value, item)[1]
     return "" if found is None else str(found).casefold()
 
 
-def represented(value: Any, names: Collection[str]) -> dict[str, Any]:
+def object_in(value: Any, names: Collection[str]) -> dict[str, Any]:
     """Return the object of a response that has the most members of these plain names: the body, or one inside it."""
     found = [value] if isinstance(value, dict) else []
     found += [item for item in value.values() if isinstance(item, dict)] if found else []
@@ -176,7 +176,7 @@ def differences(
             items = [flat(one).get("items", {}) for one in (part, shared.get(name, {}))]
             yield from (f"{text} in {name}" for text in _of_items(value, other, items[0], items[1], collections))
         elif not _alike(value, other, flat(part)):
-            yield f"{shown(other)} as {name} instead of {shown(value)}"
+            yield f"{clip(other)} as {name} instead of {clip(value)}"
 
 
 def _are_objects(value: Any) -> TypeGuard[list[dict[str, Any]]]:

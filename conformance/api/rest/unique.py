@@ -63,11 +63,11 @@ class Unique:
         plain = not given.keys() & {"enum", "const"} and bool(kinds_of(given) & {"string", "integer"})
         return plain and not given.get("readOnly") and not refers(name, schema, self._collections)
 
-    def found(self, operation: Operation, names: tuple[str, ...]) -> None:
+    def remember(self, operation: Operation, names: tuple[str, ...]) -> None:
         """Remember that these members must be new."""
         self._names[_collection(operation)] = names
 
-    def renewed(self, operation: Operation, body: Any, schema: Schema, *, keep: str = "") -> Any:
+    def with_new_values(self, operation: Operation, body: Any, schema: Schema, *, keep: str = "") -> Any:
         """Return a body with new values in place of those that were sent before; a change has always the same new ones.
 
         Args:
@@ -98,14 +98,14 @@ class Unique:
         for name in names:
             for _ in range(_STEPS):
                 self._turns[collection] += 1
-                changed[name] = numbered(parts.get(name, {}), body[name], self._turns[collection] * _STEP)
+                changed[name] = with_number(parts.get(name, {}), body[name], self._turns[collection] * _STEP)
                 if (collection, name, str(changed[name])) not in self._taken:
                     break
         self._taken |= {(collection, name, str(changed[name])) for name in names}
         return changed
 
 
-def numbered(schema: Schema, value: Any, number: int) -> Any:
+def with_number(schema: Schema, value: Any, number: int) -> Any:
     """Return a text or integer that the schema allows and that contains a number; the same one if none is allowed."""
     if is_number(value):
         given = flat(schema)

@@ -14,7 +14,7 @@ from conformance.documents.parameter_reading import (
     UNCLEAR,
     VALID,
     decoded_path,
-    judged,
+    judge_texts,
     judged_json,
     multipart_verdict,
     query_verdicts,
@@ -125,7 +125,7 @@ def _of_path(operation: Operation, path: str) -> list[_Said]:
     texts = dict(zip(names, match.groups(), strict=True))
     return [
         (
-            judged(item, [texts[item.name]], decoded_path),
+            judge_texts(item, [texts[item.name]], decoded_path),
             "path-parameter",
             f"{texts[item.name][:40]!r} at path {item.name}",
         )
@@ -144,11 +144,11 @@ def _of_query(operation: Operation, query: str) -> list[_Said]:
 def _of_headers(operation: Operation, headers: Headers) -> list[_Said]:
     """Judge header and cookie parameters; a list in a header may be written in several fields."""
     said = []
-    cookies = [pair.strip().partition("=") for _, text in _named(headers, "cookie") for pair in text.split(";")]
+    cookies = [pair.strip().partition("=") for _, text in _fields_of(headers, "cookie") for pair in text.split(";")]
     for item in (*operation.parameter("header"), *operation.parameter("cookie")):
         in_cookie = item.where == "cookie"
         texts = [part[2] for part in cookies if part[0] == item.name] if in_cookie else []
-        texts = texts if in_cookie else [text.strip(" \t") for _, text in _named(headers, item.name)]
+        texts = texts if in_cookie else [text.strip(" \t") for _, text in _fields_of(headers, item.name)]
         if not texts:
             said.append((INVALID if item.required else VALID, "header", f"no {item.where} {item.name}"))
         else:
@@ -163,10 +163,10 @@ def _of_header(item: Parameter, texts: Sequence[str]) -> str:
         return UNCLEAR
     whole = ",".join(texts)
     # White space around the items of a list is optional (RFC 9110 5.6.1).
-    return judged(item, [re.sub(r"[ \t]*,[ \t]*", ",", whole) if kinds <= {"array", "object"} else whole])
+    return judge_texts(item, [re.sub(r"[ \t]*,[ \t]*", ",", whole) if kinds <= {"array", "object"} else whole])
 
 
-def _named(headers: Headers, name: str) -> list[tuple[str, str]]:
+def _fields_of(headers: Headers, name: str) -> list[tuple[str, str]]:
     return [(key, text) for key, text in headers if key.lower() == name.lower()]
 
 

@@ -108,7 +108,7 @@ class Values:
         for name, value in in_link(text):
             self._remember(self._seen[plain_name(name)], value)
 
-    def accepted(self, operation: Operation, request: Outgoing) -> None:
+    def remember(self, operation: Operation, request: Outgoing) -> None:
         """Remember the values of a request that the device accepted."""
         for name, _, text in values_in(operation, request) if request.method == operation.method else ():
             self._accepted[plain_name(name), operation.safe].add(text)
@@ -182,14 +182,14 @@ class Values:
 
         The first takes the first alternative of each union, the second the last one.
         """
-        made = [self.filled(sample(item), item, operation) for item in (schema, backwards(schema))]
+        made = [self.fill(sample(item), item, operation) for item in (schema, backwards(schema))]
         return _distinct([*(value for value in examples if not isinstance(value, str)), *made])[:_TRIED]
 
-    def filled(self, value: Any, schema: Schema, operation: Operation | None = None) -> Any:
+    def fill(self, value: Any, schema: Schema, operation: Operation | None = None) -> Any:
         """Return an object whose members have the values that the user gave, or that a response named."""
         if isinstance(value, list):
             items = flat(schema).get("items")
-            return [self.filled(item, items if isinstance(items, dict) else {}, operation) for item in value]
+            return [self.fill(item, items if isinstance(items, dict) else {}, operation) for item in value]
         if not isinstance(value, dict):
             return value
         properties = flat(schema).get("properties", {})
@@ -201,11 +201,11 @@ class Values:
             return given[0]
         # Only identifiers: values of another member with the same name may not fit here.
         if operation is None or not refers(name, schema, self.collections):
-            return self.filled(item, schema, operation)
+            return self.fill(item, schema, operation)
         known = self.references(operation, name, schema)
         if isinstance(item, list):
             return known[: len(item)] if len(known) >= len(item) else item
-        return known[0] if known else self.filled(item, schema, operation)
+        return known[0] if known else self.fill(item, schema, operation)
 
 
 def _distinct(values: Sequence[Any]) -> list[Any]:

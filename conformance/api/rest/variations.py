@@ -98,7 +98,7 @@ def valid_variations(operation: Operation, usual: Inputs, values: Values) -> Ite
         for kind, value in _valid_values(item.schema, item.examples, values.of(operation, item), item.required):
             is_new = value != usual.at(item.where).get(item.name, NOTHING) and _sendable(item, value)
             if is_new and parameter_verdict(operation, item, value) == VALID:
-                yield Variation(kind, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value))
+                yield Variation(kind, f"{clip(value)} as {place}", place, usual.having(item.where, item.name, value))
     media_type, whole = whole_body(operation, values)
     if is_json(media_type) and isinstance(usual.body, dict):
         schema = operation.bodies[media_type].schema
@@ -202,7 +202,7 @@ def _knowing(variation: Variation, operation: Operation, values: Values) -> Vari
     if variation.kind is not Kind.OPTIONAL:
         return variation
     inputs = variation.inputs
-    filled = values.filled(inputs.body, operation.bodies[inputs.media_type].schema, operation)
+    filled = values.fill(inputs.body, operation.bodies[inputs.media_type].schema, operation)
     return replace(variation, inputs=replace(inputs, body=filled))
 
 
@@ -266,7 +266,7 @@ def _valid_members(usual: Inputs, value: Any, schema: Schema, steps: tuple[str, 
                 one = ("\u00e9\U0001f916" * len(one))[: len(one)]  # noqa: PLW2901 - of the same length
             if one != value.get(name, NOTHING):
                 body = with_member(usual.body, here, one)
-                yield Variation(kind, f"{shown(one)} as {place}", place, replace(usual, body=body))
+                yield Variation(kind, f"{clip(one)} as {place}", place, replace(usual, body=body))
         if isinstance(inner, dict) and len(steps) < DEPTH:
             yield from _valid_members(filled, inner, part, here)
 
@@ -278,7 +278,7 @@ def unknown_variations(operation: Operation, usual: Inputs) -> Iterator[Variatio
         known = next((value for value in values if fits(item.schema, value)), None)
         if known is not None and "enum" not in flat(item.schema):
             place = f"path {item.name}"
-            yield Variation(Kind.UNKNOWN, f"{shown(known)} as {place}", place, usual.having("path", item.name, known))
+            yield Variation(Kind.UNKNOWN, f"{clip(known)} as {place}", place, usual.having("path", item.name, known))
 
 
 def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
@@ -289,7 +289,7 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
         for value in (*texts, *(_ODD_NUMBERS if kinds & {"number", "integer"} else ())):
             if _sendable(item, value):
                 yield Variation(
-                    Kind.ODD, f"{shown(value)} as {place}", place, usual.having(item.where, item.name, value)
+                    Kind.ODD, f"{clip(value)} as {place}", place, usual.having(item.where, item.name, value)
                 )
     extra = usual.having("query", "roaas_unknown", "1")
     yield Variation(Kind.ODD, "an unknown query parameter", "query", extra)
@@ -304,7 +304,7 @@ def odd_variations(operation: Operation, usual: Inputs) -> Iterator[Variation]:
             for value in (None, *texts, *(_ODD_NUMBERS[2:5] if kinds & {"number", "integer"} else ())):
                 place = place_of((name,))
                 body = with_member(usual.body, (name,), value)
-                yield Variation(Kind.ODD, f"{shown(value)} as {place}", place, replace(usual, body=body))
+                yield Variation(Kind.ODD, f"{clip(value)} as {place}", place, replace(usual, body=body))
 
 
 def _sendable(parameter: Parameter, value: Any) -> bool:
@@ -337,7 +337,7 @@ def place_of(steps: Steps) -> str:
     return "body /" + "/".join(map(str, steps))
 
 
-def shown(value: Any) -> str:
+def clip(value: Any) -> str:
     """Return a value as a reader sees it, cut to 40 characters."""
     text = repr(value) if not isinstance(value, Mapping) else "an object"
     return text if len(text) <= 40 else f"{text[:36]}…{text[-1]}"  # noqa: PLR2004 - characters of a line

@@ -65,7 +65,7 @@ def attack_verdict(attack: Attack, attempt: Attempt) -> AttackVerdict:
     answer = read_exchange(attempt)
     refused = answer.fault is not None or answer.status >= _REFUSED
     refused = refused and (may_close or answer.status != HTTPStatus.BAD_GATEWAY)
-    return AttackVerdict(refused, expected, answer.describe(), f"{attack.name} taken" if answer.accepted else "")
+    return AttackVerdict(refused, expected, answer.describe(), f"{attack.name} taken" if answer.is_taken else "")
 
 
 def is_closed(attempt: Unanswered) -> bool:

@@ -62,7 +62,7 @@ class Template:
     root: str
     value: str
 
-    def filled(self, value: str | None = None, ignored: str = "", prolog: str = "") -> str:
+    def fill(self, value: str | None = None, ignored: str = "", prolog: str = "") -> str:
         """Return the document with texts in its slots, after a prolog."""
         text = self.value if value is None else value
         # If the document has no ignorable place, put that text into the value too.
@@ -71,8 +71,8 @@ class Template:
         return prolog + self.document.replace(VALUE_SLOT, text).replace(IGNORED_SLOT, ignored)
 
     def octets(self, value: str | None = None, ignored: str = "", prolog: str = "") -> bytes:
-        """Return the document in UTF-8; as filled()."""
-        return self.filled(value, ignored, prolog).encode()
+        """Return the document in UTF-8; as fill()."""
+        return self.fill(value, ignored, prolog).encode()
 
 
 def attacks(template: Template, url: Callable[[str], str], each: int, place: str = "") -> Iterator[Attack]:
@@ -106,7 +106,7 @@ def _doctypes(template: Template, _url: Callable[[str], str]) -> Iterator[Attack
         template.octets(prolog=f'<?xml version="1.0" encoding="UTF-8"?>\n{bare}'),
     )
     # In UTF-16, so that a filter for the bytes "<!DOCTYPE" does not find it.
-    wide = template.filled(prolog=f'<?xml version="1.0" encoding="UTF-16"?>{bare}')
+    wide = template.fill(prolog=f'<?xml version="1.0" encoding="UTF-16"?>{bare}')
     yield Attack("doctype", "a DOCTYPE in UTF-16", codecs.BOM_UTF16_LE + wide.encode("utf-16-le"))
 
 
@@ -226,7 +226,7 @@ def _wide(template: Template) -> bytes:
     return template.octets(ignored=f"<!--{MARK}-->").replace(MARK.encode(), b" " * _OVER, 1)
 
 
-def _compressed(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
+def _compressed_bombs(template: Template, _url: Callable[[str], str]) -> Iterator[Attack]:
     wide = _wide(template)
     for coding, pack in (("gzip", partial(gzip.compress, mtime=0)), ("deflate", zlib.compress)):
         packed = pack(wide, 1)
@@ -264,5 +264,5 @@ _KINDS: Final = (
     _attributes,
     _names,
     _sizes,
-    _compressed,
+    _compressed_bombs,
 )

@@ -93,7 +93,7 @@ def is_gone(
     """
     operation, message = accepted
     may_end = operation.name in device_of(soap.run).comes_and_goes
-    return may_end and answer.refused and call(service, message).refused
+    return may_end and answer.is_refused and call(service, message).is_refused
 
 
 def _problem(run: Run, service: SoapService) -> str:

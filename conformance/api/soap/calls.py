@@ -46,17 +46,17 @@ class SoapResponse:
         return self.fault.standard if self.fault else ""
 
     @property
-    def succeeded(self) -> bool:
+    def is_success(self) -> bool:
         """Return whether the response is 2xx and no fault."""
         return self.exchange.response.ok and self.fault is None
 
     @property
-    def accepted(self) -> bool:
+    def is_taken(self) -> bool:
         """Return whether a SOAP message reports success. An HTML page reports nothing."""
-        return self.succeeded and self.envelope is not None
+        return self.is_success and self.envelope is not None
 
     @property
-    def refused(self) -> bool:
+    def is_refused(self) -> bool:
         """Whether the request was refused: by a fault, or by 4xx."""
         return self.fault is not None or 400 <= self.status < 500  # noqa: PLR2004 - RFC 9110 15.5
 
@@ -100,7 +100,7 @@ def send(service: SoapService, message: Node | bytes | str, **how: Any) -> SoapR
         NoAnswerError: no HTTP response came.
     """
     if isinstance(message, Node):
-        message = message.written()
+        message = message.serialize()
     elif isinstance(message, str):
         message = message.encode()
     octets = message
@@ -127,9 +127,9 @@ class SoapExpectation(Expectation):
 
     answer: SoapResponse | None = None
 
-    def accepted(self, when: str) -> bool:
+    def succeeds(self, when: str) -> bool:
         """Judge that the request was accepted: 2xx and a message without a fault."""
-        holds = self.answer is not None and self.answer.accepted
+        holds = self.answer is not None and self.answer.is_taken
         return self.that(holds, f"status 2xx with a SOAP message when {when}")
 
     def fault(self, code: str, when: str, *, cause: str = "") -> bool:

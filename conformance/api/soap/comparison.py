@@ -107,7 +107,7 @@ def _element(wanted: Element, found: Element, where: str) -> Iterator[str]:
         return
     here, there = wanted.children, found.children
     if [child.tag for child in here] != [child.tag for child in there]:
-        yield f"{where} with {_listed(there)}, not {_listed(here)}"
+        yield f"{where} with {_tags_text(there)}, not {_tags_text(here)}"
         return
     if len(here) > 1 and _model(wanted.type) != _model(found.type):
         yield f"{where} as a {_model(found.type)}, not a {_model(wanted.type)}"
@@ -132,5 +132,5 @@ def _often(element: Element) -> str:
     return f"{element.minimum} to {'any number of' if element.maximum is None else element.maximum} times"
 
 
-def _listed(elements: tuple[Element, ...]) -> str:
+def _tags_text(elements: tuple[Element, ...]) -> str:
     return ", ".join(child.tag for child in elements) or "nothing"

@@ -72,9 +72,9 @@ def values(simple: Simple) -> SearchStrategy[str]:
     if simple.builtin in INTEGERS:
         low, high = bounds(simple)
         drawn = st.one_of(st.sampled_from([low, high, min(max(0, low), high)]), st.integers(low, high))
-        return _padded(drawn, written_integer)
+        return _with_spaces(drawn, written_integer)
     if simple.builtin in FLOATS:
-        return _padded(_floats(simple), written_float)
+        return _with_spaces(_floats(simple), written_float)
     return _others(simple)
 
 
@@ -98,7 +98,7 @@ def _floats(simple: Simple) -> SearchStrategy[float]:
     return st.one_of(st.sampled_from(fitting), drawn) if fitting else drawn
 
 
-def _padded(numbers: SearchStrategy[Any], write: Callable[[Any, int], str]) -> SearchStrategy[str]:
+def _with_spaces(numbers: SearchStrategy[Any], write: Callable[[Any, int], str]) -> SearchStrategy[str]:
     return st.builds(
         lambda value, form, before, after: f"{before}{write(value, form)}{after}",
         numbers,
@@ -143,7 +143,7 @@ def another(simple: Simple, text: str, turn: int, is_free: bool) -> str:  # noqa
         return " ".join(another(item, text, turn + more, is_free) for more in range(1 + turn % 2))
     if simple.others and turn % 3 > 1:
         return another(simple.others[0], text, turn, is_free)
-    known = simple.enumeration or (() if simple.patterns else _known(simple, is_free))
+    known = simple.enumeration or (() if simple.patterns else _values_of(simple, is_free))
     if known:
         return known[turn % len(known)]
     if simple.builtin in FLOATS | {"decimal"}:
@@ -185,7 +185,7 @@ def _is_limited(simple: Simple) -> bool:
     return bool(simple.enumeration or simple.patterns or simple.many or simple.others)
 
 
-def _known(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - as another()
+def _values_of(simple: Simple, is_free: bool) -> tuple[str, ...]:  # noqa: FBT001 - as another()
     """Return values of a type, in the order of turns."""
     shortest, longest = simple.min_length or 0, simple.max_length
     if simple.builtin in INTEGERS and is_free:

@@ -54,12 +54,12 @@ def _some(item: Element | Group, form: int, *, optional: bool, alone: bool = Fal
     return _ordinary(item, form, optional=optional) * min(count, _MOST)
 
 
-def filled(element: Element, values: Mapping[str, str]) -> Node:
+def message_of(element: Element, values: Mapping[str, str]) -> Node:
     """Return a message of given values (text by the local name of its element), in the order of the schema.
 
     Elements without a value are left out, and so are those that would be empty.
     """
-    children = [filled(child, values) for child in element.children]
+    children = [message_of(child, values) for child in element.children]
     kept = [child for child in children if child.children or child.name in values]
     return Node(element.tag, values.get(local(element.tag), ""), tuple(kept))
 
@@ -73,13 +73,13 @@ def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = f
     if not leaves:
         return st.just(base)
 
-    def filled(texts: tuple[str, ...]) -> Node:
+    def with_texts(texts: tuple[str, ...]) -> Node:
         made = base
         for (path, _), text in zip(leaves, texts, strict=True):
             made = with_text(made, path, text)
         return made
 
-    return st.tuples(*(forms.values(simple) for _, simple in leaves)).map(filled)
+    return st.tuples(*(forms.values(simple) for _, simple in leaves)).map(with_texts)
 
 
 def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
@@ -87,7 +87,7 @@ def with_text(node: Node, path: tuple[int, ...], text: str) -> Node:
     return node.replaced(path, replace(node.at(path), text=text))
 
 
-def derived(element: Element, node: Node) -> Iterator[Node]:
+def derivations(element: Element, node: Node) -> Iterator[Node]:
     """Yield the message with a derived type in place of one that it has, in turn; the values in common stay."""
     for path, declared in declarations(element, node):
         for name, kind in () if isinstance(declared.type, Simple) else declared.type.derived:

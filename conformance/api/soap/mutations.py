@@ -31,7 +31,7 @@ def invalid_ones(mutations: Iterable[Mutation[Payload]], types: Types) -> Iterat
         if mutation.kind in _BEYOND_SCHEMA:
             yield mutation
             continue
-        reason = types.invalid(parse(mutation.made[0].written()))
+        reason = types.invalid(parse(mutation.made[0].serialize()))
         if reason:
             yield replace(mutation, reason=reason)
 
@@ -93,7 +93,7 @@ def _namespace(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
 def _values(element: Element, base: Node) -> Iterator[Mutation[Payload]]:
     for path, simple in simple_leaves(element, base):
         texts = [("lexical", text) for text in lexical.unreadable(simple)]
-        texts += [("range", text) for text in (*lexical.outside(simple), *_wrapped(simple, base.at(path).text))]
+        texts += [("range", text) for text in (*lexical.outside(simple), *_overflows(simple, base.at(path).text))]
         texts += [("non-finite", text) for text in lexical.NON_FINITE if simple.builtin in lexical.FLOATS]
         for kind, text in texts:
             yield Mutation(kind, f"{text!r} at {base.at(path).name}", (with_text(base, path, text),))
@@ -137,7 +137,7 @@ def _branches(group: Group | None, tag: str) -> Iterator[Element]:
             yield item
 
 
-def _wrapped(simple: Simple, text: str) -> tuple[str, ...]:
+def _overflows(simple: Simple, text: str) -> tuple[str, ...]:
     """Return texts that equal a value in a program that keeps only the lower 32 bits of an integer."""
     number = lexical.number_in(text) if simple.builtin in lexical.INTEGERS else None
     return (str(int(number) + 2**32),) if number is not None else ()

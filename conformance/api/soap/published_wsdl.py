@@ -34,7 +34,7 @@ class PublishedWsdl:
         """Its source, if that is a URL."""
         return self.source if self.source is not None and "://" in self.source else None
 
-    def interpreted(self, beside: str, connection: Connection) -> tuple[Wsdl | None, str]:
+    def interpret(self, beside: str, connection: Connection) -> tuple[Wsdl | None, str]:
         """Return the description, or why it cannot be read.
 
         A WSDL from a file may refer to documents on the robot, which are looked for ``beside`` the service.

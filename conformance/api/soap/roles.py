@@ -154,9 +154,9 @@ def _act(found: Wsdl, port: SoapPort, operation: SoapOperation) -> Act:
         {name: simple for name, (simple, _) in sent.items()},
         frozenset(name for name, (_, needed) in sent.items() if needed),
         {name: simple for name, simple, _ in _values(response)} if response else {},
-        frozenset(_emptied(request, clears=_says(operation, _NIL, _REMOVES, _NOT))) if request else frozenset(),
+        frozenset(_nullable(request, clears=_says(operation, _NIL, _REMOVES, _NOT))) if request else frozenset(),
         _says(operation, _LEFT_OUT, _STAYS),
-        frozenset(_inherited(request)) if request else frozenset(),
+        frozenset(_extra_names(request)) if request else frozenset(),
     )
 
 
@@ -166,20 +166,20 @@ def _says(operation: SoapOperation, what: re.Pattern[str], does: re.Pattern[str]
     return any(what.search(one) and does.search(one) and not no.search(one) for one in sentences)
 
 
-def _emptied(declared: Element, depth: int = 0, *, clears: bool) -> Iterator[str]:
+def _nullable(declared: Element, depth: int = 0, *, clears: bool) -> Iterator[str]:
     for child in declared.children if depth < _DEEPEST else ():
         if child.nillable and (child.minimum or clears):
             yield local(child.tag).lower()
-        yield from _emptied(child, depth + 1, clears=clears)
+        yield from _nullable(child, depth + 1, clears=clears)
 
 
-def _inherited(declared: Element, depth: int = 0) -> Iterator[str]:
+def _extra_names(declared: Element, depth: int = 0) -> Iterator[str]:
     for child in declared.children if depth < _DEEPEST else ():
         known = {name for name, _, _ in _values(replace(child, type=_without_derived(child.type)))}
         for _, other in () if isinstance(child.type, Simple) else child.type.derived:
             needed = {name for name, _, needs in _values(replace(child, type=_without_derived(other))) if needs}
             yield from needed - known
-        yield from _inherited(child, depth + 1)
+        yield from _extra_names(child, depth + 1)
 
 
 def _without_derived(kind: Simple | Complex) -> Simple | Complex:

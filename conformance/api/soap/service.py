@@ -101,21 +101,21 @@ class SoapService:
         return read_file(self.contract_wsdl_path)
 
     @cached_property
-    def _interpreted(self) -> tuple[Wsdl | None, str]:
-        return self.published.interpreted(self.endpoint, self.client.connection)
+    def _own_or_fault(self) -> tuple[Wsdl | None, str]:
+        return self.published.interpret(self.endpoint, self.client.connection)
 
     @property
     def own(self) -> Wsdl | None:
         """The robot's own description of the service; None if it could not be read (see own_problem)."""
-        return self._interpreted[0]
+        return self._own_or_fault[0]
 
     @property
     def own_problem(self) -> str:
         """Why the robot's own description is missing; empty if there is one."""
-        return self._interpreted[1]
+        return self._own_or_fault[1]
 
     @cached_property
-    def described(self) -> Wsdl:
+    def description(self) -> Wsdl:
         """Return the description that a client would use: the robot's own if it is usable, else the contract's."""
         return self.own if self.own is not None and not next(unusable(self.own), "") else self.contract
 
@@ -163,7 +163,7 @@ def open_service(
         if url is not None and not is_http(url):
             raise StatementError(f"{name} {option} {url!r} is no http or https URL")
     published = obtain(name, wsdl, connection)
-    where = endpoint or _located(published, connection)
+    where = endpoint or _own_address(published, connection)
     if where is None:
         raise StatementError(
             f"{name}: {wsdl} has no soap:address with an http URL; say where the service is with --{name}-endpoint"
@@ -177,7 +177,7 @@ def open_service(
     return SoapService(name, HttpClient(base, connection), path, published, contract_wsdl_path, known_messages)
 
 
-def _located(published: PublishedWsdl, connection: Connection) -> str | None:
+def _own_address(published: PublishedWsdl, connection: Connection) -> str | None:
     """Return the address in a service's WSDL; None if a file names none."""
     try:
         address = describe(published.document or b"", published.source or "", unread).soap_address

@@ -27,7 +27,7 @@ def require_valid_message(service: SoapService, message: Node) -> Node:
         HarnessError: it is not; the message says why.
         DescriptionError: the contract cannot be used.
     """
-    fault = service.contract.types.invalid(parse(message.written()))
+    fault = service.contract.types.invalid(parse(message.serialize()))
     if fault:
         raise HarnessError(f"{message.name} was made as a valid message, and is none: {fault}")
     return message
@@ -72,25 +72,25 @@ def example(service: SoapService, operation: SoapOperation) -> Node | None:
         HarnessError: none of those made is valid by the contract.
     """
     if operation.name not in service.examples:
-        service.examples[operation.name] = _found(service, operation)
+        service.examples[operation.name] = _find_valid(service, operation)
     return service.examples[operation.name]
 
 
-def _found(service: SoapService, operation: SoapOperation) -> Node | None:
+def _find_valid(service: SoapService, operation: SoapOperation) -> Node | None:
     declared = service.contract.shape(operation.request) if operation.request else None
     if declared is None:
         return None
     tried: set[bytes] = set()
     faults: list[str] = []
     for candidate in candidates(service, operation, declared):
-        document = candidate.written()
+        document = candidate.serialize()
         if document in tried:
             continue
         tried.add(document)
         fault = service.contract.types.invalid(parse(document))
         if fault:
             faults.append(fault)
-        elif call(service, candidate).accepted:
+        elif call(service, candidate).is_taken:
             return candidate
     if len(faults) == len(tried):
         raise HarnessError(f"no message made for {operation.name} is valid: {faults[-1]}")
@@ -138,7 +138,7 @@ def _size(service: SoapService, operation: SoapOperation) -> int:
     return len(ordinary(declared, optional=True).paths()) if declared is not None else 1000
 
 
-def typed(message: Node, declared: Element, payload: Node) -> bytes:
+def with_xsi_types(message: Node, declared: Element, payload: Node) -> bytes:
     """Return a message in which each value of the payload has xsi:type, as in RPC-encoded SOAP."""
     made = payload
     for path, simple in simple_leaves(declared, payload):
@@ -150,4 +150,4 @@ def typed(message: Node, declared: Element, payload: Node) -> bytes:
     body = message.children[-1]
     whole = replace(message, children=(*message.children[:-1], replace(body, children=(made,))))
     bindings = f' xmlns:xs="{XSD}" xmlns:tns="{namespace(payload.tag)}" xmlns:'.encode()
-    return whole.written().replace(b" xmlns:", bindings, 1)
+    return whole.serialize().replace(b" xmlns:", bindings, 1)

@@ -51,11 +51,11 @@ def senders() -> list[DeliverySender]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _described(run: Run, interfaces: Interfaces) -> None:
+def _fetch_descriptions(run: Run, interfaces: Interfaces) -> None:
     """Fetch the robot's own descriptions, by which every SOAP response of the run is judged."""
     for service in interfaces.soap.there.values():
         if service.name not in run.unreachable:
-            _ = service.described
+            _ = service.description
 
 
 @pytest.fixture(scope="session")
@@ -64,7 +64,7 @@ def _lists_read(run: Run, interfaces: Interfaces) -> list[Callable[..., None]]:
     api = interfaces.rest
     if api is None or not isinstance(api.device, Device) or not run.allow_motion:
         return []
-    found = [partial(read_awaited, api.client, deliveries) for deliveries in api.device.accepted]
+    found = [partial(read_awaited, api.client, deliveries) for deliveries in api.device.delivery_checkers]
     for read in found:
         with suppress(NoAnswerError):
             read()  # entries before the first delivery are older ones
@@ -88,7 +88,7 @@ def refused(api: RestInterface) -> RefusedRequests:
     """Return the store of requests that the robot refused in the run."""
     if not isinstance(api.device, Device):
         raise TypeError("the run judges another kind of device")
-    return api.device.refused[0]
+    return api.device.refusal_stores[0]
 
 
 @pytest.fixture(scope="session")
@@ -121,7 +121,7 @@ def _looked_at(_lists_read: list[Callable[..., None]], _beats: list[Beats]) -> I
 
 
 @pytest.fixture(scope="session")
-def _beats(interfaces: Interfaces, _described: None) -> list[Beats]:
+def _beats(interfaces: Interfaces, _fetch_descriptions: None) -> list[Beats]:
     """Return the reader of the robot's state between checks; empty without a REST interface."""
     api = interfaces.rest
     return [Beats(api, interfaces)] if api is not None and isinstance(api.device, Device) else []

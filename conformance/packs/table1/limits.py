@@ -139,7 +139,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True):
         return max(self.angular_rad_s, self.navigation_angular_rad_s or 0.0)
 
     @property
-    def unresolved(self) -> str:
+    def unresolved_reason(self) -> str:
         """Why nothing that depends on reaching a velocity can be judged, or an empty text."""
         for limit, unit, tolerance, noise in (
             (self.linear_m_s, "m/s", self.tolerance_linear_m_s, self.noise.linear_m_s),
@@ -235,7 +235,7 @@ class DeclaredLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 named |= {name: max(-pair[0], pair[1]), least: pair[0], greatest: pair[1]}
         return named
 
-    def resolved(self) -> Limits:
+    def resolve(self) -> Limits:
         """Return the figures by which the robot is judged."""
         declared: dict[str, Any] = self.figures | ({"noise": self.noise} if self.noise else {})
         both = declared.pop("tolerance_abs", None)

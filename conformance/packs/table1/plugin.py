@@ -82,12 +82,12 @@ class Device(device.Device):
         return said_of(self.run).limits.hold_s
 
     @cached_property
-    def accepted(self) -> "list[Deliveries]":
+    def delivery_checkers(self) -> "list[Deliveries]":
         """Return the checkers of the run's deliveries; empty without a REST interface."""
         return []
 
     @cached_property
-    def refused(self) -> "list[RefusedRequests]":
+    def refusal_stores(self) -> "list[RefusedRequests]":
         """Return the store of refused requests; empty without a REST interface."""
         return []
 
@@ -108,7 +108,7 @@ class Device(device.Device):
         """Return a valid value of an operation within the robot's limits, near where it is, in its frames."""
         return self._examples.fit(api, operation_id, value)
 
-    def marked(self, operation_id: str, value: Any) -> Any:
+    def mark(self, operation_id: str, value: Any) -> Any:
         """Return a goal with an id of the suite's own; any other value unchanged."""
         return {**value, "goal_id": {"id": "written as XML"}} if operation_id == "putGoal" else value
 
@@ -142,8 +142,8 @@ class Device(device.Device):
         """Return the listener that keeps refused requests."""
         from conformance.packs.table1.robot.refused_requests import RefusedRequests  # noqa: PLC0415 - see the class
 
-        self.refused.append(RefusedRequests(api))
-        return self.refused
+        self.refusal_stores.append(RefusedRequests(api))
+        return self.refusal_stores
 
     def checkers(self, api: device.Rest | None, services: Iterable[device.Soap]) -> Iterable[Checker]:
         """Return the checkers of every exchange with the robot's resources and services."""
@@ -161,11 +161,11 @@ class Device(device.Device):
         if api is None:
             return [validity]
         url, said = api.client.url, said_of(self.run)
-        self.accepted.append(Deliveries(url, has_probe=said.ros.domain_id is not None))
+        self.delivery_checkers.append(Deliveries(url, has_probe=said.ros.domain_id is not None))
         self.doubting = (AcrossInterfaces(url, said.limits),)
         state = State(url, said.limits, self.clock, api.client.connection.credentials)
         judges: list[Checker] = [validity, state, Goals(url), Plans(url, said), Lists(url), SoapPoses(url)]
-        judges += [*self.doubting, *self.accepted]
+        judges += [*self.doubting, *self.delivery_checkers]
         return judges
 
     def halt(self, api: device.Rest) -> None:

@@ -70,7 +70,7 @@ class Statement(RobotStatement, frozen=True):
     @property
     def limits(self) -> Limits:
         """Return the figures by which the robot is judged, declared or default."""
-        return self.declared.resolved()
+        return self.declared.resolve()
 
     @property
     def figures(self) -> dict[str, dict[str, float]]:
@@ -83,7 +83,7 @@ class Statement(RobotStatement, frozen=True):
         return {"declared": declared, "limits": self.limits.figures, "tolerances": self.limits.tolerances}
 
     @property
-    def undeclared(self) -> dict[str, str]:
+    def why_not_tested(self) -> dict[str, str]:
         """Why requirements that need a figure are not tested, by the prerequisite that the statement lacks."""
         limits = self.limits
         kinds = {name.partition(".")[0] for name in self.motion.actuated}
@@ -96,7 +96,7 @@ class Statement(RobotStatement, frozen=True):
         lacking: dict[str, str] = {
             need: f"not tested: the statement declares no {words[need]}" for need, known in there.items() if not known
         }
-        unresolved = limits.unresolved
+        unresolved = limits.unresolved_reason
         return lacking | ({Prerequisite.RESOLVED: f"not tested: {unresolved}"} if unresolved else {})
 
 

@@ -24,7 +24,7 @@ def test_interfaces_answer(run: Run, interfaces: Interfaces, judge: Judge) -> No
     for id_, requirement in run.contract.ledger.items():
         if not id_.endswith("/reachable") or not requirement.binds(run.claims):
             continue
-        needed, any_of = _needed(run, requirement.class_), run.contract.classes[requirement.class_].one_is_enough
+        needed, any_of = _interfaces_of(run, requirement.class_), run.contract.classes[requirement.class_].one_is_enough
         problems = {name: found[name] for name in needed if found[name][0]}
         missing = len(problems) == len(needed) if any_of else bool(problems)
         shown = problems if missing else {name: found[name] for name in needed if not found[name][0]}
@@ -33,7 +33,7 @@ def test_interfaces_answer(run: Run, interfaces: Interfaces, judge: Judge) -> No
         expect(judge, id_, attempt).that(not missing, expected, problem)
 
 
-def _needed(run: Run, class_: str) -> tuple[Interface, ...]:
+def _interfaces_of(run: Run, class_: str) -> tuple[Interface, ...]:
     """Return the interfaces that a class needs of a robot."""
     there = run.contract.interfaces
     return tuple(name for name in run.contract.classes[class_].interfaces if name in there)

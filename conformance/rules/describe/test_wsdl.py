@@ -58,7 +58,7 @@ def _services(soap: SoapServices, *ids: str) -> list[SoapService]:
     return found
 
 
-def _served(service: SoapService) -> _Served:
+def _get_wsdl(service: SoapService) -> _Served:
     """Get the description from its address in the statement, else from ?wsdl at the endpoint."""
     source = service.published.url or f"{service.endpoint}?wsdl"
     exchange = get(source, service.client.connection)
@@ -82,7 +82,7 @@ def test_served(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Get the description, and everything that it refers to."""
     for service in _services(soap, "describe/wsdl"):
         for _ in range(repetitions(effort, 6)):
-            served = _served(service)
+            served = _get_wsdl(service)
             expected = "a WSDL with all that it refers to"
             expect(judge, "describe/wsdl", served.exchange).that(not served.problem, expected, served.problem)
 
@@ -93,10 +93,10 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
     ids = [f"describe/{name_}" for name_ in _COMPARED]
     for service in _services(soap, *ids):
         for _ in range(repetitions(effort, 3)):
-            served = _served(service)
+            served = _get_wsdl(service)
             for name_, (compare, expected) in _COMPARED.items():
                 same = partial(compare, service.contract)
-                found = iter([served.problem]) if served.description is None else _guarded(same, served.description)
+                found = iter([served.problem]) if served.description is None else _violations(same, served.description)
                 problem = next(found, "")
                 expect(judge, f"describe/{name_}", served.exchange).that(not problem, expected, problem)
 
@@ -107,7 +107,7 @@ def test_same_as_contract(soap: SoapServices, judge: Judge, effort: Effort) -> N
 def test_address(soap: SoapServices, judge: Judge) -> None:
     """Send a request to each address that the description names."""
     for service in _services(soap, "describe/wsdl-address"):
-        served = _served(service)
+        served = _get_wsdl(service)
         ports = served.description.all("w:service/w:port[s:address]") if served.description is not None else []
         located = [(name(port), port.find(clark(WSDL_SOAP, "address"))) for port in ports]
         if not located:
@@ -151,15 +151,15 @@ def test_profile(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Check the description by the rules of the Basic Profile."""
     for service in _services(soap, *(f"describe/wsdl-{rule}" for rule in RULES)):
         for _ in range(repetitions(effort, 3)):
-            served = _served(service)
+            served = _get_wsdl(service)
             for rule, check in RULES.items():
-                found = iter([served.problem]) if served.description is None else _guarded(check, served.description)
+                found = iter([served.problem]) if served.description is None else _violations(check, served.description)
                 problem = next(found, "")
                 expected = f"a WSDL that meets rule {rule} of the WS-I Basic Profile"
                 expect(judge, f"describe/wsdl-{rule}", served.exchange).that(not problem, expected, problem)
 
 
-def _guarded(check: Callable[[Wsdl], Iterator[str]], description: Wsdl) -> Iterator[str]:
+def _violations(check: Callable[[Wsdl], Iterator[str]], description: Wsdl) -> Iterator[str]:
     """Yield the violations that a check finds; a description too broken for the check is a violation as well."""
     try:
         yield from check(description)

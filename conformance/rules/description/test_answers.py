@@ -10,7 +10,7 @@ from conformance.api.rest.statuses import ANY_TIME, CRASHES
 from conformance.api.rest.variations import Kind
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of, wrong_formats
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.parameter_reading import parts_of
 from conformance.documents.patterns import SlowPatternError
@@ -44,7 +44,7 @@ _OF_INPUT, _ABSENT = frozenset({400, 422}), frozenset({404, 410})
 _PLAIN = frozenset({Kind.USUAL, Kind.AGAIN, Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL})
 
 
-def _answered(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Response]]:
+def _judgeable(trace: Survey, run: Run) -> Iterator[tuple[Probe, Operation, Response]]:
     """Yield the probes whose responses the description speaks of."""
     by_label = {item.label: item for item in operations_of(run.contract)}
     for probe in trace.probes:
@@ -97,7 +97,7 @@ def _successes_unseen(trace: Survey, run: Run, declares: Callable[[Operation, st
         operation.label
         for operation in operations_of(run.contract)
         if any(key.startswith("2") and declares(operation, key) for key in operation.responses)
-        and trace.held(operation.label)
+        and trace.is_held(operation.label)
     ]
     yield from held_back(probe for label in held for probe in trace.of(label, Kind.USUAL) if not probe.invents)
 
@@ -124,7 +124,7 @@ def _declared(trace: Survey, run: Run, asked: Callable[[Probe, Operation, int], 
     lacking = {item.label for item in operations_of(run.contract) if trace.lacks(item)}
     judged = {
         id(probe): (operation, answer)
-        for probe, operation, answer in _answered(trace, run)
+        for probe, operation, answer in _judgeable(trace, run)
         if _in_question(probe, answer.status) and answer.status not in CRASHES and probe.operation not in lacking
         if asked(probe, operation, answer.status)
     }
@@ -146,8 +146,8 @@ def _declared(trace: Survey, run: Run, asked: Callable[[Probe, Operation, int], 
 def media_type(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each body has a media type that is declared for its status."""
     judged: dict[int, tuple[dict[str, Schema], Response]] = {}
-    for probe, operation, answer in _answered(trace, run):
-        content = operation.declared(answer.status)
+    for probe, operation, answer in _judgeable(trace, run):
+        content = operation.schemas_for(answer.status)
         is_in_question = _in_question(probe, answer.status) or (
             answer.status in _OF_APPLICATION and str(answer.status) in operation.responses
         )
@@ -197,7 +197,7 @@ def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         schema, answer = judged[id(probe)]
         found = wrong_formats(schema, read_json(answer.body).value)
-        told = "; ".join(f"{shown(value)} at /{place}, which is no {wanted}" for value, place, wanted in found)
+        told = "; ".join(f"{clip(value)} at /{place}, which is no {wanted}" for value, place, wanted in found)
         return Fault(" ".join(sorted({wanted for _, _, wanted in found})), told) if found else None
 
     yield from _successes_unseen(trace, run, lambda operation, key: "'format'" in str(operation.responses[key]))
@@ -206,8 +206,8 @@ def formats(trace: Survey, run: Run) -> Iterable[Outcome]:
 
 def _with_schema(trace: Survey, run: Run) -> Iterator[tuple[Probe, tuple[Schema, Response]]]:
     """Yield the probes with a JSON response for which a usable schema is declared."""
-    for probe, operation, answer in _answered(trace, run):
-        content = operation.declared(answer.status) or {}
+    for probe, operation, answer in _judgeable(trace, run):
+        content = operation.schemas_for(answer.status) or {}
         names = [name for name in content if _matches(name, answer.media_type) and is_json(answer.media_type)]
         whole = not answer.cut and (answer.body or operation.method != "HEAD")
         if names and whole and answer.status not in _BODILESS and _usable(content[names[0]]):
@@ -245,7 +245,7 @@ def _wrong(schema: Schema, answer: Response) -> str:
 def headers(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether each response has the headers that are declared as required, with valid values."""
     judged: dict[int, tuple[dict[str, tuple[bool, Schema]], Response]] = {}
-    for probe, operation, answer in _answered(trace, run):
+    for probe, operation, answer in _judgeable(trace, run):
         key = operation.response_key(answer.status)
         if key is not None and operation.headers.get(key) and answer.status not in CRASHES:
             judged[id(probe)] = operation.headers[key], answer

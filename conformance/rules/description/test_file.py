@@ -30,7 +30,7 @@ def test_valid(run: Run, judge: Judge) -> None:
 @pytest.mark.requirement("description/references")
 def test_references(run: Run, judge: Judge) -> None:
     """Follow every reference."""
-    _tell(judge, "description/references", list(run.contract.unresolved), "references that lead to something")
+    _tell(judge, "description/references", list(run.contract.dead_references), "references that lead to something")
 
 
 @pytest.mark.requirement("description/ids-unique")

@@ -86,7 +86,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from held_back(sure)
-    converted = _converted(sure, run)
+    converted = _convertible(sure, run)
     acted = [one for one in sure if one.status not in HELD and one not in converted]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
 
@@ -95,7 +95,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
 def types(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether a value of another type is refused, also where the device converts it without loss."""
     sure = _forbidden(trace)
-    converted = _converted(sure, run)
+    converted = _convertible(sure, run)
 
     def fault(probe: Probe) -> Fault | None:
         why = "" if probe.says else f", although {probe.why}"
@@ -115,7 +115,7 @@ def _forbidden(trace: Survey) -> list[Probe]:
     return [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
 
 
-def _converted(probes: Iterable[Probe], run: Run) -> list[Probe]:
+def _convertible(probes: Iterable[Probe], run: Run) -> list[Probe]:
     """Return the probes whose JSON body was accepted, as a value of the declared type means the same."""
     bodies = {operation.label: operation.bodies for operation in operations_of(run.contract)}
     found = []
@@ -205,28 +205,28 @@ def optional(trace: Survey) -> Iterable[Outcome]:
 @rule("description/enums", on=(survey,))
 def enums(trace: Survey) -> Iterable[Outcome]:
     """Judge whether each value of an enumeration is accepted, if another one is."""
-    yield from _accepted(trace, (Kind.ENUM,), "each declared value of the enumeration accepted")
+    yield from _judge_accepted(trace, (Kind.ENUM,), "each declared value of the enumeration accepted")
 
 
 @rule("description/examples", on=(survey,))
 def examples(trace: Survey) -> Iterable[Outcome]:
     """Judge whether the description's examples are accepted."""
-    yield from _accepted(trace, (Kind.EXAMPLE,), "the description's example accepted", anyway=True)
+    yield from _judge_accepted(trace, (Kind.EXAMPLE,), "the description's example accepted", anyway=True)
 
 
 @rule("description/defaults", on=(survey,))
 def defaults(trace: Survey) -> Iterable[Outcome]:
     """Judge whether a default may be written out."""
-    yield from _accepted(trace, (Kind.DEFAULT,), "the declared default accepted, as when it is left out")
+    yield from _judge_accepted(trace, (Kind.DEFAULT,), "the declared default accepted, as when it is left out")
 
 
 @rule("description/valid-accepted", on=(survey, generated_requests))
 def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether requests that the description allows are accepted."""
     texts = {operation.label: operation.text for operation in operations_of(run.contract)}
-    alone = (one for one in _named(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
+    alone = (one for one in _with_known_path(trace, run) if one.ok or not _is_of_two(one, texts.get(one.operation, "")))
     trace = replace(trace, probes=tuple(alone))
-    yield from _accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
+    yield from _judge_accepted(trace, (Kind.OPTIONAL, Kind.BOUND), "a request that the description allows accepted")
     # An operation that never accepts a request may need another state; another requirement judges its status.
     works = {one.operation for one in trace.probes if one.ok}
     generated = [one for one in trace.probes if one.kind is Kind.GENERATED and one.operation in works]
@@ -255,7 +255,7 @@ def _is_extreme(probe: Probe) -> bool:
     )
 
 
-def _asked(probe: Probe) -> tuple[str, str, str]:
+def _value_key(probe: Probe) -> tuple[str, str, str]:
     """Return the operation of a probe, and the value in the place of the body that it is about, as JSON text."""
     value: Any = read_json(probe.attempt.request.body).value
     for step in probe.place.removeprefix("body /").split("/"):
@@ -263,7 +263,7 @@ def _asked(probe: Probe) -> tuple[str, str, str]:
     return probe.operation, probe.place, json_text(value)
 
 
-def _named(trace: Survey, run: Run) -> Iterator[Probe]:
+def _with_known_path(trace: Survey, run: Run) -> Iterator[Probe]:
     """Yield the probes without those whose path has a free text that was never accepted, such as a wrong id."""
     free = {
         item.label
@@ -294,15 +294,19 @@ def _path_of(probe: Probe) -> str:
     return probe.attempt.request.target.partition("?")[0]
 
 
-def _accepted(trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False) -> Iterator[Outcome]:
+def _judge_accepted(
+    trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False
+) -> Iterator[Outcome]:
     """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is."""
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
     # Only the device knows which ids and cursors exist.
     probes = [one for one in sent if (anyway or one.operation in works) and not one.invents and one.status not in HELD]
     # An input accepted in one state may be refused in another.
-    other = {_asked(one) for one in trace.probes if (one.ok or one.status in HELD) and one.place.startswith("body /")}
-    probes = [one for one in probes if one.ok or _asked(one) not in other]
+    other = {
+        _value_key(one) for one in trace.probes if (one.ok or one.status in HELD) and one.place.startswith("body /")
+    }
+    probes = [one for one in probes if one.ok or _value_key(one) not in other]
 
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:

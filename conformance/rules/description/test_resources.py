@@ -15,16 +15,16 @@ from conformance.scenarios.survey import Survey
 from conformance.verdict.evidence import Case
 
 
-def _played(name: str, scenario: Scenario) -> Rule:
+def _player(name: str, scenario: Scenario) -> Rule:
     """Return the rule that plays requests; checkers of resources, tags and contents judge each of the run."""
     return rule(f"description/{name}", on=(scenario,))(lambda _trace: ())
 
 
-head = _played("head", neighbours)
-method_refused, entity_tag = _played("method-refused", own_things), _played("entity-tag", own_things)
-if_match, digest = _played("if-match", own_things), _played("digest", own_things)
-problem_status = _played("problem-status", own_things)
-patch, read_only = _played("patch", own_things), _played("read-only", own_things)
+head = _player("head", neighbours)
+method_refused, entity_tag = _player("method-refused", own_things), _player("entity-tag", own_things)
+if_match, digest = _player("if-match", own_things), _player("digest", own_things)
+problem_status = _player("problem-status", own_things)
+patch, read_only = _player("patch", own_things), _player("read-only", own_things)
 
 
 @pytest.mark.phase("late")

@@ -32,7 +32,7 @@ def test_requests_without_a_token(api: RestInterface, rest: HttpClient, judge: J
     has_token = bool(connection.credentials)
     if not has_token:
         for id_ in ("http/authentication", "http/authentication-asked"):
-            judge.unclaimed(id_, "the run has no token, and the robot requires none")
+            judge.note_unclaimed(id_, "the run has no token, and the robot requires none")
     for call in reads(api):
         usual = call.send(api).response.status
         asking = _asking(api, call)
@@ -50,7 +50,7 @@ def test_writes_without_credentials(api: RestInterface, judge: Judge) -> None:
     """Send each operation that acts without credentials and with wrong ones: status 401, and no effect."""
     connection = api.client.connection
     if not connection.credentials:
-        judge.unclaimed(_WRITES, "the run has no credentials")
+        judge.note_unclaimed(_WRITES, "the run has no credentials")
         return
     stranger = replace(connection, token=None, credentials=connection.credentials.wrong, is_patient=False)
     with closing(HttpClient(api.client.base_url, stranger)) as unknown:
@@ -65,7 +65,7 @@ def _judge_write(api: RestInterface, judge: Judge, unknown: HttpClient, call: Ca
     cancelled = call.operation.method == "DELETE"
     if cancelled:
         _put_there(api, call)
-    before = _shown(api, call)
+    before = _get_status(api, call)
     was_so = differs_from(api, call) == ""
     fields = [("Content-Type", call.media_type)] if call.media_type else []
     for what, client, authorized in (("missing", api.client, False), ("wrong", unknown, True)):
@@ -73,7 +73,7 @@ def _judge_write(api: RestInterface, judge: Judge, unknown: HttpClient, call: Ca
             call.operation.method, call.path, headers=fields, body=call.body, authorized=authorized, fresh=True
         )
         expect(judge, _WRITES, exchange).status(401, when=f"the credentials are {what}", cause=f"{call.operation.id}")
-    gone = cancelled and before == HTTPStatus.OK and _shown(api, call) == HTTPStatus.NOT_FOUND
+    gone = cancelled and before == HTTPStatus.OK and _get_status(api, call) == HTTPStatus.NOT_FOUND
     acted = gone or (not cancelled and not was_so and takes_effect(api, call))
     expect(judge, _WRITES, exchange).that(
         not acted,
@@ -90,7 +90,7 @@ def _put_there(api: RestInterface, call: Call) -> None:
             example_call(api, operation).send(api)
 
 
-def _shown(api: RestInterface, call: Call) -> int:
+def _get_status(api: RestInterface, call: Call) -> int:
     """Return the status of GET for the resource of a request; 0 where it has none."""
     reader = reader_of(api, call)
     return reader.send(api).response.status if reader is not None else 0

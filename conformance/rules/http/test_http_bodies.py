@@ -7,7 +7,7 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
-from conformance.api.rest.applicable import answered, applicable_operations
+from conformance.api.rest.applicable import applicable_operations, working_reads
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.json_mutations import places, replaced, with_options
@@ -64,7 +64,7 @@ def _valid(api: RestInterface, judge: Judge, ids: tuple[str, ...]) -> Iterator[C
     api.device.halt(api)
 
 
-def _padded(call: Call, octets: int) -> bytes:
+def _pad(call: Call, octets: int) -> bytes:
     """Return a call's JSON body, padded with white space to ``octets`` bytes."""
     return call.body[:1] + b" " * (octets - len(call.body)) + call.body[1:]
 
@@ -87,7 +87,7 @@ def test_charset_parameter(api: RestInterface, judge: Judge) -> None:
     for call in _valid(api, judge, ("http/charset",)):
         for media_type in _CHARSETS:
             exchange = call.send(api, ("Content-Type", media_type))
-            expect(judge, "http/charset", exchange).taken(f"Content-Type is {media_type}", cause=media_type)
+            expect(judge, "http/charset", exchange).accepts(f"Content-Type is {media_type}", cause=media_type)
 
 
 @pytest.mark.requirement("http/content-too-large", "http/content-too-large-answered")
@@ -96,13 +96,13 @@ def test_sizes(api: RestInterface, judge: Judge) -> None:
     id_ = "http/content-too-large"
     judge.at_risk = (id_,)
     for number, call in enumerate(_valid(api, judge, (id_,))):
-        exchange = call.rewritten(api, _padded(call, TAKEN_OCTETS)).send(api)
-        expect(judge, id_, exchange).taken("the body has 64 KiB")
-        huge = call.carrying(_padded(call, _TOO_LARGE))
+        exchange = call.rewritten(api, _pad(call, TAKEN_OCTETS)).send(api)
+        expect(judge, id_, exchange).accepts("the body has 64 KiB")
+        huge = call.carrying(_pad(call, _TOO_LARGE))
         # At quick the framings take turns, so that each is tried.
         for fields in api.run.effort.alternatives(_FRAMINGS if number % 2 else _FRAMINGS[::-1], 1):
             _judge_too_large(api, judge, huge, fields)
-        expect(judge, id_, call.send(api)).taken("the request is valid and follows one that was too large")
+        expect(judge, id_, call.send(api)).accepts("the request is valid and follows one that was too large")
 
 
 def _judge_too_large(api: RestInterface, judge: Judge, call: Call, fields: Headers) -> None:
@@ -130,7 +130,7 @@ def test_chunked_content(api: RestInterface, judge: Judge) -> None:
     The robot must accept each as it accepts the same content with Content-Length.
     """
     for call in _valid(api, judge, ("http/chunked",)):
-        large = _padded(call, TAKEN_OCTETS)
+        large = _pad(call, TAKEN_OCTETS)
         for body, size in (
             (call.body, 1),
             (call.body, 7),
@@ -148,7 +148,7 @@ def test_chunked_content(api: RestInterface, judge: Judge) -> None:
 def _judge_chunked(api: RestInterface, judge: Judge, requirement: str, call: Call, chunks: bytes, what: str) -> None:
     fields = (f"Content-Type: {call.media_type}", "Transfer-Encoding: chunked")
     attempt = by_hand.ask(api, call.operation.method, call.path, *fields, body=chunks)
-    expect(judge, requirement, attempt).taken(f"the body comes as {what}", or_else=raw.refuses_chunks(attempt))
+    expect(judge, requirement, attempt).accepts(f"the body comes as {what}", or_else=raw.refuses_chunks(attempt))
 
 
 @pytest.mark.requirement("web-server/expect-continue")
@@ -175,7 +175,7 @@ def test_content_that_waits(api: RestInterface, judge: Judge) -> None:
 def test_case_of_media_types(api: RestInterface, judge: Judge) -> None:
     """Send media types in upper case, in Accept and in Content-Type."""
     id_ = "http/media-type-case"
-    for call in answered(api):
+    for call in working_reads(api):
         for media_type in call.operation.formats:
             # A robot need not have every format; what it sends for the usual spelling, it sends for the other.
             if call.send(api, ("Accept", media_type)).response.media_type == media_type:
@@ -188,7 +188,7 @@ def test_case_of_media_types(api: RestInterface, judge: Judge) -> None:
     for call in _valid(api, judge, (id_,)):
         for media_type in ("Application/Json", "APPLICATION/JSON; CHARSET=UTF-8"):
             exchange = call.send(api, ("Content-Type", media_type))
-            expect(judge, id_, exchange).taken(f"Content-Type is {media_type}", cause=f"Content-Type {exchange.came}")
+            expect(judge, id_, exchange).accepts(f"Content-Type is {media_type}", cause=f"Content-Type {exchange.came}")
 
 
 @pytest.mark.requirement("http/json-numbers", "http/json-integers")
@@ -198,15 +198,15 @@ def test_numbers_in_json(api: RestInterface, judge: Judge) -> None:
         for write in _FORMS:
             exchange = call.rewritten(api, with_numbers(call.value, write)).send(api)
             what = f"numbers are written like {write(-1.5)} and {write(0.0)}"
-            expect(judge, "http/json-numbers", exchange).taken(what, cause=f"{write(0.0)} {exchange.came}")
+            expect(judge, "http/json-numbers", exchange).accepts(what, cause=f"{write(0.0)} {exchange.came}")
     tried = 0
     for call in _valid(api, judge, ("http/json-integers",)):
         for value in at_integer_ends(call.value, call.operation.bodies[JSON].schema):
             tried += 1
             exchange = call.rewritten(api, json_text(value).encode()).send(api)
-            expect(judge, "http/json-integers", exchange).taken("an int32 is at an end of its range")
+            expect(judge, "http/json-integers", exchange).accepts("an int32 is at an end of its range")
     if not tried:
-        judge.unclaimed("http/json-integers", "the contract has no operation that takes an int32")
+        judge.note_unclaimed("http/json-integers", "the contract has no operation that takes an int32")
 
 
 _INT32_ENDS = (-(2**31), 2**31 - 1)
@@ -215,14 +215,14 @@ _INT32_ENDS = (-(2**31), 2**31 - 1)
 def with_numbers(value: Any, write: Callable[[float], str]) -> bytes:
     """Return JSON with floats written by ``write``; integers and texts stay unchanged."""
 
-    def written(item: Any) -> Any:
+    def with_tokens(item: Any) -> Any:
         if isinstance(item, dict):
-            return {name: written(part) for name, part in item.items()}
+            return {name: with_tokens(part) for name, part in item.items()}
         if isinstance(item, list):
-            return [written(part) for part in item]
+            return [with_tokens(part) for part in item]
         return Token(write(item)) if isinstance(item, float) else item
 
-    return json_text(written(value)).encode()
+    return json_text(with_tokens(value)).encode()
 
 
 def at_integer_ends(value: Any, schema: Schema) -> Iterator[Any]:

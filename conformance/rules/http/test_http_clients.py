@@ -8,7 +8,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.questions import Question, misplaced, questions, rounds
+from conformance.api.rest.questions import Question, mismatch_of, questions, rounds
 from conformance.transport import raw
 from conformance.transport.client import HttpClient
 from conformance.transport.exchange import Attempt, Unanswered
@@ -49,7 +49,7 @@ def test_answers_do_not_cross(api: RestInterface, judge: Judge, asked: list[Ques
     for question, attempt in zip(itertools.chain(*turns), itertools.chain(*attempts), strict=True):
         if isinstance(attempt, Unanswered) or is_busy(attempt):
             continue  # a robot that serves few clients at a time is not blamed
-        mismatch = misplaced(api, question, attempt.response)
+        mismatch = mismatch_of(api, question, attempt.response)
         expect(judge, "robustness/own-answer", attempt).that(
             not mismatch, "the response to this request while other clients send theirs", mismatch, cause="mismatch"
         )
@@ -82,7 +82,7 @@ def test_answers_come_in_order(api: RestInterface, rest: HttpClient, judge: Judg
                     _judge_forgotten(api, judge, octets, attempt)
                     return
                 break
-            mismatch = misplaced(api, question, attempt.response)
+            mismatch = mismatch_of(api, question, attempt.response)
             expect(judge, "web-server/pipelining", attempt).that(
                 not mismatch, f"the response to GET {question.path} in its turn", mismatch, cause="another order"
             )

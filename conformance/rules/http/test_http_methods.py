@@ -5,9 +5,9 @@ from typing import cast
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.permission import permitted
+from conformance.api.permission import permitted_methods
 from conformance.api.rest import by_hand
-from conformance.api.rest.applicable import allowed, reads
+from conformance.api.rest.applicable import allows, reads
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import SAFE, Resource, resources_of
@@ -33,9 +33,9 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     """
     found = []
     for resource in resources_of(api.run.contract):
-        if not any(allowed(api, item) for item in resource.operations.values()):
+        if not any(allows(api, item) for item in resource.operations.values()):
             continue
-        first = _found(api, resource) or example_call(api, next(iter(resource.operations.values())))
+        first = _find_call(api, resource) or example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
         call = Call(first.operation, first.values)
         if resource.optional:
@@ -46,7 +46,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
     return found
 
 
-def _found(api: RestInterface, resource: Resource) -> Call | None:
+def _find_call(api: RestInterface, resource: Resource) -> Call | None:
     """Return a request for a resource, with ids of a thing that the survey has found there."""
     own = (api.working[item.label] for item in resource.operations.values() if item.label in api.working)
     if call := next(own, None):
@@ -72,9 +72,9 @@ def test_methods_that_a_resource_has_not(api: RestInterface, judge: Judge) -> No
         # A further method that the resource allows is the vendor's own, and may do anything: it is not sent.
         there = {*resource.methods, *(("HEAD",) if "GET" in resource.methods else ())}
         # Unless it has to be refused, such a method may act all the same; a safe one does not (RFC 9110 9.2.1).
-        there |= _named(call.send(api, method="OPTIONS")) if is_refused else set(_STANDARD) - SAFE
+        there |= _allowed_methods(call.send(api, method="OPTIONS")) if is_refused else set(_STANDARD) - SAFE
         lacking = [name for name in _STANDARD if name not in there]
-        sendable = permitted(api.run, api.client, lacking, call.path, "http/method-not-allowed", "http/allow")
+        sendable = permitted_methods(api.run, api.client, lacking, call.path, "http/method-not-allowed", "http/allow")
         for method in api.run.effort.subsample(sendable, 2):
             exchange = call.send(api, method=method)
             cause = f"{method} {exchange.response.status}"
@@ -87,7 +87,7 @@ def test_methods_that_nobody_knows(api: RestInterface, judge: Judge) -> None:
     """Send unknown methods, which a server may reject before it looks at the resource."""
     ids = ("http/unknown-method", "http/unknown-method-refused")
     for _, call in api.run.effort.subsample(_resources(api), 2):
-        for method in permitted(api.run, api.client, _UNKNOWN, call.path, *ids):
+        for method in permitted_methods(api.run, api.client, _UNKNOWN, call.path, *ids):
             attempt: Attempt
             try:
                 attempt = call.send(api, method=method)
@@ -114,7 +114,7 @@ def test_options(api: RestInterface, judge: Judge) -> None:
             call.send(api)
 
 
-def _named(exchange: Exchange) -> set[str]:
+def _allowed_methods(exchange: Exchange) -> set[str]:
     """Return the methods that Allow names."""
     return {name.strip() for name in (exchange.response.header("allow") or "").split(",")} - {""}
 

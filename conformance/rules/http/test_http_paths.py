@@ -5,7 +5,7 @@ from functools import partial
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.permission import permitted
+from conformance.api.permission import permitted_methods
 from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import reads
 from conformance.api.rest.calls import JSON, example_call
@@ -49,7 +49,7 @@ def test_unknown_paths(api: RestInterface, rest: HttpClient, judge: Judge) -> No
     """Send each method to unknown paths; the checkers judge the problem documents."""
     paths = _unknown_paths(api)
     for path in api.run.effort.draw(paths, _PATHS, f"{api.run.seed}/unknown paths"):
-        for method in api.run.effort.subsample(permitted(api.run, rest, _METHODS, path), 3):
+        for method in api.run.effort.subsample(permitted_methods(api.run, rest, _METHODS, path), 3):
             exchange = rest.send(method, path)
             status = exchange.response.status
             # Outside the contract's paths another server may answer, in front of the robot.
@@ -95,7 +95,7 @@ def test_trailing_slash(api: RestInterface, rest: HttpClient, judge: Judge) -> N
         got = f"status {status}" + (f" to {location}" if location else "")
         expect(judge, "http/trailing-slash", exchange).that(right, expected, got, cause=f"{status}")
     if not tried:
-        judge.unclaimed("http/trailing-slash", "the contract has no path with a trailing slash to cut")
+        judge.note_unclaimed("http/trailing-slash", "the contract has no path with a trailing slash to cut")
 
 
 def _leads_to(exchange: Exchange, path: str) -> bool:
@@ -150,7 +150,9 @@ def test_large_field(api: RestInterface, judge: Judge) -> None:
 def test_targets_of_8000_octets(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send a target of 8,000 octets where the robot takes a short one: RECOMMENDED (RFC 9110 4.1)."""
     if rest.connection.credentials.repeats_target:
-        judge.unclaimed("http/target-length", "a digest repeats the target in a header, whose size may have a limit")
+        judge.note_unclaimed(
+            "http/target-length", "a digest repeats the target in a header, whose size may have a limit"
+        )
         return
     for call in [call for call in reads(api) if not call.operation.optional]:
         path = f"{call.path}{'&' if '?' in call.path else '?'}roaas="

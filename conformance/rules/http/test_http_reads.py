@@ -56,7 +56,7 @@ class _Reads:
     dropped: list[int] = field(default_factory=list)
 
     @property
-    def lost(self) -> list[Attempt]:
+    def failed_reads(self) -> list[Attempt]:
         """The reads without an answer: a server error, too many requests, or no response."""
         return [
             exchange
@@ -70,14 +70,14 @@ class _Reads:
         """The lost reads that the robot deferred with a Retry-After."""
         return [
             exchange
-            for exchange in self.lost
+            for exchange in self.failed_reads
             if isinstance(exchange, Exchange) and exchange.response.put_off_s is not None
         ]
 
     @property
     def fine(self) -> bool:
         """Whether at least 99 % were answered; a single lost read is no share."""
-        return len(self.lost) <= max(1, len(self.attempts) // 100)
+        return len(self.failed_reads) <= max(1, len(self.attempts) // 100)
 
     def note(self, attempt: Attempt, usual: int, dropped: int) -> None:
         """Add one read of a series."""
@@ -180,14 +180,14 @@ def test_availability(api: RestInterface, judge: Judge, series: _Reads) -> None:
         _wait(seen)
         seen = _read(api, calls, "10 reads a second", _READS, _EVERY_S, _READS * _EVERY_S)
     # A robot may set its clients a rate, but not one below a read a second.
-    if not seen.fine and len(seen.put_off) == len(seen.lost):
+    if not seen.fine and len(seen.put_off) == len(seen.failed_reads):
         _wait(seen)
         seen = _read(api, calls, "1 read a second", _SLOW_READS, _SLOW_S, _SLOW_READS * _SLOW_S)
-    shown = (seen.lost or seen.attempts)[-1]
+    shown = (seen.failed_reads or seen.attempts)[-1]
     expect(judge, _AVAILABLE, shown).that(
         seen.fine,
         f"at least 99 % of the reads answered ({seen.rate})",
-        f"{len(seen.lost)} of {len(seen.attempts)} reads without an answer, the last one with {shown.came}",
+        f"{len(seen.failed_reads)} of {len(seen.attempts)} reads without an answer, the last one with {shown.came}",
         cause=shown.came,
     )
 

@@ -6,7 +6,7 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
-from conformance.api.rest.applicable import answered
+from conformance.api.rest.applicable import working_reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.transport import raw
@@ -28,7 +28,7 @@ _TRIES = 3
 _PIECES, _APART_S = 12, 0.003
 
 
-def _asked(api: RestInterface, path: str, *fields: str, cuts: tuple[int, ...] = ()) -> Attempt:
+def _ask(api: RestInterface, path: str, *fields: str, cuts: tuple[int, ...] = ()) -> Attempt:
     return by_hand.ask(api, "GET", path, *fields, cuts=cuts, pause_s=_APART_S)
 
 
@@ -42,13 +42,13 @@ def _kind(attempt: Attempt) -> tuple[int, str]:
 def _usual_kind(api: RestInterface, path: str, *fields: str) -> tuple[int, str]:
     """Return the kind that other responses are compared with: not that of a server error now and then."""
     for _ in range(_TRIES):
-        kind = _kind(_asked(api, path, *fields))
+        kind = _kind(_ask(api, path, *fields))
         if kind[0] < HTTPStatus.INTERNAL_SERVER_ERROR:
             break
     return kind
 
 
-def _named(kind: tuple[int, str]) -> str:
+def _kind_text(kind: tuple[int, str]) -> str:
     """Return status and media type in words."""
     status, media_type = kind
     return f"status {status} with {media_type}" if status and media_type else f"{media_type or f'status {status}'}"
@@ -56,7 +56,7 @@ def _named(kind: tuple[int, str]) -> str:
 
 def _telling_read(api: RestInterface) -> tuple[Call, str, tuple[int, str]] | None:
     """Return a GET, an Accept that changes its response, and that response's kind; None if there is no such GET."""
-    for call in answered(api)[:1]:
+    for call in working_reads(api)[:1]:
         usual = _usual_kind(api, call.path)
         for media_type in (*call.operation.formats, _NOTHING):
             other = _usual_kind(api, call.path, f"Accept: {media_type}")
@@ -72,17 +72,17 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
     found = _telling_read(api)
     if found is None:
         for id_ in ("web-server/field-forms", "web-server/field-lines"):
-            judge.unclaimed(id_, "the robot responds alike whatever Accept is")
+            judge.note_unclaimed(id_, "the robot responds alike whatever Accept is")
         return
     call, media_type, wanted = found
     for form in _FIELDS:
         line = form.format(media_type)
-        attempt = _asked(api, call.path, line)
-        expected = f"{_named(wanted)} when the field is {line!r}, as with 'Accept: {media_type}'"
+        attempt = _ask(api, call.path, line)
+        expected = f"{_kind_text(wanted)} when the field is {line!r}, as with 'Accept: {media_type}'"
         expect(judge, "web-server/field-forms", attempt).that(_kind(attempt) == wanted, expected, cause=form)
     for lines in _LINES:
-        attempt = _asked(api, call.path, *(line.format(media_type) for line in lines))
-        expected = f"{_named(wanted)} when Accept stands in {len(lines)} lines, one of them with {media_type}"
+        attempt = _ask(api, call.path, *(line.format(media_type) for line in lines))
+        expected = f"{_kind_text(wanted)} when Accept stands in {len(lines)} lines, one of them with {media_type}"
         expect(judge, "web-server/field-lines", attempt).that(_kind(attempt) == wanted, expected)
 
 
@@ -90,15 +90,15 @@ def test_fields_in_any_form(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement("http/octet-stream")
 def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send requests in several TCP segments."""
-    for call in answered(api, "http/octet-stream")[:2]:
+    for call in working_reads(api, "http/octet-stream")[:2]:
         fields = ("Accept: application/json", "User-Agent: " + "roaas " * 4)
         wanted = _usual_kind(api, call.path, *fields)
         length = len(raw.head(rest, "GET", call.path, *fields))
         even = tuple(length * piece // _PIECES for piece in range(1, _PIECES))
         # At the end: between the carriage returns and the line feeds.
         for cuts in (even, (1, 2, 3, 4), (length - 3, length - 2, length - 1)):
-            attempt = _asked(api, call.path, *fields, cuts=cuts)
-            expected = f"{_named(wanted)} when the request comes in {len(cuts) + 1} segments, as in one"
+            attempt = _ask(api, call.path, *fields, cuts=cuts)
+            expected = f"{_kind_text(wanted)} when the request comes in {len(cuts) + 1} segments, as in one"
             expect(judge, "http/octet-stream", attempt).that(_kind(attempt) == wanted, expected)
 
 
@@ -107,7 +107,7 @@ def test_requests_in_pieces(api: RestInterface, rest: HttpClient, judge: Judge) 
 def test_the_end_of_a_connection(api: RestInterface, rest: HttpClient, judge: Judge) -> None:
     """Send Connection: close, and requests of an HTTP/1.0 client, which does not know chunked encoding."""
     judge.at_risk = ("web-server/close",)
-    for call in answered(api, "web-server/close", "web-server/old-client")[:1]:
+    for call in working_reads(api, "web-server/close", "web-server/old-client")[:1]:
         octets = raw.head(rest, "GET", call.path, "Connection: close")
         came = by_hand.talk(api, octets, timeout_s=_ENDS_S + 4 * api.run.effort.usual_ms / 1000)
         attempt, _ = raw.read_one(rest, octets, came, "GET")

@@ -7,7 +7,7 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest.applicable import applicable_operations, reads, usable_operations
 from conformance.api.rest.calls import JSON, Call, example_call
-from conformance.api.rest.effects import changed, changes_by_itself, flatten, reader_of, settles_at, take_snapshots
+from conformance.api.rest.effects import changes_by_itself, deltas, flatten, reader_of, settles_at, take_snapshots
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.statuses import is_taken
 from conformance.transport.exchange import Exchange
@@ -104,7 +104,7 @@ def _judge_safe(api: RestInterface, judge: Judge) -> None:
         for call in calls:
             id_ = call.operation.id
             exchange = call.send(api, ("Accept", JSON))
-            for place, (old, new) in changed(before[id_][0], flatten(exchange)).items():
+            for place, (old, new) in deltas(before[id_][0], flatten(exchange)).items():
                 found[id_, place] = exchange
                 changes[id_, place] = f"{place} of {id_} changed from {old!r} to {new!r}"
         suspects = found if turn == 0 else {key: item for key, item in found.items() if key in suspects}

@@ -46,12 +46,12 @@ class _Pair:
     closed: bool
 
     @property
-    def crashed(self) -> bool:
+    def has_crash(self) -> bool:
         """Return whether either request made the robot crash."""
         return any(isinstance(came, Exchange) and came.response.status in CRASHES for came in (self.first, self.second))
 
     @property
-    def rejected(self) -> bool:
+    def is_rejected(self) -> bool:
         """Whether the first request was rejected; 501 is for a transfer coding that an old server does not know."""
         if isinstance(self.first, Unanswered):
             return self.first.kind is NoAnswer.CLOSED
@@ -62,16 +62,16 @@ class _Pair:
         )
 
     @property
-    def taken(self) -> bool:
+    def is_taken(self) -> bool:
         """Whether the first request was processed."""
         return isinstance(self.first, Exchange) and self.first.response.ok
 
     @property
     def fault(self) -> str:
         """Return the evidence that the requests were read differently from how they were sent; empty if none."""
-        if self.rejected:
+        if self.is_rejected:
             return ""
-        if not self.taken:
+        if not self.is_taken:
             return self.first.came
         if self.second is None:
             return "" if self.closed else "no response to the request behind it, and the connection stays open"
@@ -87,7 +87,7 @@ def _send(api: RestInterface, path: str, *fields: str, body: bytes = b"") -> _Pa
     """Send a pair; send it again if the robot crashes."""
     for _ in range(_TRIES):
         pair = _send_once(api, path, *fields, body=body)
-        if not pair.crashed:
+        if not pair.has_crash:
             break
     return pair
 
@@ -134,7 +134,7 @@ def test_length_and_chunks(api: RestInterface, judge: Judge) -> None:
         _judge(judge, _BOTH, pair, "Transfer-Encoding and Content-Length")
         closed = pair.closed and pair.second is None
         expect(judge, _CLOSED, pair.first).that(
-            closed or not pair.taken,
+            closed or not pair.is_taken,
             "a closed connection after the response to a request with Transfer-Encoding and Content-Length",
             "another response on the same connection" if pair.second else "a connection that stays open",
         )

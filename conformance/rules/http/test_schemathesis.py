@@ -8,7 +8,7 @@ from contextlib import suppress
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import allowed
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.motion_guard import MotionGuard
 from conformance.api.rest.refusals import judge_refusal
@@ -74,14 +74,14 @@ def _send_generated(api: RestInterface, judge: Judge, explore: Explorer, *, movi
         if item is not None:
             _judge_generated(api, judge, guard, item)
 
-    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allowed(api, item)}
+    labels = {item.label for item in operations_of(api.run.contract) if item.motion == moving and allows(api, item)}
     for target in (one for one in targets(api.run.contract, undeclared=True) if one.label in labels):
         coverage = effort.draw_passing(target.covering(), _COVERAGE, f"{api.run.seed}/coverage {target.label}")
         for case in effort.subsample(coverage, 1):
             send(case)
         for negative in (True, False) if target.has_input and not effort.slow else ():
             with suppress(*NOT_GENERATED):
-                explore(target.fuzzed(negative=negative), send, cases=_FUZZED)
+                explore(target.strategy(negative=negative), send, cases=_FUZZED)
         if moving:
             api.device.halt(api)
 

@@ -9,7 +9,7 @@ from statistics import median
 
 from conformance.measures.samples import SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion import moves, several
-from conformance.scenarios.motion.measuring import end_of_travel, measured
+from conformance.scenarios.motion.measuring import end_of_travel, speed_in
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.statement.motion_map import MotionMap
@@ -52,10 +52,12 @@ def usable(leg: Leg) -> tuple[Reading, ...]:
     return tuple(reading for reading in leg.readings if reading.values)
 
 
-def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
+def judge_goal(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device was at a target when its time was over."""
-    if not goal.accepted:
-        yield Case(holds=False, exchange=goal.exchange, expected=f"a 2xx for {named(goal.targets)}, within the limits")
+    if not goal.is_ok:
+        yield Case(
+            holds=False, exchange=goal.exchange, expected=f"a 2xx for {in_words(goal.targets)}, within the limits"
+        )
         return
     seen = usable(leg)
     # What it shows when its time is over counts, or, where it was there before, what it showed last.
@@ -65,7 +67,7 @@ def reached(leg: Leg, goal: Command, motion: MotionMap) -> Iterator[Outcome]:
     if len(last) < SEVERAL or (apart and not late):
         yield NotTested("the state could not be read when the time was over")
         return
-    expected = f"{named(goal.targets)} reached {leg.due - goal.answered:.2f} s after the response ({leg.what})"
+    expected = f"{in_words(goal.targets)} reached {leg.due - goal.answered:.2f} s after the response ({leg.what})"
     found = f"{apart}, {last[-1].sent - goal.answered:.2f} s after the response"
     yield Case(not apart, goal.exchange, expected, observed=found)
 
@@ -78,7 +80,7 @@ def tries_of(drives: Sequence[Drive]) -> Iterable[list[Drive]]:
     return found.values()
 
 
-def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
+def follows(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drove as commanded; a drive that a slow link broke off is repeated."""
     seen = [reading for drive in drives for reading in (*drive.under_way, *drive.after)]
     for tries in tries_of(drives):
@@ -87,49 +89,49 @@ def driven(drives: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
             one
             for one in tries
             if motion.velocity is not None
-            and (one.was_kept(motion.velocity.hold_s) or not all(command.accepted for command in one.commands))
+            and (one.was_kept(motion.velocity.hold_s) or not all(command.is_ok for command in one.commands))
         ]
-        found = [outcome for one in shown for outcome in _driven(one, motion, seen)]
+        found = [outcome for one in shown for outcome in _judge_drive(one, motion, seen)]
         cases = [case for case in found if isinstance(case, Case)]
         yield from cases or found
         if not shown:
             yield NotTested("over this link the device was not driven on within its hold time")
 
 
-def _driven(drive: Drive, motion: MotionMap, so_far: Sequence[Reading]) -> Iterator[Outcome]:
+def _judge_drive(drive: Drive, motion: MotionMap, so_far: Sequence[Reading]) -> Iterator[Outcome]:
     if motion.velocity is None:
         return
-    refused = next((command for command in drive.commands if not command.accepted), None)
+    refused = next((command for command in drive.commands if not command.is_ok), None)
     if refused is not None:
-        yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.named}")
+        yield Case(holds=False, exchange=refused.exchange, expected=f"a 2xx for {drive.name}")
         return
     first = drive.commands[0]
-    seen = [reading for reading in drive.under_way if reading.sent >= drive.settled(motion.velocity.settle_s)]
+    seen = [reading for reading in drive.under_way if reading.sent >= drive.settled_at(motion.velocity.settle_s)]
     for name, wanted in drive.wanted.items():
         if (place := end_of_travel(drive.under_way, name, wanted, motion, so_far)) is not None:
             yield NotTested(f"it stands at {place:.4g}, maybe the end of its travel: write its limits into the map")
             continue
-        found = measured(seen, name, motion)
+        found = speed_in(seen, name, motion)
         if found is None:
             yield NotTested("the velocity could not be measured")
             continue
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             first.exchange,
-            f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.named})",
+            f"{name} at {wanted:.4g} per second {motion.velocity.settle_s:g} s after the response ({drive.name})",
             observed=f"{found:.4g}",
             cause=name,
         )
-        yield from renewed(drive, name, wanted, motion)
+        yield from judge_renewed(drive, name, wanted, motion)
 
 
-def renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
+def judge_renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a velocity that was sent again and again outlasts the hold time of the first command."""
     hold_s = motion.velocity.hold_s if motion.velocity else None
     first = drive.commands[0]
     late = [reading for reading in drive.under_way if hold_s and reading.sent >= first.answered + hold_s]
     long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
-    found = measured(late, name, motion) if wanted and long_enough else None
+    found = speed_in(late, name, motion) if wanted and long_enough else None
     if found is not None:
         slow = slowest(late, name, wanted)
         if slow is not None and slow < _LULL * abs(wanted) and abs(wanted) > 2 * motion.speed_tolerance(name):
@@ -137,7 +139,7 @@ def renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterat
         yield Case(
             abs(found - wanted) <= motion.speed_tolerance(name),
             drive.commands[-1].exchange,
-            f"{name} still at {wanted:.4g} per second {hold_s:g} s after the first of several commands ({drive.named})",
+            f"{name} still at {wanted:.4g} per second {hold_s:g} s after the first of several commands ({drive.name})",
             observed=f"{found:.4g}",
             cause=f"{name} renewed",
         )
@@ -149,7 +151,7 @@ def slowest(readings: Sequence[Reading], name: str, wanted: float) -> float | No
     return min((median(seen[index : index + SEVERAL]) for index in range(len(seen) - SEVERAL + 1)), default=None)
 
 
-def named(position: dict[str, float]) -> str:
+def in_words(position: dict[str, float]) -> str:
     """Return a position as a noun phrase."""
     return ", ".join(f"{axis} {value:.4g}" for axis, value in position.items())
 
@@ -160,7 +162,7 @@ def moved_axis(leg: Leg) -> str:
     return max(goal, key=lambda name: abs(goal[name] - leg.start[name]))
 
 
-def stopped(
+def halts(
     legs: tuple[Leg, ...], motion: MotionMap
 ) -> Iterator[tuple[Leg, tuple[Reading, ...], NotTested | Case | None]]:
     """Yield legs with a stop, the readings from when the device must rest, or why they cannot be judged.
@@ -171,7 +173,7 @@ def stopped(
         tries = list(group)
         # A link holds back one response, and not each of several.
         excused = not is_each_late([(leg.commands[1], leg.readings) for leg in tries])
-        found = [(leg, *_stopped(leg, motion, excused=excused)) for leg in tries]
+        found = [(leg, *_at_rest(leg, motion, excused=excused)) for leg in tries]
         usable = [one for one in found if not isinstance(one[2], NotTested)]
         yield from usable or found[-1:]
 
@@ -222,9 +224,9 @@ def went_on(
     return ""
 
 
-def _stopped(leg: Leg, motion: MotionMap, *, excused: bool) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
+def _at_rest(leg: Leg, motion: MotionMap, *, excused: bool) -> tuple[tuple[Reading, ...], NotTested | Case | None]:
     stop, order = motion.stop, leg.commands[1]
-    if stop is None or not order.accepted:
+    if stop is None or not order.is_ok:
         return (), Case(holds=False, exchange=order.exchange, expected="a 2xx for a stop under way")
     axis = moved_axis(leg)
     began = must_rest_from(order, leg.readings, excused=excused)

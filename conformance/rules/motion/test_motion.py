@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL
-from conformance.rules.motion.judging import ALL, at, legs_of, moved_axis, named, off, reached, stopped, usable
-from conformance.scenarios.motion.measuring import measured
+from conformance.rules.motion.judging import ALL, at, halts, in_words, judge_goal, legs_of, moved_axis, off, usable
+from conformance.scenarios.motion.measuring import speed_in
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.several import several_clients, several_drivers
@@ -34,7 +34,7 @@ _NO_STOP = NotClaimed("the map declares no stop")
 def reaches(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether each target within the limits is reached in time."""
     for leg in trace:
-        yield from reached(leg, leg.commands[-1], motion)
+        yield from judge_goal(leg, leg.commands[-1], motion)
 
 
 @rule("motion/stays", on=(targets,))
@@ -47,7 +47,7 @@ def stays(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             continue
         last = seen[-SEVERAL:]
         apart = off(at(last, motion), goal.targets, motion, 1.5)
-        yield Case(not apart, goal.exchange, f"{named(goal.targets)} kept", observed=f"{apart} after it was reached")
+        yield Case(not apart, goal.exchange, f"{in_words(goal.targets)} kept", observed=f"{apart} after it was reached")
 
 
 def _first_at(readings: tuple[Reading, ...], goal: dict[str, float], motion: MotionMap) -> int | None:
@@ -94,7 +94,7 @@ def speed(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         for index, one in enumerate(seen):
             later = next((two for two in seen[index:] if two.sent - one.received > _APART_S), None)
             if later is not None:
-                moved = motion.state.axes[name].moved(later.values[name], one.values[name]) - motion.tolerance(name)
+                moved = motion.state.axes[name].distance(later.values[name], one.values[name]) - motion.tolerance(name)
                 highest = max(highest, moved / (later.received - one.sent))
         yield Case(
             highest <= _FASTER * most,
@@ -110,7 +110,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a stop under way stops the device in time, before its target."""
     if motion.stop is None:
         yield _NO_STOP
-    for leg, readings, unusable in stopped(trace, motion):
+    for leg, readings, unusable in halts(trace, motion):
         if unusable is not None:
             yield unusable
             continue
@@ -124,7 +124,7 @@ def stop_rests(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             f"rest {rests_s:g} s after {leg.what}, before the target",
             observed=f"{moved}, {seen.sent - order.sent:.2f} s after the stop"
             if moved
-            else f"the target reached all the same: {named(where)}",
+            else f"the target reached all the same: {in_words(where)}",
             cause="moves" if moved else "arrived",
         )
 
@@ -141,7 +141,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that was stopped stays where it is, and does not resume its way."""
     if motion.stop is None:
         yield _NO_STOP
-    for leg, readings, unusable in stopped(trace, motion):
+    for leg, readings, unusable in halts(trace, motion):
         if unusable is None:
             if _soon(readings, motion)[0]:
                 yield NotTested("the device did not come to rest in time: motion/stop")
@@ -161,12 +161,12 @@ def new_target(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in trace:
         first, second = leg.commands[:2]
         if not refuses:
-            yield from reached(leg, second, motion)
+            yield from judge_goal(leg, second, motion)
             yield from _given_up(leg, motion)
-        elif second.refused or _arrives_at(leg, motion) > second.answered:
-            yield Case(second.refused, second.exchange, "4xx for a second move under way")
-            if second.refused:
-                yield from reached(leg, first, motion)
+        elif second.is_refused or _arrives_at(leg, motion) > second.answered:
+            yield Case(second.is_refused, second.exchange, "4xx for a second move under way")
+            if second.is_refused:
+                yield from judge_goal(leg, first, motion)
         else:
             yield NotTested("the device may have arrived before it got the second move")
 
@@ -190,7 +190,7 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
     first, second = leg.commands[:2]
     settle_s = motion.goto.settle_s if motion.goto else 0.0
     readings = leg.after(second.answered + settle_s)
-    if not second.accepted or len(readings) < SEVERAL:
+    if not second.is_ok or len(readings) < SEVERAL:
         return
     axis = moved_axis(leg)
     ahead = 1 if first.targets[axis] > leg.start[axis] else -1
@@ -208,18 +208,18 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
 @rule("motion/last-of-many", on=(many_commands,))
 def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device ends at the last accepted of many targets."""
-    accepted = [command for command in trace.commands if command.accepted]
+    accepted = [command for command in trace.commands if command.is_ok]
     if not accepted:
         yield Case(holds=False, exchange=trace.commands[-1].exchange, expected="a 2xx for one of many moves at least")
     else:
-        yield from reached(trace, accepted[-1], motion)
+        yield from judge_goal(trace, accepted[-1], motion)
 
 
 @rule("motion/repeated", on=(repeated,))
 def repetition(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move that is sent twice ends where it ends when it is sent once."""
-    accepted = [command for command in trace.commands if command.accepted]
-    yield from reached(trace, (accepted or list(trace.commands))[-1], motion)
+    accepted = [command for command in trace.commands if command.is_ok]
+    yield from judge_goal(trace, (accepted or list(trace.commands))[-1], motion)
 
 
 @rule("motion/one-client", on=(several_clients, several_drivers))
@@ -229,27 +229,27 @@ def one_client(trace: tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) ->
         if isinstance(leg, Drive):
             yield from _of_one_driver(leg, motion)
             continue
-        accepted = [command for command in leg.commands if command.accepted]
+        accepted = [command for command in leg.commands if command.is_ok]
         seen = usable(leg)[-SEVERAL:]
         if not accepted or len(seen) < SEVERAL:
             yield NotTested("no client's move was accepted" if not accepted else "the state could not be read")
             continue
         here = at(seen, motion)
         fits = any(not off(here, command.targets, motion) for command in accepted)
-        yield Case(fits, accepted[-1].exchange, "the target of one client", observed=named(here))
+        yield Case(fits, accepted[-1].exchange, "the target of one client", observed=in_words(here))
 
 
 def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device follows one of several clients' commands, not a mixture."""
-    accepted = [command for command in drive.commands if command.accepted]
+    accepted = [command for command in drive.commands if command.is_ok]
     if motion.velocity is None or not accepted:
         return
     if drive.at_end:
         yield NotTested("it stands where its travel seems to end: write its limits into the map")
         return
-    begin, end = drive.settled(motion.velocity.settle_s), accepted[-1].sent + (motion.velocity.hold_s or math.inf)
+    begin, end = drive.settled_at(motion.velocity.settle_s), accepted[-1].sent + (motion.velocity.hold_s or math.inf)
     seen = [reading for reading in drive.under_way if begin <= reading.sent and reading.received <= end]
-    found = {name: measured(seen, name, motion) for name in motion.velocity.axes}
+    found = {name: speed_in(seen, name, motion) for name in motion.velocity.axes}
     lasted_s = seen[-1].sent - seen[0].sent if seen else 0.0
     # By positions a velocity is seen in a while only: their noise moves a short one.
     brief = {name for name, axis in motion.velocity.axes.items() if axis.of and lasted_s < _TOLD_S}
@@ -263,4 +263,4 @@ def _of_one_driver(drive: Drive, motion: MotionMap) -> Iterator[Outcome]:
         all(abs(speeds[name] - command.targets[name]) < most / 2 for name, most in fastest_of.items() if most)
         for command in accepted
     )
-    yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=named(speeds), cause="velocity")
+    yield Case(fits, accepted[-1].exchange, "the velocity of one client", observed=in_words(speeds), cause="velocity")

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterable, Iterator
 
 from conformance.measures.samples import SEVERAL
-from conformance.rules.motion.judging import ALL, at, driven, legs_of, off, reached, usable
+from conformance.rules.motion.judging import ALL, at, follows, judge_goal, legs_of, off, usable
 from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.moves import clamped_targets
 from conformance.scenarios.motion.resting import fastest
@@ -17,7 +17,7 @@ from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
 
-def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
+def _movement(quiet: Quiet, motion: MotionMap) -> str | None:
     """Return how the device moved in a watch; empty if it stayed, None if it could not be read.
 
     It may rest anywhere within the tolerance of its last target, so two places of rest may be twice that apart.
@@ -36,7 +36,7 @@ def _moved(quiet: Quiet, motion: MotionMap) -> str | None:
 def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outcome]:
     """Judge that attempts of some kinds moved nothing: together, or, where the device moved, each alone."""
     tried = [attempt for attempt in trace.tried if attempt.kind in kinds]
-    together = _moved(trace, motion)
+    together = _movement(trace, motion)
     if not tried:
         yield NotClaimed("of the map and the description no such request can be made")
     elif together is None:
@@ -51,13 +51,13 @@ def nothing_moved(trace: Quiet, motion: MotionMap, *kinds: str) -> Iterator[Outc
 
 def _moves_anyway(trace: Quiet, motion: MotionMap) -> bool:
     """Return whether the device also moved without an attempt, because its position or velocity drifts or lags."""
-    return trace.idle is not None and bool(_moved(trace.idle, motion))
+    return trace.idle is not None and bool(_movement(trace.idle, motion))
 
 
 def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[Outcome]:
     """Judge attempts that were repeated singly, because the device moved after all of them."""
     for quiet in trace.alone:
-        moved = _moved(quiet, motion)
+        moved = _movement(quiet, motion)
         last = (
             [attempt for attempt in quiet.tried if attempt.exchange and not is_refusal(attempt.exchange)]
             or list(quiet.tried)
@@ -72,7 +72,7 @@ def _alone(trace: Quiet, motion: MotionMap, kinds: tuple[str, ...]) -> Iterator[
         yield NotTested("the device moved after several attempts, and did not come back for each of them alone")
 
 
-def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
+def judge_refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
     """Judge whether attempts are refused, with a given status if there are any; over SOAP by a fault."""
     for attempt in tried:
         soap = attempt.exchange is not None and is_soap(attempt.exchange)
@@ -87,22 +87,22 @@ def refused(tried: Iterable[Tried], *statuses: int) -> Iterator[Outcome]:
 def beyond_limits(trace: Quiet | tuple[Leg, ...] | tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether targets and velocities beyond the limits are refused or clamped, as the map declares."""
     if not isinstance(trace, Quiet):
-        yield from driven(tuple(drive for drive in trace if isinstance(drive, Drive)), motion)
+        yield from follows(tuple(drive for drive in trace if isinstance(drive, Drive)), motion)
         for leg in trace:
             if isinstance(leg, Leg):
-                yield from reached(leg, leg.commands[-1], motion)
+                yield from judge_goal(leg, leg.commands[-1], motion)
         return
     if all(one is None or one.beyond_limits == "undefined" for one in (motion.goto, motion.velocity)):
         yield NotClaimed("the map does not say what becomes of a target beyond the limits")
-    yield from refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
+    yield from judge_refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
 
 
 @rule("motion/refused-still", on=(attempts_at_rest,))
 def refused_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a target beyond the limits, or an invalid one, moves nothing."""
     yield from nothing_moved(trace, motion, "beyond", "invalid", "unactuated")
-    together = _moved(trace, motion)
-    alone = trace.idle is not None and not any(_moved(quiet, motion) for quiet in trace.alone)
+    together = _movement(trace, motion)
+    alone = trace.idle is not None and not any(_movement(quiet, motion) for quiet in trace.alone)
     if together and alone and not _moves_anyway(trace, motion):
         # It moves now and then, or after several of them; which one it was, nobody can say.
         last = next((attempt.exchange for attempt in reversed(trace.tried) if attempt.exchange is not None), None)
@@ -122,8 +122,8 @@ def unauthorised_still(trace: Quiet, motion: MotionMap) -> Iterator[Outcome]:
     # 409, 423 and 428 refuse a client without the lease (RFC 9110 15.5.10, RFC 4918 11.3, RFC 6585 3), as others do
     # whose description has its header or member.
     leased = [attempt for attempt in tried if attempt.what.endswith("the lease")]
-    yield from refused([attempt for attempt in tried if attempt not in leased], 401, 403, 423, 428)
-    yield from refused(leased)
+    yield from judge_refused([attempt for attempt in tried if attempt not in leased], 401, 403, 423, 428)
+    yield from judge_refused(leased)
     yield from nothing_moved(trace, motion, "unauthorised")
 
 

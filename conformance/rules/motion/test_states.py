@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from conformance.measures.samples import SEVERAL
-from conformance.rules.motion.judging import off, stopped, usable
+from conformance.rules.motion.judging import halts, off, usable
 from conformance.scenarios.motion.moves import stops, targets
 from conformance.scenarios.motion.states import agreement, switched
 from conformance.scenarios.motion.trace import Leg, Reading, Switched, Told
@@ -55,7 +55,7 @@ def action_succeeds(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
             if seen[index].action in action.succeeded
             and all(off(reading.values, goal.targets, motion, 2) for reading in seen[index : index + SEVERAL])
         ]
-        if goal.accepted and seen:
+        if goal.is_ok and seen:
             words = " or ".join(action.succeeded)
             expected = f"{words} at {action.at} when {leg.what} is reached, and not before"
             found = f"{early[0].action} under way" if early else f"{seen[-1].action or 'nothing'} at the end"
@@ -72,7 +72,7 @@ def action_runs(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
     for leg in trace:
         goal = leg.commands[-1]
         under_way = [reading for reading in usable(leg) if _is_between(reading, leg, motion)]
-        if goal.accepted and len(under_way) >= SEVERAL:
+        if goal.is_ok and len(under_way) >= SEVERAL:
             words = {reading.action for reading in under_way}
             found = " and ".join(sorted(words)) or "nothing"
             expected = f"{' or '.join(action.running)} at {action.at} under way ({leg.what})"
@@ -91,7 +91,7 @@ def action_canceled(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outco
     if action is None or not action.canceled:
         yield _NO_ACTION
         return
-    for leg, readings, unusable in stopped(trace, motion):
+    for leg, readings, unusable in halts(trace, motion):
         if isinstance(unusable, NotTested):
             yield unusable
         elif readings:

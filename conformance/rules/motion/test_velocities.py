@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Iterator
 
 from conformance.measures.samples import SEVERAL, longest_s
-from conformance.rules.motion.judging import at, driven, is_each_late, must_rest_from, off, slowest, tries_of, went_on
-from conformance.scenarios.motion.measuring import end_of_travel, measured, noise_of
+from conformance.rules.motion.judging import at, follows, is_each_late, must_rest_from, off, slowest, tries_of, went_on
+from conformance.scenarios.motion.measuring import end_of_travel, noise_of, speed_in
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.motion.velocities import let_go, vanishing, velocities
@@ -27,7 +27,7 @@ _SLOWS_S = 0.1
 @rule("motion/velocity", on=(velocities,))
 def velocity(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device drives at a velocity within its limits."""
-    yield from driven(trace, motion)
+    yield from follows(trace, motion)
 
 
 def _at_rest(readings: list[Reading], drive: Drive, motion: MotionMap) -> str | None:
@@ -48,12 +48,12 @@ def stopped(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         ended = [(drive, drive.end) for drive in tries if drive.end is not None]
         excused = not is_each_late([(end, drive.readings) for drive, end in ended])
         for drive, end in ended:
-            yield from _ended(drive, end, motion.velocity.settle_s, motion, excused=excused)
+            yield from _judge_end(drive, end, motion.velocity.settle_s, motion, excused=excused)
 
 
-def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, excused: bool) -> Iterator[Outcome]:
-    if not end.accepted:
-        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.named}")
+def _judge_end(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, excused: bool) -> Iterator[Outcome]:
+    if not end.is_ok:
+        yield Case(holds=False, exchange=end.exchange, expected=f"a 2xx for velocity 0 after {drive.name}")
         return
     due = must_rest_from(end, drive.readings, excused=excused) + settle_s
     moved = _at_rest([reading for reading in drive.after if reading.sent >= due], drive, motion)
@@ -61,7 +61,7 @@ def _ended(drive: Drive, end: Command, settle_s: float, motion: MotionMap, *, ex
         axes = motion.velocity.axes if motion.velocity else {}
         speeds = {axes[name].of: speed * axes[name].scale for name, speed in drive.wanted.items() if axes[name].of}
         moved = went_on(end, drive.readings, speeds, settle_s, motion) or moved
-    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.named})")
+    yield from _rests(moved, drive, f"rest {settle_s:g} s after velocity 0 ({drive.name})")
 
 
 def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:
@@ -83,7 +83,7 @@ def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
         seen_from = due if drive.rested is None else min(due, drive.rested)
         moved = _at_rest([reading for reading in drive.after if reading.sent >= seen_from], drive, motion)
         moved = moved or _still_driven(drive, due, motion.velocity.hold_s, motion) or moved
-        yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.named})")
+        yield from _rests(moved, drive, f"rest {within_s:g} s after the last command ({drive.name})")
 
 
 def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) -> str:
@@ -95,13 +95,13 @@ def _still_driven(drive: Drive, due: float, hold_s: float, motion: MotionMap) ->
     late = due - settle_s + max(_LONGER * hold_s, settle_s / 2, _LONGER_S)
     seen = [reading for reading in drive.after if late <= reading.sent and reading.received <= due]
     for name, wanted in drive.wanted.items():
-        found = measured(seen, name, motion) if wanted else None
+        found = speed_in(seen, name, motion) if wanted else None
         if found is not None and abs(found - wanted) <= motion.speed_tolerance(name) < abs(wanted) / 2:
             return f"{name} at {found:.4g} per second, {seen[0].sent - drive.commands[-1].answered:.2f} s after it"
     return ""
 
 
-def _held(drive: Drive, hold_s: float, share: float, motion: MotionMap) -> tuple[float, float]:
+def _hold_window(drive: Drive, hold_s: float, share: float, motion: MotionMap) -> tuple[float, float]:
     """Return from when to when a device that was let go must still drive, also if it refused something meanwhile."""
     last, refused = drive.commands[-1], drive.refused
     # A last command of some velocities alone need not renew the others.
@@ -116,7 +116,7 @@ def _held(drive: Drive, hold_s: float, share: float, motion: MotionMap) -> tuple
 @rule("motion/hold", on=(let_go,))
 def hold(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that gets no command any more still drives within its hold time."""
-    return held(trace, motion, _HELD[1])
+    return judge_hold(trace, motion, _HELD[1])
 
 
 def fails(outcomes: Iterable[Outcome]) -> bool:
@@ -124,7 +124,7 @@ def fails(outcomes: Iterable[Outcome]) -> bool:
     return any(isinstance(case, Case) and not case.holds for case in outcomes)
 
 
-def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[Outcome]:
+def judge_hold(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[Outcome]:
     """Judge whether a device still drives for a share of its hold time.
 
     On a slow machine a drive may show too little of it; another one of the same axis is enough.
@@ -134,10 +134,10 @@ def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[
     unseen, seen = set[str](), set[str]()
     so_far = [reading for drive in trace for reading in drive.readings]
     for drive in trace:
-        last, (begin, end) = drive.commands[-1], _held(drive, motion.velocity.hold_s, share, motion)
+        last, (begin, end) = drive.commands[-1], _hold_window(drive, motion.velocity.hold_s, share, motion)
         within = [reading for reading in drive.after if begin <= reading.sent and reading.received <= end]
         for name, wanted in drive.wanted.items():
-            found = measured(within, name, motion) if wanted else None
+            found = speed_in(within, name, motion) if wanted else None
             if end_of_travel(within, name, wanted, motion, so_far) is not None:
                 continue
             if found is not None:
@@ -148,7 +148,7 @@ def held(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Iterator[
                 yield Case(
                     math.copysign(1, wanted) * found >= _STILL_DRIVES * abs(wanted) - room,
                     last.exchange,
-                    f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.named})",
+                    f"{name} still driven {end - last.sent:.2g} s after the last command ({drive.name})",
                     observed=f"{found:.4g} in place of {wanted:.4g} per second",
                     cause=name,
                 )

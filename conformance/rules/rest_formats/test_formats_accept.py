@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import answered
+from conformance.api.rest.applicable import working_reads
 from conformance.api.rest.calls import Call
 from conformance.api.rest.formats import are_data, quality
 from conformance.api.rest.interface import RestInterface
@@ -66,7 +66,7 @@ _FEW = (
 @pytest.mark.requirement(_DEFAULT)
 def test_default_format(api: RestInterface, judge: Judge) -> None:
     """Send no Accept header, and */*: the response must be JSON."""
-    for call in api.run.effort.subsample(answered(api, _DEFAULT), 3):
+    for call in api.run.effort.subsample(working_reads(api, _DEFAULT), 3):
         if "application/json" not in call.operation.formats:
             continue
         for accept in ("", "*/*", "*/*;q=0.5"):
@@ -78,13 +78,13 @@ def test_default_format(api: RestInterface, judge: Judge) -> None:
 @pytest.mark.requirement(_Q, _SPECIFIC)
 def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     """Send Accept with preferences: the client gets the format that it prefers."""
-    found = answered(api)
+    found = working_reads(api)
     calls = [call for call in api.run.effort.subsample(found, 3) if are_data(call.operation.formats)]
     others = [one for one in found if len(one.operation.formats) > 1 and not are_data(one.operation.formats)]
     alone = {id(one): _alone(api, one) for one in others}
     if not calls and not others:
         for id_ in (_Q, _SPECIFIC):
-            judge.unclaimed(id_, "the contract has no responses in more than one format")
+            judge.note_unclaimed(id_, "the contract has no responses in more than one format")
     cases = [(call, id_, text) for call in calls for id_, text in _MATRIX]
     offering = [one for one in others if all(each.holds for each in alone[id(one)])]
     few = [(call, id_, text) for call in offering[:_OTHERS] for id_, text in _FEW]
@@ -95,7 +95,7 @@ def test_preferred_format(api: RestInterface, judge: Judge) -> None:
     preferred = [each for one in others for each in alone[id(one)] if each.holds]
     try:
         for call, id_, text in chosen:
-            preferred.append(Preferred(id_, call.operation.formats, *_sent(api, call, text)))
+            preferred.append(Preferred(id_, call.operation.formats, *_send(api, call, text)))
     finally:
         judge_preferred(judge, preferred)
 
@@ -111,16 +111,16 @@ def judge_preferred(judge: Judge, preferred: list[Preferred]) -> None:
     failed = defaultdict(list)
     for preference in preferred:
         if not preference.holds:
-            failed[preference.got].append(preference.accept)
+            failed[preference.got_type].append(preference.accept)
     for preference in preferred:
-        others = [accept for accept in dict.fromkeys(failed[preference.got]) if accept != preference.accept]
+        others = [accept for accept in dict.fromkeys(failed[preference.got_type]) if accept != preference.accept]
         more = f" (and for {len(others)} more values of Accept: {' | '.join(others[:_NAMED])})" if others else ""
         expect(judge, preference.requirement, preference.exchange).that(
-            preference.holds, f"{preference.expected}{more}", cause=preference.got
+            preference.holds, f"{preference.expected_text}{more}", cause=preference.got_type
         )
 
 
-def _sent(api: RestInterface, call: Call, text: str) -> tuple[str, Exchange]:
+def _send(api: RestInterface, call: Call, text: str) -> tuple[str, Exchange]:
     """Send a line of the matrix; return the value of Accept, and the exchange."""
     formats = call.operation.formats
     a, b, c = (*formats, *formats)[:3]
@@ -138,7 +138,7 @@ class Preferred:
     exchange: Exchange
 
     @property
-    def got(self) -> str:
+    def got_type(self) -> str:
         """The media type of a successful response, or the status of another one."""
         answer = self.exchange.response
         return answer.media_type if answer.ok else str(answer.status)
@@ -152,10 +152,10 @@ class Preferred:
         """Whether the response has the preferred format, or none is acceptable and the status is 406."""
         # A robot may have further formats of its own, and send one that is as acceptable.
         sent = self.exchange.response.media_type if self.exchange.response.ok else ""
-        return quality(sent, self.accept) >= self._best if sent else not self._best and self.got == "406"
+        return quality(sent, self.accept) >= self._best if sent else not self._best and self.got_type == "406"
 
     @property
-    def expected(self) -> str:
+    def expected_text(self) -> str:
         """Return the media type that the requirement demands, as a phrase."""
         names = [name for name in self.formats if quality(name, self.accept) == self._best]
         return f"{' or '.join(names) if self._best else 'status 406'} when Accept is {self.accept}"

@@ -58,7 +58,7 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
             judge.note(_ID, f"not tried on {operation.id}: a valid request for it as JSON got {plain.came}")
             continue
         api.device.bring_to_rest(api)
-        call = replace(call, value=api.device.marked(operation.id, call.value))
+        call = replace(call, value=api.device.mark(operation.id, call.value))
         like = _sent_form(api, call)
         body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
         echoes: list[dict[str, Any]] = []
@@ -67,7 +67,7 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
             exchange = call.send(api, ("Accept", accept))
             status = exchange.response.status
             when = f"the body of {operation.id} is {XML}, as when it is JSON"
-            taken = expect(judge, _ID, exchange).taken(when, cause=f"{operation.id} {status}")
+            taken = expect(judge, _ID, exchange).accepts(when, cause=f"{operation.id} {status}")
             if taken and exchange.response.ok:
                 shown, fault = _echo(call, exchange)
                 expected = "the accepted value in the response"
@@ -78,7 +78,7 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
             end = body.rindex(b"</")
             large = call.rewritten(api, body[:end] + b" " * (TAKEN_OCTETS - len(body)) + body[end:])
             exchange = large.send(api)
-            expect(judge, _ID, exchange).taken(f"the body is 64 KiB of {XML}", cause=f"{operation.id} 64 KiB")
+            expect(judge, _ID, exchange).accepts(f"the body is 64 KiB of {XML}", cause=f"{operation.id} 64 KiB")
         if taken and status != 409:
             other = settles_at(api, call)
             if other is not None:
@@ -125,7 +125,7 @@ def _same(shown: Any, value: Any) -> bool:
 def _echo(call: Call, exchange: Exchange) -> tuple[dict[str, Any], str]:
     """Return the values in the response that were in the request, by place (maybe none), and where they differ."""
     answer = exchange.response
-    schema = (call.operation.declared(answer.status) or {}).get(answer.media_type)
+    schema = (call.operation.schemas_for(answer.status) or {}).get(answer.media_type)
     if schema is None or not answer.body:
         return {}, ""
     try:

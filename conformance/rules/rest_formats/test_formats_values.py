@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.rest.applicable import answered, reads
+from conformance.api.rest.applicable import reads, working_reads
 from conformance.api.rest.calls import Call, root_name
 from conformance.api.rest.formats import at_once, each_after, judge_same_values
 from conformance.api.rest.interface import RestInterface
@@ -33,7 +33,7 @@ def _say_lacking(api: RestInterface, media_type: str, *ids: str) -> None:
     """Mark requirements as not applicable where no operation of the contract has the format."""
     if not any(media_type in operation.formats for operation in operations_of(api.run.contract)):
         for id_ in ids:
-            api.run.judge.unclaimed(id_, f"the contract has no responses as {media_type}")
+            api.run.judge.note_unclaimed(id_, f"the contract has no responses as {media_type}")
 
 
 @pytest.mark.phase("settling")
@@ -45,10 +45,10 @@ def test_each_format_is_sent(api: RestInterface, judge: Judge, effort: Effort) -
     _say_lacking(api, _XML, "rest-formats/xml", "rest-formats/xml-root")
     _say_lacking(api, _TEXT, "rest-formats/text")
     if not any({_XML, _TEXT} & set(operation.formats) for operation in operations_of(api.run.contract)):
-        judge.unclaimed("rest-formats/charset", "the contract has responses neither as XML nor as plain text")
+        judge.note_unclaimed("rest-formats/charset", "the contract has responses neither as XML nor as plain text")
     if not any(len(operation.formats) > 1 for operation in operations_of(api.run.contract)):
-        judge.unclaimed("rest-formats/vary", "the contract has no responses in more than one format")
-    calls = answered(api)
+        judge.note_unclaimed("rest-formats/vary", "the contract has no responses in more than one format")
+    calls = working_reads(api)
     if not calls:
         raise NoOccasionError("no operation that only reads was answered 2xx")
     for turn in range(effort.cases(12) if effort.name != "quick" else 1):
@@ -93,7 +93,7 @@ def test_formats_carry_the_same_values(api: RestInterface, judge: Judge) -> None
             continue
         compared += judge_same_values(api, call, others).response.ok
     if not compared and not any(set(_IDS) & set(item.formats) for item in operations_of(api.run.contract)):
-        judge.unclaimed("rest-formats/same-values", "the contract has one format only")
+        judge.note_unclaimed("rest-formats/same-values", "the contract has one format only")
 
 
 @pytest.mark.phase("resting")
@@ -105,10 +105,10 @@ def test_formats_carry_the_same_values_after_other_requests(api: RestInterface) 
     """
     run = api.run
 
-    def refused(call: Call) -> object:
+    def send_unacceptable(call: Call) -> object:
         return call.send(api, ("Accept", _NO_FORMAT))
 
-    events: list[Callable[[Call], object]] = [refused, lambda _: api.client.close()]
+    events: list[Callable[[Call], object]] = [send_unacceptable, lambda _: api.client.close()]
     if run.allow_motion:
         events.append(lambda _: api.device.halt(api))
     calls = [call for call in run.effort.subsample(reads(api), 5) if len(call.operation.formats) > 1]

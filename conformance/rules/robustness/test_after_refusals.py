@@ -10,9 +10,9 @@ import pytest
 
 from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
-from conformance.api.rest.applicable import allowed, reads
+from conformance.api.rest.applicable import allows, reads
 from conformance.api.rest.calls import Call
-from conformance.api.rest.inputs import usual_inputs, written
+from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import unknown_variations
@@ -36,10 +36,10 @@ _THINK_S, _WAITS = 3.0, 2
 def test_reads_behind_refused_content(api: RestInterface, judge: Judge, values: Values) -> None:
     """Send content that is refused, small and 64 KiB, and a valid read behind it on the same connection."""
     found = [call for call in reads(api) if call.operation.label in api.working]
-    taking = [item for item in operations_of(api.run.contract) if item.bodies and allowed(api, item)]
+    taking = [item for item in operations_of(api.run.contract) if item.bodies and allows(api, item)]
     calls, waited = cycle(found), 0
     for number, operation in enumerate(api.run.effort.subsample(taking, 2) if found else ()):
-        for request in _refused(operation, values, number) if operation.label not in api.streams else ():
+        for request in _refusable(operation, values, number) if operation.label not in api.streams else ():
             if waited >= _WAITS:
                 return
             call, begun = next(calls), time.monotonic()
@@ -57,10 +57,10 @@ def test_reads_behind_refused_content(api: RestInterface, judge: Judge, values: 
                 )
 
 
-def _refused(operation: Operation, values: Values, number: int) -> list[Outgoing]:
+def _refusable(operation: Operation, values: Values, number: int) -> list[Outgoing]:
     """Return requests with content that a device refuses by its media type, as unreadable, and for an unknown id."""
     usual = usual_inputs(operation, values)[0]
-    valid = written(operation, usual)
+    valid = request_of(operation, usual)
     small, large = valid.body or b"{}", (valid.body or b"{}").ljust(TAKEN_OCTETS)
     # It ends in a space, so that no server takes its end for the name of a method.
     cut = b'{"roaas": '.ljust(0 if number % 2 else TAKEN_OCTETS)
@@ -68,7 +68,7 @@ def _refused(operation: Operation, values: Values, number: int) -> list[Outgoing
     found = [replace(valid, body=cut), *([other] if _TEXT not in operation.bodies else [])]
     unknown = list(unknown_variations(operation, usual))[-1:]
     return found + [
-        replace(written(operation, variation.inputs), body=small if number % 2 else large) for variation in unknown
+        replace(request_of(operation, variation.inputs), body=small if number % 2 else large) for variation in unknown
     ]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from conformance.scenarios.ros.definition import Definition, put_at, value_at
-from conformance.scenarios.ros.web import differences, document_of, succeeded
+from conformance.scenarios.ros.web import differences, document_of, is_success
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
 
@@ -29,7 +29,7 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
     return f"{found[0].at} is {found[0].web} in place of {found[0].ros}" if found else ""
 
 
-def mapped(message: dict[str, object], body: Body) -> dict[str, object]:
+def fields_in(message: dict[str, object], body: Body) -> dict[str, object]:
     """Return the fields of a ROS message that an operation's body has."""
     found: dict[str, object] = {}
     for own in body.fields.values():
@@ -40,7 +40,7 @@ def mapped(message: dict[str, object], body: Body) -> dict[str, object]:
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:
     """Return whether a response reports a failure: by a declared or any error status, or in a 2xx by the map."""
     response = exchange.response
-    return not succeeded(exchange, body) and (response.ok or not declared or response.status in declared)
+    return not is_success(exchange, body) and (response.ok or not declared or response.status in declared)
 
 
 def statuses(declared: Sequence[int]) -> str:

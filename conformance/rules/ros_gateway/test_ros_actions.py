@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, mapped, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, fields_in, statuses
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
-from conformance.scenarios.ros.web import changed, succeeded
+from conformance.scenarios.ros.web import changes, is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.transport.exchange import Exchange
@@ -34,7 +34,7 @@ def once(trace: Goals) -> Iterator[Outcome]:
     for goal in trace.probes:
         if goal.course not in _ACCEPTED or goal.course is Course.SECOND:
             continue
-        if not goal.accepted:
+        if not goal.is_ok:
             yield Case(holds=False, exchange=goal.exchange, expected=f"2xx for a goal {goal.course}", cause="refused")
             continue
         wanted = 2 if goal.course is Course.FIRST else 1
@@ -42,8 +42,8 @@ def once(trace: Goals) -> Iterator[Outcome]:
         expected = f"{wanted} goal{'s' * (wanted > 1)} at {goal.body.action} for {wanted} accepted"
         cause = "lost" if len(goals) < wanted else "doubled"
         yield Case(len(goals) == wanted, goal.exchange, expected, f"{len(goals)} goals", cause)
-        wanted_fields = mapped(json.loads(goal.value), goal.body)
-        wrong = next(changed(mapped(goals[0].content, goal.body), wanted_fields), None) if goals else None
+        wanted_fields = fields_in(json.loads(goal.value), goal.body)
+        wrong = next(changes(fields_in(goals[0].content, goal.body), wanted_fields), None) if goals else None
         found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
         yield Case(not wrong, goal.exchange, "the goal's fields at its server", observed=found, cause="changed")
 
@@ -55,7 +55,7 @@ def rejected(trace: Goals) -> Iterator[Outcome]:
         if goal.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in goal.heard):
             continue
         body, declared = goal.body, goal.body.rejected
-        if not goal.accepted:
+        if not goal.is_ok:
             holds = fails_as(goal.exchange, body, declared)
             yield Case(holds, goal.exchange, f"{statuses(declared)} for a goal {goal.course}", cause="status")
             continue
@@ -142,7 +142,7 @@ def feedback(trace: Goals, ros: RosMap) -> Iterator[Outcome]:
         if goal.body.feedback is None:
             yield NotClaimed("the map has no feedback of goals")
             continue
-        if goal.course is Course.SUCCEEDS and goal.accepted and goal.looks:
+        if goal.course is Course.SUCCEEDS and goal.is_ok and goal.looks:
             yield from _feedback(goal, trace, ros)
 
 
@@ -189,16 +189,16 @@ def cancels(trace: Goals) -> Iterator[Outcome]:
             yield NotClaimed("the map has no operation that cancels")
             continue
         if goal.course in {Course.CANCELED, Course.GOES_ON, Course.FIRST} and isinstance(goal.cancel, Exchange):
-            yield from _canceled(goal, goal.cancel)
+            yield from _judge_cancel(goal, goal.cancel)
         if goal.course is Course.SECOND and goal.body.state is not None and goal.looks:
             last = goal.looks[-1]
             holds = last.word not in goal.body.state.canceled
             yield Case(holds, last.exchange, f"no cancellation of a goal {goal.course}", last.word, cause="another")
 
 
-def _canceled(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
+def _judge_cancel(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
     asked = [heard for heard in one.heard if heard.what == "cancel"]
-    ok = succeeded(cancel, one.body)
+    ok = is_success(cancel, one.body)
     if one.course is Course.GOES_ON:
         words = one.body.state.canceled if one.body.state else ()
         said = next((look for look in one.looks if look.word in words), None)
@@ -221,6 +221,6 @@ def recovers(trace: Goals) -> Iterator[Outcome]:
     """Judge whether goals reach a server that is back."""
     for goal in trace.probes:
         if goal.course in {Course.REACHED, Course.BACK}:
-            holds = goal.accepted and bool(goal.heard)
+            holds = goal.is_ok and bool(goal.heard)
             expected = f"2xx, and a goal at {goal.body.action}, {goal.course}"
             yield Case(holds, goal.exchange, expected, "none" if not goal.heard else "", cause=goal.course)

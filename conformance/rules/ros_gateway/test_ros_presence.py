@@ -19,7 +19,7 @@ from conformance.scenarios.ros.presence import (
     topics_at_first,
 )
 from conformance.scenarios.ros.topics import Burst, topic_bursts
-from conformance.scenarios.ros.web import succeeded
+from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.verdict.evidence import Case
 
@@ -34,7 +34,7 @@ def absent(trace: tuple[Absence, ...]) -> Iterator[Outcome]:
     for absence in trace:
         if not absence.body.absent and absence.body.failure is None:
             yield NotClaimed("the map does not say what a topic without a message returns: `absent`")
-        elif succeeded(absence.exchange, absence.body) and absence.body.max_age_s is None:
+        elif is_success(absence.exchange, absence.body) and absence.body.max_age_s is None:
             yield NotTested("the gateway may have a message from before this run, and keeps it as long as it likes")
         else:
             yield _absence(absence)
@@ -46,7 +46,7 @@ def stale(trace: Publishers) -> Iterator[Outcome]:
     if not trace.absences:
         yield NotClaimed("the map says of no topic how old a message may be: `max_age_s`")
     for absence in trace.absences:
-        if absence.first is not None and not succeeded(absence.first, absence.body):
+        if absence.first is not None and not is_success(absence.first, absence.body):
             yield NotTested("there was no message that could become too old")
         else:
             yield _absence(absence)
@@ -80,16 +80,16 @@ def _older(one: Presence) -> str:
 @rule("ros-gateway/recovers", on=(publishers_end,))
 def recovers(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether messages are returned again after their publisher was away."""
-    yield from _heard(presence for presence in trace.presences if presence.publisher != _ALL)
+    yield from _judge_heard(presence for presence in trace.presences if presence.publisher != _ALL)
 
 
 @rule("ros-gateway/qualities", on=(publishers_of_each_quality,))
 def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
     """Judge whether publishers of each reliability and durability are heard."""
-    yield from _heard(trace)
+    yield from _judge_heard(trace)
 
 
-def _heard(presences: Iterable[Presence]) -> Iterator[Case]:
+def _judge_heard(presences: Iterable[Presence]) -> Iterator[Case]:
     """Judge whether the message of each publisher is returned."""
     for presence in presences:
         text = f"the message of {presence.publisher}"

@@ -7,11 +7,11 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from typing import Any, Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, mapped, statuses
+from conformance.rules.ros_gateway.judging import differing, fails_as, fields_in, statuses
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
-from conformance.scenarios.ros.web import changed, succeeded
+from conformance.scenarios.ros.web import changes, is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
@@ -27,7 +27,7 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
     for call in trace.probes:
         if call.server not in _RESPONDS or not call.answer:
             continue
-        ok = call.succeeded
+        ok = call.is_success
         if not ok and call.server is not Server.RESPONDS:
             # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
             continue
@@ -51,7 +51,7 @@ def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]
         if message.what == "response":
             left[_key(message.content["request"], body)].append(json.dumps(message.content["response"]))
     for request, attempt in zip(crowd.requests, crowd.attempts, strict=True):
-        if isinstance(attempt, Exchange) and succeeded(attempt, body):
+        if isinstance(attempt, Exchange) and is_success(attempt, body):
             own = left[_key(json.loads(request), body)]
             fits = next(
                 (text for text in own if not differing(attempt, text, definition, body, body.result, ros)), None
@@ -63,14 +63,14 @@ def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]
 
 
 def _key(request: dict[str, Any], body: Body) -> str:
-    return json.dumps(mapped(request, body))
+    return json.dumps(fields_in(request, body))
 
 
 @rule("ros-gateway/service-once", on=(service_calls,))
 def once(trace: Services) -> Iterator[Outcome]:
     """Judge whether a successful call reached the server unchanged, and exactly once."""
     for call in trace.probes:
-        if call.server not in _RESPONDS or not call.answer or not call.succeeded:
+        if call.server not in _RESPONDS or not call.answer or not call.is_success:
             continue
         requests = [heard for heard in call.heard if heard.what == "request"]
         expected, cause = f"one call of {call.body.service} for one accepted request", "doubled" if requests else "lost"
@@ -78,16 +78,16 @@ def once(trace: Services) -> Iterator[Outcome]:
         if requests:
             yield from _as_sent(call, requests[0])
     for crowd in trace.crowds:
-        yield from _reached(crowd)
+        yield from _judge_reach(crowd)
 
 
-def _reached(crowd: Crowd) -> Iterator[Outcome]:
+def _judge_reach(crowd: Crowd) -> Iterator[Outcome]:
     """Judge whether of many calls at once none reaches the server twice, and each that succeeds does once."""
     body = crowd.body
     keys = [_key(json.loads(request), body) for request in crowd.requests]
     sent = Counter(keys)
     heard = Counter(_key(message.content, body) for message in crowd.heard if message.what == "request")
-    done = Counter(key for key, attempt in zip(keys, crowd.attempts, strict=True) if succeeded(attempt, body))
+    done = Counter(key for key, attempt in zip(keys, crowd.attempts, strict=True) if is_success(attempt, body))
     for key, attempt in zip(keys, crowd.attempts, strict=True):
         calls = f"{done[key]} to {sent[key]}" if done[key] < sent[key] else f"{sent[key]}"
         expected = f"{calls} calls of {body.service} for {sent[key]} equal requests, {len(keys)} requests at once"
@@ -96,7 +96,7 @@ def _reached(crowd: Crowd) -> Iterator[Outcome]:
 
 
 def _as_sent(one: Called, request: Heard) -> Iterator[Outcome]:
-    wrong = next(changed(mapped(request.content, one.body), mapped(json.loads(one.request), one.body)), None)
+    wrong = next(changes(fields_in(request.content, one.body), fields_in(json.loads(one.request), one.body)), None)
     found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
     yield Case(not wrong, one.attempt, f"the request's fields at {one.body.service}", observed=found, cause="changed")
 
@@ -152,4 +152,4 @@ def recovers(trace: Services) -> Iterator[Outcome]:
     """Judge whether a service that was gone is called again, and whether the gateway survives a silent one."""
     for call in trace.probes:
         if call.server in {Server.BACK, Server.AFTER}:
-            yield Case(call.succeeded, call.attempt, f"2xx for {call.body.service}, {call.server}", cause=call.server)
+            yield Case(call.is_success, call.attempt, f"2xx for {call.body.service}, {call.server}", cause=call.server)

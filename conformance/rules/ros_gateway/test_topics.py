@@ -8,7 +8,7 @@ from dataclasses import replace
 from statistics import median_low
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import mapped
+from conformance.rules.ros_gateway.judging import fields_in
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
     Burst,
@@ -20,7 +20,7 @@ from conformance.scenarios.ros.topics import (
     topic_refusals,
     topic_writes,
 )
-from conformance.scenarios.ros.web import Difference, changed, differences, document_of, equal, succeeded
+from conformance.scenarios.ros.web import Difference, changes, differences, document_of, equal, is_success
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
 from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange
@@ -60,7 +60,7 @@ def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
             for exchange in (one.exchange, *one.later):
                 if exchange.response.cut:
                     yield Note(f"Of {one.what} on {one.topic}, the suite got {exchange.response.cut}: not compared.")
-                elif succeeded(exchange, reads_of(ros, one.operation)) and not any(
+                elif is_success(exchange, reads_of(ros, one.operation)) and not any(
                     _is_in(each, exchange, trace, ros) for each in older
                 ):
                     yield _of_content(one, exchange, trace, ros)
@@ -81,7 +81,7 @@ def _differences(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> 
 
 
 def _is_in(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> bool:
-    return succeeded(exchange, reads_of(ros, one.operation)) and not _differences(one, exchange, trace, ros)
+    return is_success(exchange, reads_of(ros, one.operation)) and not _differences(one, exchange, trace, ros)
 
 
 def _of_content(one: Shown, exchange: Exchange, trace: Topics, ros: RosMap) -> Case:
@@ -105,7 +105,7 @@ def read_fresh(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
             took.setdefault(one.operation, []).append((took_s - within_s - SLACK_S, case))
         elif not one.reliably:
             yield Note(f"The gateway subscribes to {one.topic} with best effort, and did not get {one.what}.")
-        elif not succeeded(one.exchange, reads):
+        elif not is_success(one.exchange, reads):
             if one.kind is not Kind.NON_FINITE:
                 yield Case(False, one.exchange, expected, cause=f"{one.operation} {one.exchange.response.status}")
         elif back := next((each for each in older if _is_in(each, one.exchange, trace, ros)), None):
@@ -147,7 +147,7 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
             if not heard:
                 continue  # whether one comes, another requirement says
             fits = any(equal(each, wanted) for each in heard)
-            found = [] if fits else list(changed(_mapped(heard[-1], message, ros), _mapped(wanted, message, ros)))
+            found = [] if fits else list(changes(_fields_in(heard[-1], message, ros), _fields_in(wanted, message, ros)))
             more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
             web = "; ".join(f"{at} = {sent}" for at, _, sent in found[:_ROWS]) + more
             own = "; ".join(f"{at} = {came}" for at, came, _ in found[:_ROWS]) + more
@@ -160,10 +160,10 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
             )
 
 
-def _mapped(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, object]:
+def _fields_in(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, object]:
     body = ros.operations[one.operation]
     assert isinstance(body, Publishes)
-    return mapped(message, body)
+    return fields_in(message, body)
 
 
 @rule("ros-gateway/once", on=(topic_writes, topic_bursts))
@@ -173,7 +173,7 @@ def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
         same_operation = [one for one in trace if one.operation == burst.operation]
         sent = [message for each in same_operation for message in each.sent]
         after = [each for one in trace[number:] if one.operation == burst.operation for each in one.heard]
-        wanted = {message.value: _mapped(json.loads(message.value), message, ros) for message in sent}
+        wanted = {message.value: _fields_in(json.loads(message.value), message, ros) for message in sent}
         strange = [each for each in burst.heard if not any(equal(each.content, item) for item in wanted.values())]
         for message in burst.sent:
             twins = sum(other.accepted and wanted[other.value] == wanted[message.value] for other in sent)
@@ -203,7 +203,7 @@ def order(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether the messages of one client are published in the order of its requests."""
     for burst in trace:
         heard = [each.content for each in burst.heard]
-        wanted = [_mapped(json.loads(one.value), one, ros) for one in burst.sent]
+        wanted = [_fields_in(json.loads(one.value), one, ros) for one in burst.sent]
         before: dict[int, int] = {}
         for one, message in zip(burst.sent, wanted, strict=True):
             place = next((place for place, each in enumerate(heard) if equal(each, message)), None)
@@ -225,7 +225,7 @@ def refused_nothing(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
                 continue
             heard = [each.content for each in burst.heard]
             if message.value:
-                heard = [each for each in heard if equal(each, _mapped(json.loads(message.value), message, ros))]
+                heard = [each for each in heard if equal(each, _fields_in(json.loads(message.value), message, ros))]
             expected = f"no message on {message.topic}, as the request was refused ({message.what})"
             shown = json.dumps(heard[0])[:_SHOWN] if heard else ""
             yield Case(not heard, message.exchange, expected, f"the message {shown}", cause=message.operation)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from conformance.rules.ros_gateway.test_topics import SLACK_S, reads_of, rows
 from conformance.scenarios.ros.watching import Look, Watched, topic_watches
-from conformance.scenarios.ros.web import Difference, differences, differing, document_of, succeeded
+from conformance.scenarios.ros.web import Difference, differences, differing, document_of, is_success
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.verdict.evidence import Case
@@ -21,7 +21,7 @@ def _places(one: Watched, ros: RosMap) -> list[tuple[Look, list[int]]]:
     """Return the looks that show a message, each with the indexes of the heard messages that it may be."""
     values, reads = [each.content for each in one.heard], reads_of(ros, one.operation)
     found = []
-    for look in (look for look in one.looks if succeeded(look.exchange, reads)):
+    for look in (look for look in one.looks if is_success(look.exchange, reads)):
         # The first difference is enough: there are many messages, and most differ in their stamp.
         document = document_of(look.exchange.response.body)
         first = [next(differing(document, value, one.definition, reads, ros), None) for value in values]

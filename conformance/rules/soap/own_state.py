@@ -23,7 +23,7 @@ _ENDS: Final = LAST | {Role.OTHER}
 _Sent = tuple[str, frozenset[tuple[str, str]]]
 
 
-def unexplained(trace: Iterable[SoapProbe], found: Wsdl | None) -> list[SoapProbe]:
+def probes_left(trace: Iterable[SoapProbe], found: Wsdl | None) -> list[SoapProbe]:
     """Return the probes whose response the device's state does not explain.
 
     The fault of an operation that reads is explained if the suite ended or removed its thing since the last success. A
@@ -34,11 +34,11 @@ def unexplained(trace: Iterable[SoapProbe], found: Wsdl | None) -> list[SoapProb
     probes = list(trace)
     sent = [(one.operation, _values(one)) for one in probes]
     names = [role_of(one.operation.rpartition("/")[2]) for one in probes]
-    good = [one.succeeded for one in probes]
+    good = [one.is_success for one in probes]
     # How many successes that may have changed the device came before each probe.
     changes = [0, *accumulate(ok and role is not Role.READS for ok, role in zip(good, names, strict=True))]
     before, after = _successes(good, sent), _successes(good[::-1], sent[::-1])[::-1]
-    declared, kept = _declared(probes, found), list[SoapProbe]()
+    declared, kept = _declared_faults(probes, found), list[SoapProbe]()
     for index, (probe, role, (_, values)) in enumerate(zip(probes, names, sent, strict=True)):
         fault, last, later = probe.fault, before[index], after[index]
         later = None if later is None else len(probes) - 1 - later
@@ -77,7 +77,7 @@ def _successes(good: list[bool], sent: list[_Sent]) -> list[int | None]:
     return found
 
 
-def _declared(probes: list[SoapProbe], found: Wsdl | None) -> dict[str, frozenset[str]]:
+def _declared_faults(probes: list[SoapProbe], found: Wsdl | None) -> dict[str, frozenset[str]]:
     """Return the faults that each operation declares, but those of all that answer messages the schema forbids."""
     by_label = {label_of(port, one): one.faults for port, one in each(found.ports)} if found is not None else {}
     general = frozenset.intersection(*by_label.values()) if by_label else frozenset()
@@ -103,4 +103,4 @@ def _inside(fault: etree._Element) -> frozenset[str]:
 
 def _is_repeatable(probes: list[SoapProbe], label: str) -> bool:
     usual = [probe for probe in probes if probe.operation == label and probe.kind is Kind.USUAL]
-    return len(usual) >= _REPEATED and all(probe.succeeded for probe in usual)
+    return len(usual) >= _REPEATED and all(probe.is_success for probe in usual)

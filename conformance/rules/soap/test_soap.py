@@ -12,7 +12,7 @@ from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import ENVELOPE, clark, elements, local, text_of
-from conformance.rules.soap.own_state import entries, unexplained
+from conformance.rules.soap.own_state import entries, probes_left
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
@@ -40,7 +40,7 @@ _ASKED = frozenset({Kind.USUAL, Kind.VARIED})
 Trace = tuple[SoapProbe, ...]
 
 
-def _told(
+def _cases(
     trace: Iterable[SoapProbe], expected: str, wrong: Callable[[SoapProbe], str | None], *, by_kind: bool = False
 ) -> Iterator[Outcome]:
     """Yield a case for each probe: ``wrong`` returns its fault, an empty text, or None to skip it.
@@ -90,7 +90,7 @@ def answered(trace: Trace) -> Iterator[Outcome]:
         closed = probe.unanswered.kind is NoAnswer.CLOSED
         return None if closed and probe.kind in {Kind.UNREADABLE, Kind.EMPTY} else probe.unanswered.problem
 
-    return _told(trace, "a response", wrong)
+    return _cases(trace, "a response", wrong)
 
 
 @rule("soap/message", on=_ON)
@@ -109,7 +109,7 @@ def message(trace: Trace) -> Iterator[Outcome]:
             return None if probe.kind in _OF_NO_VERSION else str(error)
         return ""
 
-    return _told(trace, "a SOAP message", wrong)
+    return _cases(trace, "a SOAP message", wrong)
 
 
 @rule("soap/media-type", on=_ON)
@@ -130,7 +130,7 @@ def media_type(trace: Trace) -> Iterator[Outcome]:
             given = parts_of(answer.header("content-type") or "", answer.body)[0].media_type
         return "" if given == wanted else f"Content-Type: {given or '(none)'}"
 
-    return _told(trace, "the media type of the SOAP version", wrong)
+    return _cases(trace, "the media type of the SOAP version", wrong)
 
 
 @rule("soap/response-valid", on=_ON)
@@ -139,7 +139,7 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
     found = services_of(run.contract)
 
     def wrong(probe: SoapProbe) -> str | None:
-        if found is None or not probe.succeeded or probe.exchange is None:
+        if found is None or not probe.is_success or probe.exchange is None:
             return None
         try:
             inside = probe.inside()
@@ -154,7 +154,7 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
             return f"{inside[0].tag if inside else 'an empty Body'} in place of {probe.response}"
         return found.types.invalid(inside[0])
 
-    return _told(trace, "a response that is valid by the WSDL", wrong)
+    return _cases(trace, "a response that is valid by the WSDL", wrong)
 
 
 @rule("soap/fault", on=_ON)
@@ -172,7 +172,7 @@ def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
             return f"{known[0].tag} in the detail, which is for errors of the Body"
         return wrong or next(filter(None, (types.invalid(element) for element in known if types)), "")
 
-    return _told(trace, "a well-made fault", wrong)
+    return _cases(trace, "a well-made fault", wrong)
 
 
 def _wrong_fault_11(found: etree._Element) -> str:
@@ -183,7 +183,7 @@ def _wrong_fault_11(found: etree._Element) -> str:
             return f"no {name} without a namespace"
     if strange := [name for name in by_name if not name.startswith("{") and name not in _CHILDREN_11]:
         return f"the child {strange[0]} without a namespace, which SOAP 1.1 does not have"
-    if undeclared := _undeclared(by_name["faultcode"]):
+    if undeclared := _no_prefix(by_name["faultcode"]):
         return undeclared
     # Other names in SOAP's namespace are allowed: 4.4 recommends it for codes of one's own.
     space, name = _code_of(found)
@@ -191,7 +191,7 @@ def _wrong_fault_11(found: etree._Element) -> str:
     return f"the code {name!r}, which is one of SOAP 1.2" if is_other else ""
 
 
-def _undeclared(code: etree._Element) -> str:
+def _no_prefix(code: etree._Element) -> str:
     """Return that a code's prefix is not declared, or an empty text."""
     prefix, colon, _ = text_of(code).strip().rpartition(":")
     return f"a code with the prefix {prefix!r}, which is not declared" if colon and not code.nsmap.get(prefix) else ""
@@ -220,7 +220,7 @@ def _wrong_fault_12(found: etree._Element) -> str:
     if value is None or value.nsmap.get(prefix or None) != ENVELOPE_12 or name not in _CODES_12:
         return f"the code {text_of(value).strip() if value is not None else ''!r}, which SOAP 1.2 does not have"
     parts = (by_name["Code"], *found.iter(_SUBCODE))
-    wrong = [*map(_undeclared, found.iter(clark(ENVELOPE_12, "Value"))), *map(_wrong_code_12, parts), _disorder(found)]
+    wrong = [*map(_no_prefix, found.iter(clark(ENVELOPE_12, "Value"))), *map(_wrong_code_12, parts), _disorder(found)]
     if any(wrong):
         return next(filter(None, wrong))
     texts = [element for element in elements(by_name["Reason"]) if local(str(element.tag)) == "Text"]
@@ -254,7 +254,7 @@ def fault_status(trace: Trace) -> Iterator[Outcome]:
         allowed = {_BAD, _FAILED} if probe.envelope == ENVELOPE_12 else {_FAILED}
         return "" if status in allowed else f"status {status}"
 
-    return _told(trace, "a fault with its status", wrong)
+    return _cases(trace, "a fault with its status", wrong)
 
 
 @rule("soap/valid-accepted", on=_ON)
@@ -263,9 +263,9 @@ def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
     found = services_of(run.contract)
     lacking = {probe for probe in trace if found is not None and found.foreign and _OPTIONAL.search(_came(probe))}
     asked = [
-        probe for probe in unexplained(trace, found) if probe.kind in _ASKED and probe.exchange and probe not in lacking
+        probe for probe in probes_left(trace, found) if probe.kind in _ASKED and probe.exchange and probe not in lacking
     ]
-    yield from _told(asked, "success", lambda probe: "" if probe.succeeded else _came(probe))
+    yield from _cases(asked, "success", lambda probe: "" if probe.is_success else _came(probe))
     accepted = {probe.operation for probe in trace if probe.kind is Kind.USUAL}
     for label in dict.fromkeys(probe.operation for probe in trace if probe.kind in _VALID):
         if label not in accepted:
@@ -280,35 +280,35 @@ def _came(probe: SoapProbe) -> str:
     return f"a fault: {' '.join(' '.join(map(str, found.itertext())).split())[:200]}"
 
 
-def _refused(expected: str, *kinds: Kind, code: str = "") -> Callable[[Trace], Iterator[Outcome]]:
+def _refusal_judge(expected: str, *kinds: Kind, code: str = "") -> Callable[[Trace], Iterator[Outcome]]:
     """Return a function that judges whether messages are refused.
 
     A fault of the port's SOAP version must have the ``code`` for that, if there is one.
     """
 
-    def judged(trace: Trace) -> Iterator[Outcome]:
-        usable = {one.operation for one in trace if one.kind is Kind.AGAIN and one.succeeded}
+    def judge_refusals(trace: Trace) -> Iterator[Outcome]:
+        usable = {one.operation for one in trace if one.kind is Kind.AGAIN and one.is_success}
 
         def wrong(probe: SoapProbe) -> str | None:
-            if probe.exchange is None or probe.succeeded:
+            if probe.exchange is None or probe.is_success:
                 return None if probe.exchange is None else "success"
             own = _code_of(probe.fault) if probe.fault is not None else (probe.envelope, code)
             is_right = not code or probe.operation not in usable or own == (probe.envelope, code)
             return "" if is_right else f"the code {own[1]}"
 
-        return _told((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
+        return _cases((one for one in trace if one.kind in kinds), expected, wrong, by_kind=True)
 
-    return judged
+    return judge_refusals
 
 
 malformed_refused, invalid_refused, version_mismatch, must_understand, doctype_refused = (
     rule(f"soap/{name}", on=_ON)(judge)
     for name, judge in (
-        ("malformed-refused", _refused("a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)),
-        ("invalid-refused", _refused("a fault", Kind.INVALID)),
-        ("version-mismatch", _refused("a VersionMismatch fault", Kind.VERSION, code="VersionMismatch")),
-        ("must-understand", _refused("a MustUnderstand fault", Kind.UNDERSTAND, code="MustUnderstand")),
-        ("doctype-refused", _refused("a fault", Kind.DOCTYPE)),
+        ("malformed-refused", _refusal_judge("a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)),
+        ("invalid-refused", _refusal_judge("a fault", Kind.INVALID)),
+        ("version-mismatch", _refusal_judge("a VersionMismatch fault", Kind.VERSION, code="VersionMismatch")),
+        ("must-understand", _refusal_judge("a MustUnderstand fault", Kind.UNDERSTAND, code="MustUnderstand")),
+        ("doctype-refused", _refusal_judge("a fault", Kind.DOCTYPE)),
     )
 )
 
@@ -323,21 +323,21 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
             return None if status == 0 else ""
         return "" if probe.fault is not None else f"status {status} without a fault"
 
-    return _told(trace, "a fault, if it fails", wrong)
+    return _cases(trace, "a fault, if it fails", wrong)
 
 
 @rule("soap/recovers", on=_ON)
 def recovers(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a valid message still gets its usual response after wrong ones."""
-    before = {one.operation: one.succeeded for one in trace if one.kind is Kind.USUAL}
+    before = {one.operation: one.is_success for one in trace if one.kind is Kind.USUAL}
 
     def wrong(probe: SoapProbe) -> str | None:
         if not before.get(probe.operation) or probe.exchange is None:
             return None
-        return "" if probe.succeeded else _came(probe)
+        return "" if probe.is_success else _came(probe)
 
-    again = (one for one in unexplained(trace, services_of(run.contract)) if one.kind is Kind.AGAIN)
-    return _told(again, "success, as before", wrong)
+    again = (one for one in probes_left(trace, services_of(run.contract)) if one.kind is Kind.AGAIN)
+    return _cases(again, "success, as before", wrong)
 
 
 @rule("soap/no-internals", on=_ON)
@@ -350,15 +350,15 @@ def no_internals(trace: Trace) -> Iterator[Outcome]:
         shown = inside_shown(probe.exchange)
         return f"{shown!r}" if shown else ""
 
-    return _told(trace, "an error that shows nothing of the program", wrong)
+    return _cases(trace, "an error that shows nothing of the program", wrong)
 
 
-def _played(_trace: Trace) -> tuple[Outcome, ...]:
+def _play(_trace: Trace) -> tuple[Outcome, ...]:
     """Play the changes; `checkers.soap_memory` judges what is read after them."""
     return ()
 
 
 written_is_read, refused_keeps, created_is_there, deleted_is_gone = (
-    rule(f"soap/{name}", on=(soap_changes,))(_played)
+    rule(f"soap/{name}", on=(soap_changes,))(_play)
     for name in ("written-is-read", "refused-keeps", "created-is-there", "deleted-is-gone")
 )

@@ -26,7 +26,7 @@ def test_messages_without_credentials(soap: SoapServices, judge: Judge) -> None:
     for service in callable_services(soap, _ID):
         connection = service.client.connection
         if not connection.credentials:
-            judge.unclaimed(_ID, "the run has no credentials")
+            judge.note_unclaimed(_ID, "the run has no credentials")
             return
         good = quiet_example(service)
         if good is None:
@@ -39,7 +39,7 @@ def test_messages_without_credentials(soap: SoapServices, judge: Judge) -> None:
                     "POST",
                     service.path,
                     headers=(("Content-Type", MEDIA_TYPE), ("SOAPAction", '""')),
-                    body=envelope([good[1]]).written(),
+                    body=envelope([good[1]]).serialize(),
                     authorized=authorized,
                     fresh=True,
                 )

@@ -5,7 +5,7 @@ from typing import Final
 import pytest
 
 from conformance.api.expectation import expect
-from conformance.api.permission import permitted
+from conformance.api.permission import permitted_methods
 from conformance.api.soap.callable_services import SoapServices, callable_services, repetitions
 from conformance.api.soap.calls import SoapResponse, call, expect_answer, read_exchange, send
 from conformance.api.soap.envelope import envelope
@@ -46,7 +46,7 @@ def test_soap_action(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             judge.skip("soap-basic-profile/R1109", f"the {service.name} service took none of the messages tried")
             continue
         for _ in range(repetitions(effort, 3)):
-            expect_answer(judge, "soap-basic-profile/R1109", call(service, message)).accepted('SOAPAction is ""')
+            expect_answer(judge, "soap-basic-profile/R1109", call(service, message)).succeeds('SOAPAction is ""')
 
 
 def _taken_otherwise(service: SoapService) -> Node | None:
@@ -57,14 +57,14 @@ def _taken_otherwise(service: SoapService) -> Node | None:
             continue
         message = next(candidates(service, operation, declared))
         for action in (f'"{operation.input_action or operation.name}"', f'"{operation.name}"', None):
-            if call(service, message, soap_action=action).accepted:
+            if call(service, message, soap_action=action).is_taken:
                 return message
     return None
 
 
-def _malformed(message: Node) -> list[tuple[str, bytes]]:
+def _malformed_bodies(message: Node) -> list[tuple[str, bytes]]:
     """Return bodies that are not well-formed XML, complete enough that no parser waits for more."""
-    good = envelope([message]).written()
+    good = envelope([message]).serialize()
     end = good.rindex(b"</")
     return [
         ("an end tag of another name", good[:end] + b"</wrong>"),
@@ -86,7 +86,7 @@ def _malformed(message: Node) -> list[tuple[str, bytes]]:
 def test_malformed(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send malformed XML: the response is 4xx without a fault (best 400), or 500 with one."""
     for service in callable_services(soap, "soap-basic-profile/R1125", "soap-basic-profile/R1113"):
-        cases = _malformed(_message(service))
+        cases = _malformed_bodies(_message(service))
         apart = service.apart()
         for what, body in cases[: effort.cases(len(cases))]:
             try:
@@ -100,7 +100,7 @@ def test_malformed(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 break  # the next one would cost another deadline
             _judge_malformed(judge, answer, what)
         apart.client.close()
-        _truncated(judge, service)
+        _send_truncated(judge, service)
 
 
 def _judge_malformed(judge: Judge, answer: SoapResponse, what: str) -> None:
@@ -110,12 +110,12 @@ def _judge_malformed(judge: Judge, answer: SoapResponse, what: str) -> None:
     expect_answer(judge, "soap-basic-profile/R1113", answer).status(400, when=f"there is {what}")
 
 
-def _truncated(judge: Judge, service: SoapService) -> None:
+def _send_truncated(judge: Judge, service: SoapService) -> None:
     """Send two thirds of a document over a separate connection.
 
     A server that parses XML as it arrives may wait for the rest until its timeout (gSOAP does); that is no violation.
     """
-    document = envelope([_message(service)]).written()
+    document = envelope([_message(service)]).serialize()
     apart = service.apart()
     try:
         answer = send(
@@ -138,8 +138,8 @@ def _truncated(judge: Judge, service: SoapService) -> None:
 def test_methods(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send methods other than POST; GET may return a description."""
     for service in callable_services(soap, "soap-basic-profile/R1114"):
-        body = envelope([_message(service)]).written()
-        methods = permitted(soap.run, service.client, ("PUT", "GET", "DELETE", "PATCH"), service.path)
+        body = envelope([_message(service)]).serialize()
+        methods = permitted_methods(soap.run, service.client, ("PUT", "GET", "DELETE", "PATCH"), service.path)
         for method in methods * repetitions(effort, 3):
             exchange = service.client.send(
                 method,
@@ -165,7 +165,7 @@ def test_media_types(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     """Send messages as other media types than text/xml."""
     types = ("text/plain", "application/json", "application/octet-stream", "text/html", "application/xml")
     for service in callable_services(soap, "soap-basic-profile/R1115"):
-        body = envelope([_message(service)]).written()
+        body = envelope([_message(service)]).serialize()
         for media_type in types * repetitions(effort, 3):
             answer = send(service, body, content_type=media_type)
             expect_answer(judge, "soap-basic-profile/R1115", answer).status(415, when=f"Content-Type is {media_type}")
@@ -181,8 +181,8 @@ def test_forms_of_the_media_type(soap: SoapServices, judge: Judge) -> None:
                 judge.note(f"soap-basic-profile/{name}", f"the {service.name} service took none of the messages tried")
                 continue
             for media_type in forms:
-                answer = send(service, envelope([good[1]]).written(), content_type=media_type)
-                expect_answer(judge, f"soap-basic-profile/{name}", answer).accepted(f"Content-Type is {media_type}")
+                answer = send(service, envelope([good[1]]).serialize(), content_type=media_type)
+                expect_answer(judge, f"soap-basic-profile/{name}", answer).succeeds(f"Content-Type is {media_type}")
 
 
 @pytest.mark.requirement("soap-basic-profile/chunked")
@@ -193,7 +193,7 @@ def test_messages_in_chunks(soap: SoapServices, judge: Judge) -> None:
         if good is None:
             judge.note("soap-basic-profile/chunked", f"the {service.name} service took none of the messages tried")
             continue
-        small = require_valid_document(service, envelope([good[1]]).written())
+        small = require_valid_document(service, envelope([good[1]]).serialize())
         large = require_valid_document(service, padded(small, TAKEN_OCTETS))
         for document, size in ((small, 7), (large, 4096), (large, TAKEN_OCTETS)):
             _judge_chunked(judge, service, document, size)
@@ -208,7 +208,7 @@ def _judge_chunked(judge: Judge, service: SoapService, document: bytes, size: in
     )
     answer = read_exchange(attempt) if isinstance(attempt, Exchange) else None
     expect(judge, "soap-basic-profile/chunked", attempt).that(
-        raw.refuses_chunks(attempt) or (answer is not None and answer.accepted),
+        raw.refuses_chunks(attempt) or (answer is not None and answer.is_taken),
         f"status 2xx with a SOAP message when {len(document):,} bytes come in chunks of {size:,}",
         answer.describe() if answer is not None else "",
         cause=attempt.came,

@@ -8,7 +8,7 @@ from conformance.api.soap.callable_services import SoapServices, accepted_messag
 from conformance.api.soap.calls import call, expect_answer, send
 from conformance.api.soap.envelope import envelope
 from conformance.api.soap.service import SoapService
-from conformance.api.soap.valid_messages import candidates, example, require_valid_document, typed
+from conformance.api.soap.valid_messages import candidates, example, require_valid_document, with_xsi_types
 from conformance.api.soap.xml_style import XmlStyle, serialize
 from conformance.documents.xml import Node, clark
 from conformance.verdict.effort import Effort
@@ -31,28 +31,28 @@ def test_answers(soap: SoapServices, judge: Judge, effort: Effort) -> None:
         good = accepted_messages(soap, service)
         for id_ in _REPEATED if not good else ():
             judge.skip(id_, f"the {service.name} service accepted none of the messages tried")
-        _untyped(judge, service)
+        _send_typed(judge, service)
         for operation, message in good:
             for _ in range(effort.cases(15)):
                 answer = call(service, message)
                 if is_gone(soap, service, (operation, message), answer):
                     break
-                if expect_answer(judge, "soap-basic-profile/R1017", answer).accepted("a valid message has no xsi:type"):
+                if expect_answer(judge, "soap-basic-profile/R1017", answer).succeeds("a valid message has no xsi:type"):
                     same = answer.payload == operation.response
                     expected = f"the element {operation.response} in the Body"
                     expect_answer(judge, "soap-basic-profile/R2712", answer).that(same, expected)
 
 
-def _untyped(judge: Judge, service: SoapService) -> None:
+def _send_typed(judge: Judge, service: SoapService) -> None:
     """Send messages with xsi:type to operations that refuse them without it: they must refuse these too."""
     for operation in service.contract.operations:
         declared = service.contract.shape(operation.request) if operation.request else None
         if declared is None or example(service, operation) is not None:
             continue
         plain = next(candidates(service, operation, declared))
-        answer = send(service, typed(envelope([plain]), declared, plain))
+        answer = send(service, with_xsi_types(envelope([plain]), declared, plain))
         # Once more without: what was refused before may be there by now, as a goal that has begun.
-        needs_type = answer.accepted and not send(service, envelope([plain])).accepted
+        needs_type = answer.is_taken and not send(service, envelope([plain])).is_taken
         expected = f"status 2xx for {operation.name} without xsi:type, as with it"
         found = "a refusal without xsi:type"
         expect_answer(judge, "soap-basic-profile/R1017", answer).that(not needs_type, expected, found)
@@ -70,7 +70,7 @@ def test_dispatch(soap: SoapServices, judge: Judge, effort: Effort) -> None:
             for action in spoofed[: effort.cases(len(spoofed))]:
                 answer = call(service, message, soap_action=action)
                 # A robot may refuse an action that nothing declares; it must not run the other operation.
-                right = answer.refused or (answer.accepted and answer.payload == operation.response)
+                right = answer.is_refused or (answer.is_taken and answer.payload == operation.response)
                 for id_ in ids:
                     expected = f"the element {operation.response} or a refusal when SOAPAction is {action}"
                     expect_answer(judge, id_, answer).that(right, expected)
@@ -90,7 +90,7 @@ def test_unknown_operation(soap: SoapServices, judge: Judge, effort: Effort) -> 
             for action in ('""', f'"{known[0].input_action or known[0].name}"') if known else ('""',):
                 answer = call(service, Node(tag), soap_action=action)
                 expected = f"a fault or status 4xx when the Body has the unknown element {tag}"
-                expect_answer(judge, id_, answer).that(answer.refused, expected)
+                expect_answer(judge, id_, answer).that(answer.is_refused, expected)
 
 
 @pytest.mark.requirement("soap-basic-profile/R4001", "soap-basic-profile/utf-16")
@@ -112,7 +112,7 @@ def test_encodings(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                 answer = send(service, valid, content_type=f"text/xml; charset={charset}")
                 if is_gone(soap, service, (operation, message), answer):
                     break
-                right = answer.accepted and answer.payload == operation.response
+                right = answer.is_taken and answer.payload == operation.response
                 expect_answer(judge, f"soap-basic-profile/{id_}", answer).that(
                     right, f"status 2xx for a message in {what}"
                 )

@@ -14,7 +14,7 @@ from conformance.verdict.evidence import Case
 _TWICE = 2
 
 
-def _led(trace: Walk, state_map: StateMap) -> Iterator[Step]:
+def _judged_steps(trace: Walk, state_map: StateMap) -> Iterator[Step]:
     """Yield the steps that were taken where they must be, without those that a change by itself may have overtaken.
 
     It has where it left the device in a state that follows by itself, while another try was in time, or was none.
@@ -27,7 +27,7 @@ def _led(trace: Walk, state_map: StateMap) -> Iterator[Step]:
             yield step
 
 
-def _found(step: Step) -> str:
+def _status_text(step: Step) -> str:
     return f"status {step.exchange.response.status}" + ("" if step.taken else ", which is a refusal")
 
 
@@ -38,7 +38,7 @@ def taken(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
         ended = step.shown[0] != step.state and step.state in state_map.changes
         if state_map.operations[step.operation].is_taken_in(step.state) and (step.taken or not ended):
             expected = f"a 2xx for {step.operation} in {step.state}"
-            yield Case(step.taken, step.exchange, expected, _found(step), f"{step.operation} in {step.state}")
+            yield Case(step.taken, step.exchange, expected, _status_text(step), f"{step.operation} in {step.state}")
     yield from _unseen(trace)
 
 
@@ -93,7 +93,7 @@ def keeps(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
 @rule("states/leads", on=(walked,))
 def leads(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
     """Judge whether operations that were taken have their effect, and whether it lasts."""
-    for step in _led(trace, state_map):
+    for step in _judged_steps(trace, state_map):
         one = state_map.operations[step.operation]
         wanted, within_s = one.leads(step.state), one.within_s or state_map.within_s
         lasts = step.shown[-1] in state_map.following(wanted)
@@ -105,7 +105,7 @@ def leads(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
 @rule("states/order", on=(walked,))
 def order(trace: Walk, state_map: StateMap) -> Iterator[Outcome]:
     """Judge whether the states on the way are those of the map, in its order."""
-    for step in _led(trace, state_map):
+    for step in _judged_steps(trace, state_map):
         one = state_map.operations[step.operation]
         if not one.to:
             continue

@@ -31,18 +31,18 @@ def _targets(soap: SoapServices, service: SoapService) -> list[tuple[Element, No
     return [(declared, message) for declared, message in found if declared is not None]
 
 
-def _judged(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
+def _judge_refusal(judge: Judge, mutant: Mutation[Payload], answer: SoapResponse) -> bool:
     """Judge whether the robot rejected an invalid message, and with which fault; return whether that was right."""
     why = f" ({mutant.reason})" if mutant.reason else ""
     if mutant.reason:
         cause = f"{mutant.kind} {answer.status} {answer.code}"
         expect_answer(judge, _CLIENT, answer).fault("Client", f"there is {mutant.what}", cause=cause)
     refused = expect_answer(judge, f"strict-input/soap-{mutant.kind}", answer).that(
-        answer.refused,
+        answer.is_refused,
         f"a fault or status 4xx for {mutant.what}{why}",
-        cause=f"{mutant.kind} {answer.status} {answer.accepted}",
+        cause=f"{mutant.kind} {answer.status} {answer.is_taken}",
     )
-    if answer.accepted:
+    if answer.is_taken:
         return refused
     return expect_answer(judge, _FAULT, answer).that(
         answer.fault is not None and answer.status == 500,
@@ -65,7 +65,7 @@ def test_single_mutations(soap: SoapServices, judge: Judge, effort: Effort) -> N
             ours = [mutant for mutant in found if mutant.kind == kind]
             for mutant in invalid_ones(ours[: effort.cases(60)], service.contract.types):
                 sent[kind] += 1
-                _judged(judge, mutant, call(service, *mutant.made))
+                _judge_refusal(judge, mutant, call(service, *mutant.made))
     for kind, count in sent.items():
         if not count:
             judge.skip(f"strict-input/soap-{kind}", _nothing(services, kind))
@@ -86,23 +86,23 @@ def test_mutations_of_any_message(soap: SoapServices, judge: Judge, explore: Exp
         if not targets:
             continue
 
-        def refused(case: tuple[Element, Mutation[Payload]], service: SoapService = service) -> None:
+        def refute_accepted(case: tuple[Element, Mutation[Payload]], service: SoapService = service) -> None:
             for invalid in invalid_ones([case[1]], service.contract.types):
-                if not _judged(judge, invalid, call(service, *invalid.made)):
+                if not _judge_refusal(judge, invalid, call(service, *invalid.made)):
                     raise RefutedError(invalid.what)
 
-        explore(st.one_of([_broken(*target) for target in targets]), refused, cases=80)
+        explore(st.one_of([_any_mutation(*target) for target in targets]), refute_accepted, cases=80)
 
 
-def _broken(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation[Payload]]]:
+def _any_mutation(declared: Element, base: Node) -> st.SearchStrategy[tuple[Element, Mutation[Payload]]]:
     """Return a strategy for any single mutation of any valid message of an operation."""
     # Values change nothing in what there is to mutate, so that only the mutation that was chosen has to be made.
     count = sum(1 for _ in mutations(declared, base))
 
-    def broken(drawn: Node, chosen: int) -> tuple[Element, Mutation[Payload]]:
+    def mutation(drawn: Node, chosen: int) -> tuple[Element, Mutation[Payload]]:
         return declared, next(islice(mutations(declared, drawn), chosen, None))
 
-    return st.builds(broken, variants(declared, base), st.integers(0, count - 1))
+    return st.builds(mutation, variants(declared, base), st.integers(0, count - 1))
 
 
 def _fullest(declared: Element, message: Node) -> Node:

@@ -51,11 +51,11 @@ def test_mutations_are_refused(api: RestInterface, judge: Judge, effort: Effort)
             call.carrying(item.made).send(api, ("Accept", XML))
         api.device.halt(api)
         when = f"a valid {operation.id} follows invalid ones"
-        expect(judge, "http/no-server-error", call.send(api)).taken(when)
+        expect(judge, "http/no-server-error", call.send(api)).accepts(when)
     api.device.halt(api)
     for kind in KINDS if possible else ():
         if kind not in possible:
-            judge.unclaimed(f"strict-input/json-{kind}", "no body of the contract can be wrong in this way")
+            judge.note_unclaimed(f"strict-input/json-{kind}", "no body of the contract can be wrong in this way")
 
 
 def _count(effort: Effort, kind: str) -> int:
@@ -120,4 +120,4 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
             call.carrying(item.made).send(api, ("Accept", XML))
     api.device.halt(api)
     if not taken and "rest-formats" not in api.run.claims:
-        judge.unclaimed(_XML_BODY, "the robot takes no XML")
+        judge.note_unclaimed(_XML_BODY, "the robot takes no XML")

@@ -31,7 +31,7 @@ def _has(where: str, operation: Operation) -> bool:
 def test_query_parameters(api: RestInterface) -> None:
     """Send text, nothing, NaN, Infinity and 1e400 in place of a number in a query."""
     for call in _valid_calls(api, _QUERY, partial(_has, "query"), "takes numbers in its query"):
-        chosen = _chosen(api, call.operation, "query")
+        chosen = _choose_wrong(api, call.operation, "query")
         for item in chosen:
             _try(api, call, item, _QUERY)
         for item in chosen[:1]:
@@ -40,7 +40,7 @@ def test_query_parameters(api: RestInterface) -> None:
     operations = operations_of(api.run.contract)
     if not any(JSON in item.bodies or _has("query", item) or _has("path", item) for item in operations):
         for id_ in _PROBLEMS:
-            api.run.judge.unclaimed(id_, "the contract has no input in which a field could be wrong")
+            api.run.judge.note_unclaimed(id_, "the contract has no input in which a field could be wrong")
 
 
 @pytest.mark.phase("settling")
@@ -48,10 +48,10 @@ def test_query_parameters(api: RestInterface) -> None:
 def test_missing_query_parameters(api: RestInterface) -> None:
     """Leave out each required parameter of a query."""
 
-    def required(operation: Operation) -> bool:
+    def has_required(operation: Operation) -> bool:
         return any(item.required for item in operation.parameter("query"))
 
-    for call in _valid_calls(api, _MISSING, required, "requires a query parameter"):
+    for call in _valid_calls(api, _MISSING, has_required, "requires a query parameter"):
         operation = call.operation
         for item in operation.parameter("query"):
             if item.required:
@@ -66,7 +66,7 @@ def test_missing_query_parameters(api: RestInterface) -> None:
 def test_path_parameters(api: RestInterface) -> None:
     """Send text, NaN, Infinity, 1e400 and values that are not allowed in a path."""
     for call in _valid_calls(api, _PATH, partial(_has, "path"), "takes numbers in its path"):
-        for item in _chosen(api, call.operation, "path"):
+        for item in _choose_wrong(api, call.operation, "path"):
             # Two slashes in a row are another path, which servers may shorten.
             if item.text:
                 _try(api, call, item, _PATH)
@@ -88,7 +88,7 @@ def _valid_calls(
             api.run.judge.skip(requirement, reason)
 
 
-def _chosen(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
+def _choose_wrong(api: RestInterface, operation: Operation, where: str) -> list[Wrong]:
     """Return invalid texts for parameters: at quick effort one of each kind and a few more."""
     wrong = [item for parameter in operation.parameter(where) for item in wrong_texts(parameter)]
     first: dict[str, Wrong] = {}

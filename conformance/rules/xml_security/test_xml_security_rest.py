@@ -53,7 +53,7 @@ def _template(rest: HttpClient, path: str) -> Template:
         return plain
     value: list[str] = []
     node = _node(root, value)
-    written = node.written().decode()
+    written = node.serialize().decode()
     name = written[1:].split(">", 1)[0].split(" ", 1)[0].rstrip("/")
     return Template(written, name, value[0]) if value else plain
 
@@ -75,7 +75,7 @@ def test_attacks(interfaces: Interfaces, judge: Judge, effort: Effort) -> None:
     api, soap = interfaces.rest, interfaces.soap
     targets = list(_targets(soap.run.contract))
     if api is None or not targets:
-        judge.unclaimed(_REST, "there is no REST interface that takes XML")
+        judge.note_unclaimed(_REST, "there is no REST interface that takes XML")
         return
     if Interface.REST in api.run.unreachable:
         pytest.skip(f"the robot's REST interface does not answer: {api.run.unreachable[Interface.REST]}")

@@ -46,7 +46,7 @@ def _harmless(service: SoapService) -> tuple[Node, Node, str] | None:
 
 
 def _runner(judge: Judge, service: SoapService, message: Node) -> AttackRunner:
-    document = envelope([message]).written()
+    document = envelope([message]).serialize()
 
     def send(attack: Attack) -> Attempt:
         apart = service.apart()
@@ -69,7 +69,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
     if not soap.there:
         # The class is then judged over REST alone.
         for id_ in (_SPOOFING, "xml-security/soapaction-spoofing"):
-            judge.unclaimed(id_, "the robot has no SOAP service")
+            judge.note_unclaimed(id_, "the robot has no SOAP service")
         return
     services = callable_services(soap, _SPOOFING, *_IDS)
     with CallbackServer(services[0].client.host, services[0].client.port) as callbacks:
@@ -81,7 +81,7 @@ def test_attacks(soap: SoapServices, judge: Judge, effort: Effort) -> None:
                     judge.skip(id_, f"the {service.name} service took none of the messages tried")
                 continue
             # Addresses first: a robot that calls them has time until the other attacks are over.
-            spoofed = list(_spoofed(service, harmless[0], callbacks))
+            spoofed = list(_spoofing(service, harmless[0], callbacks))
             others = _attacks(service, harmless, callbacks, 1 if effort.factor < HALF else ALL)
             for chosen in (spoofed[: effort.cases(len(spoofed))], others):
                 runners.append(_runner(judge, service, harmless[0]))
@@ -96,12 +96,12 @@ def _attacks(
     """Yield the attacks on a harmless message: in a value, and in a Header block that must be ignored."""
     _, marked, value = harmless
     aside = Node(clark("urn:example:strange", "Note"), IGNORED_SLOT)
-    document = envelope([marked], (aside,)).written().decode()
+    document = envelope([marked], (aside,)).serialize().decode()
     template = Template(document, document[1:].split(" ", 1)[0], value)
     yield from attacks(template, callbacks.url, each, service.name)
 
 
-def _spoofed(service: SoapService, message: Node, callbacks: CallbackServer) -> Iterator[Attack]:
+def _spoofing(service: SoapService, message: Node, callbacks: CallbackServer) -> Iterator[Attack]:
     action = next((item.input_action for item in service.contract.operations if item.request == message.tag), None)
     broken = Node(clark("urn:example:strange", "no_such_operation"))
     valid, invalid = ("a valid message", message), ("an invalid one", broken)
@@ -118,7 +118,7 @@ def _spoofed(service: SoapService, message: Node, callbacks: CallbackServer) -> 
             yield Attack(
                 "addressing-spoofing",
                 f"{name} of {what}",
-                envelope([payload], headers).written(),
+                envelope([payload], headers).serialize(),
                 must_refuse=False,
                 canary=canary,
             )

@@ -66,7 +66,7 @@ def tried_at_rest(
         PartialTraceError: the device does not come to rest again, or there is no response.
     """
     quiet = _quiet(mapped, several, settle, effect_s, beside)
-    if not _moved(mapped, quiet):
+    if not _has_moved(mapped, quiet):
         return quiet
     alone: list[Quiet] = []
     try:
@@ -140,7 +140,7 @@ def _effect_s(mapped: MappedDevice) -> float:
     return max(moves_s, drives_s)
 
 
-def _moved(mapped: MappedDevice, quiet: Quiet) -> bool:
+def _has_moved(mapped: MappedDevice, quiet: Quiet) -> bool:
     def rests(here: Mapping[str, float]) -> bool:
         return mapped.is_near(here, quiet.where) or bool(quiet.home and mapped.is_near(here, quiet.home))
 
@@ -231,10 +231,10 @@ class _Sender:
 
     def vanish(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send parts of a command, and close their connections."""
-        return vanished(self.mapped, self.mapped.request_of(self.given, values), self.what)
+        return send_in_parts(self.mapped, self.mapped.request_of(self.given, values), self.what)
 
 
-def vanished(mapped: MappedDevice, made: Outgoing, what: str) -> Iterator[Tried]:
+def send_in_parts(mapped: MappedDevice, made: Outgoing, what: str) -> Iterator[Tried]:
     """Send parts of a request and close the connections; ``what``: the commanded move as a noun phrase."""
     begun = []
     for share, lacking, _ in _PARTS:

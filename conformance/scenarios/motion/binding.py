@@ -40,7 +40,7 @@ class Binding(Protocol):
     def has_credentials(self) -> bool:
         """Whether a request can be sent without the credentials that the device wants."""
 
-    def made(
+    def make(
         self, call: str, body: Any, media_type: str = JSON, root: str = "", *, authorized: bool = True
     ) -> Outgoing:
         """Return the request of a call with this body; None: without one, or with the usual one.
@@ -78,7 +78,7 @@ class JsonBinding:
         """Whether the connection has any."""
         return self._api is not None and bool(self._api.client.connection.credentials.items)
 
-    def made(
+    def make(
         self,
         call: str,
         body: Any,
@@ -115,7 +115,7 @@ class JsonBinding:
         """Return whether the OpenAPI description forbids a call."""
         if self._contract is None:
             return False
-        one = self.made(call, body)
+        one = self.make(call, body)
         return validity(self._contract, one.method, one.target, one.content_type, one.body).verdict == INVALID
 
 
@@ -169,7 +169,7 @@ class SoapBinding:
         """Whether messages carry a token, or the connection has any."""
         return self._messages.token is not None or bool(self._api.client.connection.credentials.items)
 
-    def made(
+    def make(
         self, call: str, body: Any, _media_type: str = "", _root: str = "", *, authorized: bool = True
     ) -> Outgoing:
         """Return the message of a call, with its values in the order of the schema.
@@ -207,7 +207,7 @@ class SoapBinding:
             node = self._node(call, body)[2]
         except NoElementError:
             return False  # no such message can be made from the schema
-        return node is not None and bool(self._messages.found.types.invalid(parse(node.written())))
+        return node is not None and bool(self._messages.found.types.invalid(parse(node.serialize())))
 
 
 def binding_of(api: RestInterface) -> Binding:

@@ -78,7 +78,7 @@ def driven_for_a_moment(mapped: MappedDevice, speeds: Mapping[str, float]) -> li
     drives, room = mapped.drives, mapped.room
     command, seen = mapped.drive(speeds), list[Reading]()
     until = command.answered + drives.settle_s + _LEARNED_S
-    while command.accepted and (mapped.clock.now() < until or len(seen) < SEVERAL):
+    while command.is_ok and (mapped.clock.now() < until or len(seen) < SEVERAL):
         seen.append(mapped.read())
         room.note(speeds, seen)
         if room.is_over([speeds], seen, drives.settle_s):
@@ -126,7 +126,7 @@ def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
     middle, ends = sum(span) / 2, False
     starts_by = mapped.clock.now() + mapped.drives.settle_s + _LEARNED_S
     while not ends and mapped.clock.now() < until and not mapped.room.is_over(speeds, seen, mapped.drives.settle_s):
-        if not mapped.drive(speeds[0]).accepted:
+        if not mapped.drive(speeds[0]).is_ok:
             break
         seen.append(mapped.read())
         if seen[-1].values and (seen[-1].values[axis] >= middle if forward else seen[-1].values[axis] <= middle):

@@ -18,7 +18,7 @@ from conformance.scenarios.motion.room import Room
 from conformance.scenarios.motion.templates import (
     NoValueError,
     at,
-    filled,
+    fill,
     numbers_at,
     positions_at,
     quaternion_of,
@@ -155,7 +155,7 @@ class MappedDevice:
         Raises:
             NoAnswerError: there is no response.
         """
-        exchange = self.send(self.binding.made(call, None))
+        exchange = self.send(self.binding.make(call, None))
         return exchange, self.binding.content(exchange.response.body)
 
     def send(self, made: Outgoing, **how: Any) -> Exchange:
@@ -166,7 +166,7 @@ class MappedDevice:
         """
         self.ready.keep()
         exchange = self._exchange(made, **how)
-        if self.ready.lost(exchange):
+        if self.ready.lost_lease(exchange):
             self.ready.keep()
             exchange = self._exchange(self.ready.with_lease(made), **how)
         return exchange
@@ -182,7 +182,7 @@ class MappedDevice:
         if action is None or self._answer is None:
             return ""
         try:
-            word = at(self.get(filled(action.read, {}, self._answer))[1], action.at)
+            word = at(self.get(fill(action.read, {}, self._answer))[1], action.at)
         except NoValueError:
             return ""
         return word if isinstance(word, str) else json.dumps(word)
@@ -204,7 +204,7 @@ class MappedDevice:
         elif isinstance(given, Velocity | Way):
             values = {**dict.fromkeys(self.drives.axes, 0.0), **values}
         values = {**values, "lease": self.ready.lease}
-        return filled(given.send, values, self._answer), filled(given.body, values, self._answer)
+        return fill(given.send, values, self._answer), fill(given.body, values, self._answer)
 
     def request_of(
         self, given: Goto | Velocity | Way | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True
@@ -213,9 +213,9 @@ class MappedDevice:
         self.rests = False
         self.ready.keep()
         form = (given.media_type, given.root) if isinstance(given, Way) else ()
-        return self.ready.with_lease(self.binding.made(*self.call_of(given, values), *form, authorized=authorized))
+        return self.ready.with_lease(self.binding.make(*self.call_of(given, values), *form, authorized=authorized))
 
-    def _sent(self, made: Outgoing, targets: Position, **how: Any) -> Command:
+    def _send(self, made: Outgoing, targets: Position, **how: Any) -> Command:
         sent = self.clock.now()
         exchange = self.send(made, **how)
         return Command(sent, self.clock.now(), targets, exchange, self.has_failed(exchange))
@@ -228,9 +228,9 @@ class MappedDevice:
         """
         axes, wanted = self.motion.state.axes, {**self.home, **(ends or targets)}
         wanted = {name: axes[name].near(one, self._last.get(name, one)) for name, one in wanted.items()}
-        self.room.commanded({"a move"})
-        command = self._sent(self.request_of(self.moves, targets), wanted)
-        if command.accepted:
+        self.room.note_command({"a move"})
+        command = self._send(self.request_of(self.moves, targets), wanted)
+        if command.is_ok:
             self.note(command.exchange)
         return command
 
@@ -261,8 +261,8 @@ class MappedDevice:
         if integers:
             written |= {name: int(one) for name, one in wanted.items() if one == int(one)}
         made = self.request_of(way or self.drives, written, authorized=authorized)
-        self.room.commanded({name for name, one in wanted.items() if one})
-        return self._sent(made, wanted, authorized=authorized, fresh=fresh)
+        self.room.note_command({name for name, one in wanted.items() if one})
+        return self._send(made, wanted, authorized=authorized, fresh=fresh)
 
     def has_failed(self, exchange: Exchange) -> bool:
         """Return whether the content of a 2xx reports a failed request, by the map's `failed`."""
@@ -291,7 +291,7 @@ class MappedDevice:
             made = self.request_of(stop, {})
         except NoValueError:
             return None
-        return self._sent(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
+        return self._send(made, {}, timeout_s=max(_STOP_S, stop.rests_within_s))
 
     def halt(self) -> Command | None:
         """Send the stop; if the device refuses it, send velocity 0 too: a stop for a move may be refused without one.
@@ -303,7 +303,7 @@ class MappedDevice:
             NoAnswerError: there is no response.
         """
         command = self.stop()
-        if command is not None and command.refused and self.motion.stop and self.motion.velocity:
+        if command is not None and command.is_refused and self.motion.stop and self.motion.velocity:
             self.drive({})
         return command
 
@@ -372,10 +372,10 @@ class MappedDevice:
         """Send one move and watch it; ``ends``: where it must end, if not at the targets."""
         start, until = self.where(), self.clock.now() + _FINISHES_S
         command = self.goto(targets, ends)
-        while self.moves.while_moving == "refused" and command.refused and self.clock.now() < until:
+        while self.moves.while_moving == "refused" and command.is_refused and self.clock.now() < until:
             self.clock.sleep(_AGAIN_S)
             command = self.goto(targets, ends)
-        return Leg(what, start, (command,), tuple(self.follow(command)) if command.accepted else (), self.due(command))
+        return Leg(what, start, (command,), tuple(self.follow(command)) if command.is_ok else (), self.due(command))
 
     def bring_home(self) -> None:
         """Stop any motion, and bring the device home; one without positions stays where it comes to rest.
@@ -400,7 +400,7 @@ class MappedDevice:
         except (NotPossibleError, NotPermittedError) as error:
             return problem or str(error)
         except NoAnswerError as none:
-            return problem or f"{self._named(none.unanswered)}: {none}"
+            return problem or f"{self._request_text(none.unanswered)}: {none}"
         return problem
 
     def _left_at_rest(self) -> str:
@@ -409,10 +409,10 @@ class MappedDevice:
             command = self.halt()
             if command is None:
                 problem = "the motion map has no stop that can be sent"
-            elif not command.accepted:
-                problem = f"{self._named(command.exchange)} got {command.exchange.came}"
+            elif not command.is_ok:
+                problem = f"{self._request_text(command.exchange)} got {command.exchange.came}"
         except NoAnswerError as none:
-            problem = f"{self._named(none.unanswered)}: {none}"
+            problem = f"{self._request_text(none.unanswered)}: {none}"
         except NotPermittedError as refusal:
             problem = str(refusal)
         if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
@@ -424,11 +424,11 @@ class MappedDevice:
         except (NotPossibleError, NotPermittedError) as error:
             return "; ".join(filter(None, (problem, str(error))))
         except NoAnswerError as none:
-            return problem or f"{self._named(none.unanswered)}: {none}"
+            return problem or f"{self._request_text(none.unanswered)}: {none}"
         return ""
 
     @staticmethod
-    def _named(attempt: Attempt) -> str:
+    def _request_text(attempt: Attempt) -> str:
         return f"{attempt.request.method} {urlsplit(attempt.request.url).path}"
 
     def come_to_rest(self, *, stop: bool = True, within_s: float | None = None) -> None:

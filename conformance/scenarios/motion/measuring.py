@@ -20,7 +20,7 @@ _STANDS: Final = 0.1
 STEADY_S: Final = 0.36
 
 
-def measured(readings: Sequence[Reading], name: str, motion: MotionMap) -> float | None:
+def speed_in(readings: Sequence[Reading], name: str, motion: MotionMap) -> float | None:
     """Return a velocity by some readings, in units per second; None if they do not show it."""
     speed = motion.velocity.axes[name] if motion.velocity else None
     if speed is None or not speed.of:
@@ -55,7 +55,7 @@ def end_of_travel(
     if speed is None or not speed.of or not wanted or motion.state.axes[speed.of].bound:
         return None
     last = [reading for reading in readings if reading.values and reading.sent >= readings[-1].sent - STEADY_S]
-    found, room, way = measured(last, name, motion), motion.tolerance(speed.of), 1 if wanted > 0 else -1
+    found, room, way = speed_in(last, name, motion), motion.tolerance(speed.of), 1 if wanted > 0 else -1
     if found is None or abs(found) > _STANDS * abs(wanted) or last[-1].sent - last[0].sent < STEADY_S / 2:
         return None
     place = middle_of(last[-SEVERAL:], speed.of)
@@ -85,13 +85,13 @@ def steady_since(
         return None
     for half in (last[: len(last) // 2], last[len(last) // 2 :]):
         for name, speed in wanted.items():
-            found = measured(half, name, motion)
+            found = speed_in(half, name, motion)
             if found is None:
                 return None
             if abs(found - speed) > motion.speed_tolerance(name) + noise_of(half, name, motion, resting):
                 return None
     for name, speed in wanted.items():
-        found = measured(last, name, motion)
+        found = speed_in(last, name, motion)
         if found is None or abs(found - speed) > motion.speed_tolerance(name):
             return None
     return last[0].sent

@@ -41,7 +41,7 @@ _LONG: Final = 12
 _BEYOND: Final = (0.05, 0.5)
 
 
-def recorded(made: Iterable[_Part]) -> tuple[_Part, ...]:
+def record_parts(made: Iterable[_Part]) -> tuple[_Part, ...]:
     """Return the legs or drives of a generator, keeping those made before an error.
 
     Raises:
@@ -58,7 +58,7 @@ def recorded(made: Iterable[_Part]) -> tuple[_Part, ...]:
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
     """Send the device to the limits of its axes and back; at quick all axes at once, at standard also at random."""
-    return recorded(_to_targets(mapped, effort, run.seed))
+    return record_parts(_to_targets(mapped, effort, run.seed))
 
 
 def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg]:
@@ -88,7 +88,7 @@ def clamped_targets(mapped: MappedDevice) -> tuple[Leg, ...]:
     if mapped.moves.beyond_limits != "clamped":
         raise NotDeclaredError("the map does not say that targets beyond the limits are clamped")
     mapped.bring_home()
-    return recorded(
+    return record_parts(
         mapped.go(f"{name} {value:g}, beyond its limit", {name: value}, {name: limit})
         for name, limit, value in beyond(mapped.motion.state.axes)
     )
@@ -154,7 +154,7 @@ def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
 def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Stop the device under way, and watch it for as long as the rest of the way would have taken, and longer."""
     stop = mapped.motion.stop
-    return recorded(_to_stops(mapped, effort, stop.rests_within_s)) if stop and mapped.moves else ()
+    return record_parts(_to_stops(mapped, effort, stop.rests_within_s)) if stop and mapped.moves else ()
 
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
@@ -164,7 +164,7 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
             return
         part = _UNDER_WAY
         for _ in range(TRIES):
-            leg = _stopped(mapped, name, part, rests_s)
+            leg = _stop_under_way(mapped, name, part, rests_s)
             # Judge each try: if every second stop is late, the discarded try may be the late one.
             yield leg
             under_way = leg.was_under_way(name, mapped.motion.tolerance(name))
@@ -174,7 +174,7 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
         shown = shown or under_way
 
 
-def _stopped(mapped: MappedDevice, name: str, part: float, rests_s: float) -> Leg:
+def _stop_under_way(mapped: MappedDevice, name: str, part: float, rests_s: float) -> Leg:
     _drive_before(mapped)
     way = _way(mapped, name, part)
     stop = mapped.stop()
@@ -202,7 +202,7 @@ def _drive_before(mapped: MappedDevice) -> None:
 def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Send the device back under way, and watch for as long as the first move would have taken, and longer."""
     need_positions(mapped)
-    return recorded(_to_new_targets(mapped, effort))
+    return record_parts(_to_new_targets(mapped, effort))
 
 
 def need_positions(mapped: MappedDevice) -> None:
@@ -219,7 +219,7 @@ def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
     for name in _axes(mapped, effort):
         way = _way(mapped, name)
         second = mapped.goto(way.behind)
-        last = second if second.accepted else way.command
+        last = second if second.is_ok else way.command
         first_s = min(mapped.takes_s, way.lasts_s(name))
         seen = way.readings + mapped.follow(last)
         seen += mapped.watch(max(mapped.clock.now(), way.command.answered + first_s) + _LONGER_S)
@@ -252,5 +252,5 @@ def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
     """Send targets in a row, and follow the last one that is accepted."""
     start = mapped.where()
     commands = [mapped.goto(item) for item in wanted]
-    last = next((command for command in reversed(commands) if command.accepted), commands[-1])
-    return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.accepted else (), mapped.due(last))
+    last = next((command for command in reversed(commands) if command.is_ok), commands[-1])
+    return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.is_ok else (), mapped.due(last))

@@ -7,7 +7,7 @@ from typing import Any, Final, Protocol
 
 from conformance.observe.clock import Clock
 from conformance.scenarios.motion.binding import Binding
-from conformance.scenarios.motion.templates import NoValueError, at, filled
+from conformance.scenarios.motion.templates import NoValueError, at, fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_map import Lease, Step
 from conformance.transport.client import Headers, is_drafting
@@ -71,7 +71,7 @@ class Preparation:
         try:
             lease = self.motion.lease
             if lease and self.lease and lease.renew and self._clock.now() >= self._kept_s + _SOON * lease.every_s:
-                exchange = self._called(lease.renew, lease.renew_body)
+                exchange = self._call(lease.renew, lease.renew_body)
                 self._kept_s = self._clock.now()
                 if not exchange.response.ok:
                     # The lease ends if nothing is sent for a while.
@@ -92,7 +92,7 @@ class Preparation:
         """Renew the lease again."""
         self._is_silent = False
 
-    def lost(self, exchange: Exchange) -> bool:
+    def lost_lease(self, exchange: Exchange) -> bool:
         """Return whether a response shows that the lease has ended, which a silent client cannot have renewed."""
         lease = self.motion.lease
         wants = exchange.response.status in WANTS_LEASE and not self._busy
@@ -129,7 +129,7 @@ class Preparation:
         try:
             self._steps(self.motion.after)
             if self.motion.lease and self.lease and self.motion.lease.release:
-                self._called(self.motion.lease.release, None)
+                self._call(self.motion.lease.release, None)
         finally:
             self._busy, self.lease = False, ""
             self._is_ready = not self.motion.before
@@ -139,15 +139,15 @@ class Preparation:
         lease = self.motion.lease
         if not lease or self.lease:
             for step in self.motion.after:
-                self._called(step.send, step.body)
+                self._call(step.send, step.body)
             if lease and lease.release:
-                self._called(lease.release, None)
+                self._call(lease.release, None)
 
     def _acquire(self) -> None:
         lease = self.motion.lease
         if lease is None:
             return
-        exchange = self._called(lease.acquire, lease.body)
+        exchange = self._call(lease.acquire, lease.body)
         if not exchange.response.ok:
             raise NotPossibleError(f"[motion.lease] {lease.acquire} got {exchange.came}")
         self.hold(lease, exchange)
@@ -167,22 +167,22 @@ class Preparation:
 
     def _steps(self, steps: Iterable[Step]) -> None:
         for step in steps:
-            exchange = self._called(step.send, step.body)
+            exchange = self._call(step.send, step.body)
             if not exchange.response.ok:
                 raise NotPossibleError(f"[motion] {step.send} got {exchange.came}")
             until = self._clock.now() + step.within_s
-            while step.read and self._shown(step) != step.shows:
+            while step.read and self._read_step(step) != step.shows:
                 if self._clock.now() > until:
                     raise NotPossibleError(f"[motion] {step.read} does not show {step.shows!r} after {step.send}")
                 self._clock.sleep(_LOOKS_S)
 
-    def _shown(self, step: Step) -> Any:
-        exchange = self._called(step.read, None)
+    def _read_step(self, step: Step) -> Any:
+        exchange = self._call(step.read, None)
         try:
             return at(self._binding.content(exchange.response.body), step.at)
         except NoValueError:
             return None
 
-    def _called(self, call: str, body: Any) -> Exchange:
+    def _call(self, call: str, body: Any) -> Exchange:
         values = {"lease": self.lease}
-        return self._send(self.with_lease(self._binding.made(filled(call, values), filled(body, values))))
+        return self._send(self.with_lease(self._binding.make(fill(call, values), fill(body, values))))

@@ -95,7 +95,7 @@ class Room:
         }
         return share, begin
 
-    def commanded(self, names: set[str]) -> None:
+    def note_command(self, names: set[str]) -> None:
         """Take note that velocities, or a move, may have turned the device; no names: it was stopped."""
         if names and names != self._driven:
             self._driven, self._heading = names, {}

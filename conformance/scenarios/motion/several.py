@@ -7,7 +7,7 @@ from typing import Final
 from conformance.scenarios.motion.driving import driven_for_a_moment, with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.measuring import end_of_travel, steady_since
-from conformance.scenarios.motion.moves import need_positions, recorded
+from conformance.scenarios.motion.moves import need_positions, record_parts
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
 from conformance.scenarios.motion.velocities import MEASURED_S
 from conformance.scenarios.scenario import NotPossibleError, scenario
@@ -44,7 +44,7 @@ def _at_once(mapped: MappedDevice, given: Goto | Velocity, several: list[Positio
 def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
     """Send different targets from several clients at the same moment."""
     need_positions(mapped)
-    return recorded(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
+    return record_parts(_of_clients(mapped) for _ in range(1 if effort.name == "quick" else 3))
 
 
 def _of_clients(mapped: MappedDevice) -> Leg:
@@ -57,7 +57,7 @@ def _of_clients(mapped: MappedDevice) -> Leg:
     wanted = [item for item in several if not mapped.is_near(start, item)]
     commands = _at_once(mapped, mapped.moves, wanted)
     for command in commands:
-        if command.accepted:
+        if command.is_ok:
             mapped.note(command.exchange)
     seen = mapped.follow(commands[-1], wanted)
     return Leg("targets of several clients", start, tuple(commands), tuple(seen), mapped.due(commands[-1]))
@@ -75,7 +75,7 @@ def several_drivers(mapped: MappedDevice, effort: Effort) -> tuple[Drive, ...]:
         for name, axis in mapped.drives.axes.items()
         if axis.limits[side]
     ]
-    return recorded(of_drivers(mapped, several) for _ in range(2 if effort.name == "quick" else 4))
+    return record_parts(of_drivers(mapped, several) for _ in range(2 if effort.name == "quick" else 4))
 
 
 def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
@@ -86,19 +86,19 @@ def of_drivers(mapped: MappedDevice, several: list[Position]) -> Drive:
     several = with_room(mapped, several, lasts_s + settle_s)
     commands = _at_once(mapped, mapped.drives, several)
 
-    def reached(so_far: list[Reading]) -> float | None:
+    def steady_time(so_far: list[Reading]) -> float | None:
         found = (
             steady_since(so_far, command.targets, mapped.motion, mapped.resting)
             for command in commands
-            if command.accepted
+            if command.is_ok
         )
         return next((since for since in found if since is not None), None)
 
     def is_over(so_far: list[Reading]) -> bool:
-        return reached(so_far) is not None or mapped.room.is_over(several, so_far, settle_s)
+        return steady_time(so_far) is not None or mapped.room.is_over(several, so_far, settle_s)
 
     seen = mapped.watch(commands[-1].answered + lasts_s, is_over)
-    end, since = mapped.drive({}), reached(seen)
+    end, since = mapped.drive({}), steady_time(seen)
     at_end = since is None and any(_is_at_end(mapped, command.targets, seen) for command in commands)
     what = "velocities of several clients"
     return Drive(what, {}, tuple(commands), tuple(seen), end, (), since=since, at_end=at_end)

@@ -8,7 +8,7 @@ from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import poll_for
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
-from conformance.scenarios.motion.moves import recorded
+from conformance.scenarios.motion.moves import record_parts
 from conformance.scenarios.motion.templates import NoValueError, at, positions_at
 from conformance.scenarios.motion.trace import Reading, Switched, Told
 from conformance.scenarios.scenario import NotDeclaredError, scenario
@@ -27,10 +27,10 @@ def agreement(mapped: MappedDevice) -> tuple[Told, ...]:
     """Read by each operation that tells it the position at rest, and the velocity under way and afterwards."""
     if not mapped.motion.state.agrees:
         raise NotDeclaredError("the map names no other operation that tells the position")
-    return recorded(_told(mapped))
+    return record_parts(_read_states(mapped))
 
 
-def _told(mapped: MappedDevice) -> Iterator[Told]:
+def _read_states(mapped: MappedDevice) -> Iterator[Told]:
     axes, speeds = mapped.motion.state.axes, mapped.motion.speeds
     named = {name for pointers in mapped.motion.state.agrees.values() for name in pointers}
     mapped.bring_home()
@@ -84,7 +84,7 @@ def switched(mapped: MappedDevice) -> tuple[Switched, ...]:
     """Set each switch to each of its values, and at last to the first again."""
     if not mapped.motion.switches:
         raise NotDeclaredError("the map has no [motion.switches]")
-    return recorded(
+    return record_parts(
         _switch(mapped, name, value)
         for name, switch in mapped.motion.switches.items()
         for value in (*switch.values, switch.values[0])
@@ -94,18 +94,18 @@ def switched(mapped: MappedDevice) -> tuple[Switched, ...]:
 def _switch(mapped: MappedDevice, name: str, value: object) -> Switched:
     switch = mapped.motion.switches[name]
     command = mapped.send(mapped.request_of(switch, {"value": value}))
-    shown, wanted = None, switch.shown(value)
+    shown, wanted = None, switch.reading_of(value)
     for _ in poll_for(mapped.clock, _STEP_S, switch.within_s):
-        shown = _shown(mapped, name)
+        shown = _read_switch(mapped, name)
         if shown == wanted:
             break
     arrived = shown == wanted
     mapped.clock.sleep(STAYS_S)
-    later = _shown(mapped, name)
+    later = _read_switch(mapped, name)
     return Switched(name, value, command, later if arrived else shown, arrived, later == wanted)
 
 
-def _shown(mapped: MappedDevice, name: str) -> object:
+def _read_switch(mapped: MappedDevice, name: str) -> object:
     switch = mapped.motion.switches[name]
     try:
         return at(mapped.get(switch.read or mapped.motion.state.read)[1], switch.at)

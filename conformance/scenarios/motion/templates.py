@@ -19,7 +19,7 @@ class NoValueError(LookupError):
     """Raised when a template names an unknown value; the message names it."""
 
 
-def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
+def fill(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
     """Return a template with its values.
 
     Args:
@@ -34,9 +34,9 @@ def filled(template: Any, values: Mapping[str, Any], answer: Any = None) -> Any:
         if template.keys() == SIGNED:
             number = _value(template["sign_of"], values, answer)
             return template["negative" if isinstance(number, int | float) and number < 0 else "positive"]
-        return {key: filled(item, values, answer) for key, item in template.items()}
+        return {key: fill(item, values, answer) for key, item in template.items()}
     if isinstance(template, list | tuple):
-        return [filled(item, values, answer) for item in template]
+        return [fill(item, values, answer) for item in template]
     if not isinstance(template, str):
         return template
     whole = NAME.fullmatch(template)

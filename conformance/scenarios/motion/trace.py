@@ -65,12 +65,12 @@ class Command:
     failed: bool = False
 
     @property
-    def accepted(self) -> bool:
+    def is_ok(self) -> bool:
         """Whether it was answered 2xx, and did not fail by its content."""
         return self.exchange.response.ok and not self.failed
 
     @property
-    def refused(self) -> bool:
+    def is_refused(self) -> bool:
         """Whether the device refused it."""
         return self.failed or is_refusal(self.exchange)
 
@@ -153,7 +153,7 @@ class Drive:
     at_end: bool = False
 
     @property
-    def named(self) -> str:
+    def name(self) -> str:
         """Return the drive as a noun phrase, with the velocity to which it was slowed."""
         return self.what + self.slowed
 
@@ -162,7 +162,7 @@ class Drive:
         """All readings."""
         return self.under_way + self.after
 
-    def settled(self, settle_s: float) -> float:
+    def settled_at(self, settle_s: float) -> float:
         """Return when it had reached its velocity, or else had to, s; ``settle_s``: the device's time to do so."""
         return self.commands[0].answered + settle_s if self.since is None else self.since
 

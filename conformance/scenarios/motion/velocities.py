@@ -15,7 +15,7 @@ from conformance.measures.samples import SEVERAL, longest_s, usual_s
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.measuring import STEADY_S, steady_since
-from conformance.scenarios.motion.moves import TRIES, beyond, recorded
+from conformance.scenarios.motion.moves import TRIES, beyond, record_parts
 from conformance.scenarios.motion.resting import creeping, fastest, may_creep
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
@@ -73,14 +73,14 @@ def velocities(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, .
     """
     if effort.name == "quick":
         parts = [
-            Part(_named(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
-            for number, (speeds, longer) in enumerate(_planned(mapped, quick=True), run.seed)
+            Part(_speeds_text(speeds, by := _in_turn(mapped, speeds, number)), speeds, longer=longer, by=by)
+            for number, (speeds, longer) in enumerate(_plan_drives(mapped, quick=True), run.seed)
         ]
-        return recorded(_in_a_row(mapped, parts))
-    parts = [Part(_named(speeds), speeds, longer=longer) for speeds, longer in _planned(mapped, quick=False)]
-    parts += [Part(_named(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
+        return record_parts(_in_a_row(mapped, parts))
+    parts = [Part(_speeds_text(speeds), speeds, longer=longer) for speeds, longer in _plan_drives(mapped, quick=False)]
+    parts += [Part(_speeds_text(speeds, by), speeds, by=by) for speeds, by in _by_each_way(mapped)]
     pairs = (parts[index : index + _PAIR] for index in range(0, len(parts), _PAIR))
-    return recorded(drive for pair in pairs for drive in _in_a_row(mapped, pair))
+    return record_parts(drive for pair in pairs for drive in _in_a_row(mapped, pair))
 
 
 def _by(way: Way, speeds: Position) -> _By:
@@ -107,7 +107,7 @@ def _ends(mapped: MappedDevice) -> Iterator[tuple[str, float]]:
         yield from ((name, limit) for limit in _there_and_back(mapped, axis.limits, axis.of))
 
 
-def _planned(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, bool]]:
+def _plan_drives(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, bool]]:
     """Yield velocities, and whether they are to outlast the hold time."""
     several = list(_at_once(mapped))
     for name, axis in mapped.drives.axes.items():
@@ -132,7 +132,7 @@ def _slowest(mapped: MappedDevice, name: str, limit: float) -> Position:
     return {name: math.copysign(min(max(_SLOWEST * abs(limit), least), _SLOW * abs(limit)), limit)}
 
 
-def _named(speeds: Position, by: _By = ()) -> str:
+def _speeds_text(speeds: Position, by: _By = ()) -> str:
     way = next((f" by {one.send}" + (" as XML" if one.root else "") for one in by if one), "")
     return " and ".join(f"{name} {speed:g}" for name, speed in speeds.items()) + way
 
@@ -147,7 +147,7 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
         for name, limit, value in beyond(mapped.drives.axes)
         if limit
     ]
-    return recorded(drive for part in parts for drive in _in_a_row(mapped, [part]))
+    return record_parts(drive for part in parts for drive in _in_a_row(mapped, [part]))
 
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
@@ -161,7 +161,7 @@ def let_go(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
     if hold_s is None:
         raise NotDeclaredError("the map declares no hold_s: the device goes on until it is told otherwise")
     chance = random.Random(f"{run.seed}/let go")  # noqa: S311 - no secret
-    return recorded(_let_go(mapped, hold_s, chance, quick=effort.name == "quick"))
+    return record_parts(_let_go(mapped, hold_s, chance, quick=effort.name == "quick"))
 
 
 def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick: bool) -> Iterator[Drive]:
@@ -180,7 +180,7 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
         # Odd and even numbers of commands, with and without readings.
         silent = made == 1 if quick else len(limits) <= made < 2 * len(limits)
         gone = SILENT if silent else POLLING
-        part = Part(f"{_named(speeds, by)}, {gone}", speeds, by=by)
+        part = Part(f"{_speeds_text(speeds, by)}, {gone}", speeds, by=by)
         yield from left_alone(mapped, part, hold_s, more=made % 2, gone=gone, brief=made > 0)
     name = axes[0][0]
     for kind, refused in refusals[: 1 if quick else None]:
@@ -193,17 +193,17 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
 def vanishing(mapped: MappedDevice) -> tuple[Drive, ...]:
     """Drive slowly, and vanish: in silence, with the connection closed, with the link broken, and reading on."""
     ways = WAYS if mapped.drives.hold_s is not None else (CLOSED, POLLING)
-    return recorded(drive for way in ways for drive in _vanished(mapped, way))
+    return record_parts(drive for way in ways for drive in _drive_and_vanish(mapped, way))
 
 
-def _vanished(mapped: MappedDevice, way: str) -> Iterator[Drive]:
+def _drive_and_vanish(mapped: MappedDevice, way: str) -> Iterator[Drive]:
     name, axis = next(iter(mapped.drives.axes.items()))
     limit = next(_there_and_back(mapped, axis.limits, axis.of))
     # So slow that a device that does not stop stays near.
     least = min(_TOLD * mapped.motion.speed_tolerance(name), abs(limit))
     speeds = {name: math.copysign(max(_SLOW * abs(limit), least), limit)}
     hold_s = mapped.drives.hold_s if mapped.drives.hold_s is not None else _UNDECLARED_S
-    yield from left_alone(mapped, Part(f"{_named(speeds)}, {way}", speeds), hold_s, gone=way, brief=True)
+    yield from left_alone(mapped, Part(f"{_speeds_text(speeds)}, {way}", speeds), hold_s, gone=way, brief=True)
 
 
 def _refusals(mapped: MappedDevice) -> Iterator[tuple[str, Callable[[], Command]]]:
@@ -278,7 +278,7 @@ def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part
         lasts_s = max(settle_s + STEADY_S, outlasts_s + MEASURED_S)
         made = part.speeds
         if before is not None and not _goes_on(mapped, before[1], made, lasts_s + drives.settle_s):
-            yield before[0], _ended(mapped, before[1], before[0].by), before[2]
+            yield before[0], _end_drive(mapped, before[1], before[0].by), before[2]
             before, settle_s = None, drives.settle_s
         if before is None:
             made = with_room(mapped, [part.speeds], lasts_s + drives.settle_s)[0]
@@ -291,7 +291,7 @@ def _at_each(mapped: MappedDevice, parts: Sequence[Part]) -> Iterator[tuple[Part
             yield before
         before = part, drive, whole
     if before is not None:
-        yield before[0], _ended(mapped, before[1], before[0].by), before[2]
+        yield before[0], _end_drive(mapped, before[1], before[0].by), before[2]
 
 
 def _times(mapped: MappedDevice, before: Position, after: Position) -> float:
@@ -359,12 +359,12 @@ def left_alone(
         drive = replace(drive, commands=(*drive.commands, *again))
         with ExitStack() as links:
             links.callback(mapped.ready.speak)
-            if gone in {CLOSED, HALF_OPEN} and drive.commands[-1].accepted:
+            if gone in {CLOSED, HALF_OPEN} and drive.commands[-1].is_ok:
                 drive = replace(drive, commands=(*drive.commands, _unread(mapped, made, drive, links, gone)))
             if gone:
                 mapped.ready.fall_silent()
             drive = _let_go_of(mapped, drive, hold_s, refused, beside, silent_s=silent_s, brief=brief)
-        if drive.refused is None or not drive.refused.accepted:
+        if drive.refused is None or not drive.refused.is_ok:
             yield drive
         if drive.was_kept(hold_s):
             return
@@ -411,9 +411,9 @@ def _let_go_of(
     for part in _REFUSED_AT if refused is not None else ():
         after += mapped.watch(last.answered + part * hold_s, lambda _: beside())
         one = refused() if refused is not None else None
-        answer = one if answer is None or (one and one.accepted) else answer
+        answer = one if answer is None or (one and one.is_ok) else answer
     mapped.clock.sleep(last.answered + silent_s - mapped.clock.now())
-    drive = _watched(mapped, drive, after, rests_at, brief_from=last.answered + hold_s if brief else None)
+    drive = _watch_rest(mapped, drive, after, rests_at, brief_from=last.answered + hold_s if brief else None)
     if not mapped.rests:
         mapped.stop()
     return replace(drive, refused=answer)
@@ -450,7 +450,7 @@ def _kept_up(
     commands, readings = [mapped.drive(made, way=next(ways))], list[Reading]()
     begun = commands[0].answered
     until, since, whole = max(begun + settle_s, begun + outlasts_s) + measured_s, None, True
-    while mapped.clock.now() < until and commands[-1].accepted:
+    while mapped.clock.now() < until and commands[-1].is_ok:
         # Before the settle time is over, a device that reverses still drives at the earlier velocity.
         settled = before is None or mapped.clock.now() >= begun + settle_s
         mapped.room.note(
@@ -480,13 +480,13 @@ def _kept_up(
     return replace(drive, resting=mapped.resting, since=since), whole
 
 
-def _ended(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
+def _end_drive(mapped: MappedDevice, drive: Drive, by: _By) -> Drive:
     """End a drive by velocity 0; return it with the readings after that."""
     end = mapped.drive({}, way=by[0] if by else None, integers=True)
-    return _watched(mapped, replace(drive, end=end), [], end.answered + mapped.drives.settle_s)
+    return _watch_rest(mapped, replace(drive, end=end), [], end.answered + mapped.drives.settle_s)
 
 
-def _watched(
+def _watch_rest(
     mapped: MappedDevice, drive: Drive, after: list[Reading], rests_at: float, *, brief_from: float | None = None
 ) -> Drive:
     """Watch a device that must rest from a time on, s of the clock; return the drive with the readings after it.
@@ -505,11 +505,11 @@ def _watched(
         late = [reading for reading in readings if reading.sent >= due]
         return len(late) > 2 * SEVERAL and mapped.room.is_over([speeds], late, 0.0)
 
-    def rested(readings: list[Reading]) -> float | None:
+    def resting_since(readings: list[Reading]) -> float | None:
         return None if brief_from is None else _resting_since(mapped, readings, brief_from)
 
-    after += mapped.watch(rests_at + _REST_S, lambda seen: drives_on(seen) or rested(seen) is not None)
-    since = rested(after)
+    after += mapped.watch(rests_at + _REST_S, lambda seen: drives_on(seen) or resting_since(seen) is not None)
+    since = resting_since(after)
     # After a slow reading, only readings as much later count: several of them show rest.
     for _ in range(_MORE if since is None else 0):
         counted = [reading for reading in after if reading.sent >= rests_at + longest_s([*drive.readings, *after])]

@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import TRIES, document_of, gave_up, succeeded
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
@@ -100,9 +100,9 @@ class Goal:
     heard: tuple[Heard, ...] = ()
 
     @property
-    def accepted(self) -> bool:
+    def is_ok(self) -> bool:
         """Whether the gateway took it."""
-        return succeeded(self.exchange, self.body)
+        return is_success(self.exchange, self.body)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class _Sender:
     def goals(self) -> Iterator[Goal]:
         """Yield a goal of each course."""
         self._serve()
-        yield self._reached(Course.REACHED)
+        yield self._reach_server(Course.REACHED)
         feedback, result = [self._new("Feedback") for _ in range(_FEEDBACKS)], self._new("Result")
         steps: dict[Course, dict[str, Any]] = {
             Course.SUCCEEDS: {"feedback": feedback, "gap_s": _GAP_S, "result": result},
@@ -151,13 +151,13 @@ class _Sender:
         }
         for course, step in list(steps.items())[: None if self._body.cancel else 3]:
             for _ in range(TRIES):
-                goals = self._two() if course is Course.FIRST else [self._followed(course, step)]
+                goals = self._two() if course is Course.FIRST else [self._follow_goal(course, step)]
                 if not any(gave_up(sent, self._body) for goal in goals for sent in (goal.exchange, goal.cancel)):
                     break
             yield from goals
         self._gateway.robot.tell("forget", name=self._body.action)
         self._serve()
-        yield self._reached(Course.BACK)
+        yield self._reach_server(Course.BACK)
 
     def _serve(self) -> None:
         self._gateway.robot.tell("act", action=self._body.action, type=self._body.type, script=[{}])
@@ -170,22 +170,22 @@ class _Sender:
         value = self._new("Goal")
         return value, self._gateway.send(self._gateway.request(self._call, self._body, value), self._body.response_s)
 
-    def _reached(self, course: Course) -> Goal:
+    def _reach_server(self, course: Course) -> Goal:
         """Send goals until one reaches its server, or the gateway's time is over."""
         robot, until = self._gateway.robot, WALL_CLOCK.now() + 2 * self._body.within_s
         while True:
-            robot.heard(self._body.action)
+            robot.take_heard(self._body.action)
             value, exchange = self._send()
-            heard = robot.heard(self._body.action, 1, _MORE_S)
+            heard = robot.take_heard(self._body.action, 1, _MORE_S)
             goal = Goal(self._call, self._body, course, json.dumps(value), exchange, heard=tuple(heard))
-            if (heard and goal.accepted) or WALL_CLOCK.now() > until:
+            if (heard and goal.is_ok) or WALL_CLOCK.now() > until:
                 WALL_CLOCK.sleep(_MORE_S)
                 return goal
 
-    def _begun(self, course: Course, *steps: dict[str, Any]) -> Goal:
+    def _begin_goal(self, course: Course, *steps: dict[str, Any]) -> Goal:
         robot = self._gateway.robot
         robot.tell("script", name=self._body.action, script=[*steps, {}])
-        robot.heard(self._body.action)
+        robot.take_heard(self._body.action)
         value, exchange = self._send()
         return self._goal(course, value, exchange, steps[0])
 
@@ -194,37 +194,37 @@ class _Sender:
         result = json.dumps(step["result"]) if "result" in step else ""
         return Goal(self._call, self._body, course, json.dumps(value), exchange, feedback, result)
 
-    def _followed(self, course: Course, step: dict[str, Any]) -> Goal:
+    def _follow_goal(self, course: Course, step: dict[str, Any]) -> Goal:
         """Send a goal, and follow it to its end; cancel it if that is its course."""
-        goal, robot = self._begun(course, step), self._gateway.robot
+        goal, robot = self._begin_goal(course, step), self._gateway.robot
         looks: list[Look] = []
         cancel: Exchange | None = None
-        if goal.accepted and course in {Course.CANCELED, Course.GOES_ON}:
-            looks += self._watched(goal, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
+        if goal.is_ok and course in {Course.CANCELED, Course.GOES_ON}:
+            looks += self._watch_goal(goal, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
             cancel = self._cancel(goal)
-        if goal.accepted:
+        if goal.is_ok:
             lasts_s = step.get("gap_s", 0.0) * (len(goal.feedback) + 1)
             until = WALL_CLOCK.now() + lasts_s + self._body.within_s + _LATE_S
-            looks += self._watched(goal, until, self._has_ended)
-        heard = tuple(robot.heard(self._body.action, 2, _MORE_S))
+            looks += self._watch_goal(goal, until, self._has_ended)
+        heard = tuple(robot.take_heard(self._body.action, 2, _MORE_S))
         return replace(goal, looks=tuple(looks), cancel=cancel, heard=heard)
 
     def _two(self) -> list[Goal]:
         """Send two goals, cancel the first, and follow both; then cancel the second."""
         robot, body = self._gateway.robot, self._body
         steps = [{"end": "never", "result": self._new("Result")} for _ in range(2)]
-        first = self._begun(Course.FIRST, *steps)
+        first = self._begin_goal(Course.FIRST, *steps)
         value, exchange = self._send()
         second = self._goal(Course.SECOND, value, exchange, steps[1])
-        if not (first.accepted and second.accepted):
+        if not (first.is_ok and second.is_ok):
             # A server or gateway may accept only one goal at a time.
             return []
         cancel = self._cancel(first)
-        ended = self._watched(first, WALL_CLOCK.now() + body.within_s + _LATE_S, self._has_ended)
-        went_on = self._watched(second, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
-        heard = tuple(robot.heard(body.action, 4, _MORE_S))
+        ended = self._watch_goal(first, WALL_CLOCK.now() + body.within_s + _LATE_S, self._has_ended)
+        went_on = self._watch_goal(second, WALL_CLOCK.now() + _RUNS_S, lambda _: False)
+        heard = tuple(robot.take_heard(body.action, 4, _MORE_S))
         self._cancel(second)
-        robot.heard(body.action, 2, _MORE_S)
+        robot.take_heard(body.action, 2, _MORE_S)
         first = replace(first, looks=tuple(ended), cancel=cancel, heard=heard)
         return [first, replace(second, looks=tuple(went_on), heard=heard)]
 
@@ -232,7 +232,7 @@ class _Sender:
         made = self._gateway.following(goal.exchange, self._body, self._body.cancel, self._body.cancel_body)
         return None if made is None else self._gateway.send(made, self._body.response_s)
 
-    def _watched(self, goal: Goal, until: float, is_over: Callable[[list[Look]], bool]) -> list[Look]:
+    def _watch_goal(self, goal: Goal, until: float, is_over: Callable[[list[Look]], bool]) -> list[Look]:
         looks: list[Look] = []
         state = self._body.state
         made = self._gateway.following(goal.exchange, self._body, state.read, state.body) if state else None

@@ -13,11 +13,11 @@ import msgspec
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.motion.binding import Binding
-from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
-from conformance.scenarios.ros.web import document_of, written
+from conformance.scenarios.ros.web import document_for, document_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange, Outgoing, Response
@@ -162,8 +162,8 @@ class Gateway:
             # Its id identifies the response to this message.
             body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
-            document = written(value, self.definition(_type_of(body)), body, self.ros)
-        return self.binding.made(filled(call, body.values), document)
+            document = document_for(value, self.definition(_type_of(body)), body, self.ros)
+        return self.binding.make(fill(call, body.values), document)
 
     def following(
         self, exchange: Exchange, body: Acts | Calls, template: str, content: dict[str, Any]
@@ -173,7 +173,7 @@ class Gateway:
         if body.id is not None:
             name = value_at(document_of(exchange.response.body).value, body.id)
         values = {**body.values, "id": str(name)}
-        return None if name is None else self.binding.made(filled(template, values), filled(content, values) or None)
+        return None if name is None else self.binding.make(fill(template, values), fill(content, values) or None)
 
     def read(self, call: str, reads: Reads) -> Exchange:
         """Read a topic; of a stream, return the last message.
@@ -184,7 +184,7 @@ class Gateway:
         if reads.stream:
             if call not in self._streams or self._streams[call].ended:
                 self._streams[call] = self.stream(call, reads)
-            return streamed(self._streams[call], self._streams[call].last)
+            return exchange_of(self._streams[call], self._streams[call].last)
         return self.send(self.request(call, reads), reads.response_s)
 
     def stream(self, call: str, reads: Reads, after: str = "") -> Stream:
@@ -218,7 +218,7 @@ class Silence(Exchange):
         return "no message on the stream"
 
 
-def streamed(stream: Stream, message: Message | None) -> Exchange:
+def exchange_of(stream: Stream, message: Message | None) -> Exchange:
     """Return a message of a stream as a response to the request that opened it."""
     if message is None:
         return Silence(stream.request, Response(HTTPStatus.NOT_FOUND, (), b"", 0.0))

@@ -16,7 +16,7 @@ from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import value_at
 from conformance.scenarios.ros.gateway import PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import content_of, differences, document_of, succeeded
+from conformance.scenarios.ros.web import content_of, differences, document_of, is_success
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Lists, Publishes, Reads
@@ -91,7 +91,7 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
         # Messages of an earlier run may still be published.
         until = WALL_CLOCK.now() + (body.max_age_s or 0.0) + _LATE_S
         exchange = gateway.read(call, body)
-        while succeeded(exchange, body) and WALL_CLOCK.now() < until:
+        while is_success(exchange, body) and WALL_CLOCK.now() < until:
             WALL_CLOCK.sleep(PACE_S)
             exchange = gateway.read(call, body)
         found.append(Absence(body, "on which nothing was published", exchange))
@@ -108,13 +108,13 @@ def publishers_end(gateway: Gateway) -> Publishers:
         raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
     absences: list[Absence] = []
-    presences = list(topics.shown("all topics at once"))
-    absences += topics.aged("whose publisher fell silent", topics.silence)
-    presences += topics.shown("a publisher that fell silent before")
-    absences += topics.aged("whose publisher left", topics.leave)
-    presences += topics.shown("a publisher in place of one that left")
-    absences += topics.aged("whose publisher was killed", gateway.kill)
-    presences += topics.shown("a publisher in place of one that was killed")
+    presences = list(topics.publish_all("all topics at once"))
+    absences += topics.let_age("whose publisher fell silent", topics.silence)
+    presences += topics.publish_all("a publisher that fell silent before")
+    absences += topics.let_age("whose publisher left", topics.leave)
+    presences += topics.publish_all("a publisher in place of one that left")
+    absences += topics.let_age("whose publisher was killed", gateway.kill)
+    presences += topics.publish_all("a publisher in place of one that was killed")
     topics.leave()
     return Publishers(tuple(absences), tuple(presences))
 
@@ -125,9 +125,9 @@ def publishers_of_each_quality(gateway: Gateway) -> tuple[Presence, ...]:
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     topics = _Topics(gateway)
-    found = [*topics.shown("a best-effort publisher", reliability="best_effort")]
+    found = [*topics.publish_all("a best-effort publisher", reliability="best_effort")]
     topics.leave()
-    found += topics.shown("a latched publisher", repeat_s=0.0, durability="transient_local")
+    found += topics.publish_all("a latched publisher", repeat_s=0.0, durability="transient_local")
     topics.leave()
     return tuple(found)
 
@@ -142,7 +142,7 @@ class _Topics:
         # One for each type, so that topics of the same type get different messages.
         self._makers = {body.type: gateway.maker(self._definitions[call]) for call, body in self._reads.items()}
 
-    def shown(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
+    def publish_all(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
         """Publish on all topics, and yield the gateway's response for each."""
         before = {call: content_of(self._gateway.read(call, body), body) for call, body in self._reads.items()}
         values: dict[str, Any] = {}
@@ -169,7 +169,7 @@ class _Topics:
     def _presence(self, call: str, publisher: str, values: Mapping[str, Any], before: object) -> Presence:
         exchange = self._gateway.read(call, self._reads[call])
         body, kinds = self._reads[call], {mapping.topic: mapping.type for mapping in self._reads.values()}
-        if not succeeded(exchange, body):
+        if not is_success(exchange, body):
             return Presence(publisher, shown=False, exchange=exchange)
         document, definition = document_of(exchange.response.body), self._definitions[call]
         alike = {topic: value for topic, value in values.items() if kinds[topic] == body.type}
@@ -196,7 +196,7 @@ class _Topics:
             self._gateway.robot.tell("forget", name=body.topic)
         WALL_CLOCK.sleep(_LATE_S)
 
-    def aged(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
+    def let_age(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
         """Stop publishing, and yield the gateway's responses when the last messages are too old."""
         judged = {call: body for call, body in self._reads.items() if body.max_age_s is not None}
         first = {call: self._gateway.read(call, body) for call, body in judged.items()}
@@ -206,7 +206,7 @@ class _Topics:
             WALL_CLOCK.sleep(max(0.0, ended + (body.max_age_s or 0.0) + _LATE_S - WALL_CLOCK.now()))
             exchange = self._gateway.read(call, body)
             for _ in range(_TRIES):
-                if not succeeded(exchange, body):
+                if not is_success(exchange, body):
                     break
                 WALL_CLOCK.sleep(_LATE_S)
                 exchange = self._gateway.read(call, body)
@@ -258,10 +258,10 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
         for name in names:
             _put(gateway, body.lists, name, kind)
         for name, there in reversed(names.items()):
-            found.append(_listed(gateway, call, body, name, kind, there=there))
+            found.append(_read_list(gateway, call, body, name, kind, there=there))
         for name in names:
             gateway.robot.tell("forget", name=name)
-        found += [_listed(gateway, call, body, name, kind, there=False) for name in names]
+        found += [_read_list(gateway, call, body, name, kind, there=False) for name in names]
     if not found:
         raise NotPossibleError("the map has no list of topics, services or actions")
     return tuple(found)
@@ -276,11 +276,11 @@ def _put(gateway: Gateway, lists: str, name: str, kind: str) -> None:
         gateway.robot.tell("act", action=name, type=kind, script=[{}])
 
 
-def _listed(gateway: Gateway, call: str, body: Lists, name: str, kind: str, *, there: bool) -> Listed:
+def _read_list(gateway: Gateway, call: str, body: Lists, name: str, kind: str, *, there: bool) -> Listed:
     until = WALL_CLOCK.now() + body.timeout_s
     while True:
         began = WALL_CLOCK.now()
-        exchange = gateway.send(gateway.binding.made(call, None), body.timeout_s)
+        exchange = gateway.send(gateway.binding.make(call, None), body.timeout_s)
         types = _types_in(exchange, body).get(name)
         is_right = exchange.response.ok and ((types is not None and kind in types) if there else types is None)
         if is_right or began > until:

@@ -84,7 +84,7 @@ class Robot(RosProcess):
         sent = said["sent"]
         return Published(sent[0] / _NS if sent else time.monotonic(), not said["best_effort"])
 
-    def heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
+    def take_heard(self, name: str, count: int = 0, within_s: float = 0.0) -> list[Heard]:
         """Return what a topic, service or action received since the last call; wait for ``count`` of it.
 
         Raises:

@@ -118,10 +118,10 @@ class Maker:
 
     def _message(self, turn: int | None, leaf: Any = None) -> dict[str, Any]:
         self._leaf, self._texts = itertools.count(), itertools.count()
-        made: dict[str, Any] = self._filled(self.definition.root, turn, 0, leaf or self._value)
+        made: dict[str, Any] = self._fill(self.definition.root, turn, 0, leaf or self._value)
         return made
 
-    def _filled(self, name: str, turn: int | None, depth: int, leaf: Any) -> dict[str, Any]:
+    def _fill(self, name: str, turn: int | None, depth: int, leaf: Any) -> dict[str, Any]:
         if name.startswith("builtin_interfaces/") and name.endswith(("/Time", "/Duration")):
             # A greater number is no ROS time, and a gateway may read it in any way.
             return {"sec": self._random.randint(0, _SECONDS), "nanosec": self._random.randint(0, _NANOSECONDS)}
@@ -129,7 +129,7 @@ class Maker:
         for field, shape in self.definition.fields(name):
             number = self._count(shape, turn, depth) if shape.is_array else 1
             if shape.is_message:
-                items: list[Any] = [self._filled(shape.item, turn, depth + 1, leaf) for _ in range(number)]
+                items: list[Any] = [self._fill(shape.item, turn, depth + 1, leaf) for _ in range(number)]
             else:
                 items = [leaf(shape, turn) for _ in range(number)]
             found[field] = _octets(items) if shape.is_octets else items if shape.is_array else items[0]

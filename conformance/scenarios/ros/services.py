@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
-from conformance.scenarios.ros.web import TRIES, document_of, gave_up, succeeded
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
@@ -102,9 +102,9 @@ class Called:
     beside: tuple[Beside, ...] = ()
 
     @property
-    def succeeded(self) -> bool:
+    def is_success(self) -> bool:
         """Return whether the gateway reports that the service responded."""
-        return succeeded(self.attempt, self.body)
+        return is_success(self.attempt, self.body)
 
     @property
     def is_open(self) -> bool:
@@ -189,24 +189,24 @@ class _Caller:
             self._finite(self._responses, _CALLS[effort.name]),
             strict=False,
         )
-        yield self._called(Server.MISSING, {})
+        yield self._call_server(Server.MISSING, {})
         self._serve([{"answer": {}}])
-        yield self._reached(Server.RESPONDS)
-        yield from (self._answered(Server.RESPONDS, *pair) for pair in pairs)
-        yield self._answered(Server.SLOW, *self._usual(), self._body.within_s * _SLOW)
-        yield self._answered(Server.AFTER, *self._usual())
+        yield self._reach_server(Server.RESPONDS)
+        yield from (self._call_answering(Server.RESPONDS, *pair) for pair in pairs)
+        yield self._call_answering(Server.SLOW, *self._usual(), self._body.within_s * _SLOW)
+        yield self._call_answering(Server.AFTER, *self._usual())
         for _ in range(ROUNDS):
             silent = self._never_answered()
             yield silent
             if not silent.is_open or self._body.timeout_s:
                 # Without the usual call, the gateway may rightly wait for the first one.
-                yield self._answered(Server.AFTER, *self._usual())
+                yield self._call_answering(Server.AFTER, *self._usual())
             if not any(is_held(silent, beside) for beside in silent.beside):
                 break
         self._gateway.robot.tell("forget", name=self._body.service)
-        yield self._called(Server.GONE, {})
+        yield self._call_server(Server.GONE, {})
         self._serve([{"answer": {}}])
-        yield self._reached(Server.BACK)
+        yield self._reach_server(Server.BACK)
 
     def of_many(self) -> Crowd:
         """Call from many clients at once. It comes last, as calls that were given up may still reach the server."""
@@ -217,10 +217,10 @@ class _Caller:
             for turn in range(CROWD)
         ]
         robot.tell("script", name=body.service, script=[*script, {}])
-        robot.heard(body.service)
+        robot.take_heard(body.service)
         made = [[self._gateway.request(self._call, body, request)] for request in requests]
         attempts = [(self._outcome(one),) for (one,) in crowd(self._gateway.api.client, made, body.within_s + _LATE_S)]
-        heard = tuple(robot.heard(body.service, 2 * CROWD, _MORE_S))
+        heard = tuple(robot.take_heard(body.service, 2 * CROWD, _MORE_S))
         return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
 
     def _serve(self, script: list[dict[str, Any]]) -> None:
@@ -229,22 +229,22 @@ class _Caller:
     def _complete(self, part: str, value: dict[str, Any]) -> dict[str, Any]:
         return self._gateway.complete(f"{self._body.type}#{part}", value)
 
-    def _reached(self, server: Server) -> Called:
+    def _reach_server(self, server: Server) -> Called:
         """Call until the gateway has found the server, or its time is over."""
         until = WALL_CLOCK.now() + 2 * self._body.within_s
         while True:
-            called = self._called(server, {}, self._complete("Response", {}))
-            if called.succeeded or WALL_CLOCK.now() > until:
+            called = self._call_server(server, {}, self._complete("Response", {}))
+            if called.is_success or WALL_CLOCK.now() > until:
                 return called
             WALL_CLOCK.sleep(PACE_S)
 
-    def _answered(self, server: Server, request: Sample, answer: Sample, delay_s: float = 0.0) -> Called:
+    def _call_answering(self, server: Server, request: Sample, answer: Sample, delay_s: float = 0.0) -> Called:
         """Call a server that gives a response of its own to this call."""
         complete = self._complete("Response", answer.value)
         script = [{"answer": complete, "delay_s": delay_s}, {"answer": {}}]
         for _ in range(TRIES):
             self._gateway.robot.tell("script", name=self._body.service, script=script)
-            called = self._called(server, request.value, complete)
+            called = self._call_server(server, request.value, complete)
             if not gave_up(called.attempt, self._body):
                 break
         return called
@@ -257,13 +257,13 @@ class _Caller:
         """Yield samples without NaN and infinities, which a gateway may refuse."""
         return (sample for sample in maker.samples(most, large=False) if sample.kind is not Kind.NON_FINITE)
 
-    def _called(self, server: Server, request: dict[str, Any], answer: dict[str, Any] | None = None) -> Called:
+    def _call_server(self, server: Server, request: dict[str, Any], answer: dict[str, Any] | None = None) -> Called:
         robot, body = self._gateway.robot, self._body
         request = self._complete("Request", request)
-        robot.heard(body.service)
-        attempt = self._outcome(self._sent(self._gateway.request(self._call, body, request), body.within_s + _LATE_S))
+        robot.take_heard(body.service)
+        attempt = self._outcome(self._send(self._gateway.request(self._call, body, request), body.within_s + _LATE_S))
         ended = WALL_CLOCK.now()
-        heard = () if answer is None else tuple(robot.heard(body.service, 3, _MORE_S))
+        heard = () if answer is None else tuple(robot.take_heard(body.service, 3, _MORE_S))
         text = "" if answer is None else json.dumps(answer)
         return Called(self._call, body, server, json.dumps(request), text, attempt, ended, heard)
 
@@ -274,13 +274,13 @@ class _Caller:
             return attempt
         made = self._gateway.following(attempt, self._body, state.read, state.body)
         while made is not None:
-            attempt = self._sent(made, self._body.within_s)
+            attempt = self._send(made, self._body.within_s)
             if not runs(attempt, self._body) or WALL_CLOCK.now() > until:
                 break
             WALL_CLOCK.sleep(PACE_S)
         return attempt
 
-    def _sent(self, made: Any, timeout_s: float) -> Attempt:
+    def _send(self, made: Any, timeout_s: float) -> Attempt:
         try:
             return self._gateway.send(made, timeout_s)
         except NoAnswerError as none:
@@ -296,10 +296,10 @@ class _Caller:
         self._usual_s = self._usual_s or [self._read(call, read, 0.0).took for call, read in others]
         request = self._complete("Request", self._requests.usual().value)
         robot.tell("script", name=body.service, script=[{"never": True}])
-        robot.heard(body.service)
+        robot.take_heard(body.service)
         made, text = self._gateway.request(self._call, body, request), json.dumps(request)
         with meanwhile(self._gateway.api.client, made, body.within_s + _LATE_S) as hanging:
-            heard = robot.heard(body.service, 1, body.within_s)
+            heard = robot.take_heard(body.service, 1, body.within_s)
             beside = tuple(
                 self._read(call, read, took) for (call, read), took in zip(others, self._usual_s, strict=True) if heard
             )
@@ -314,7 +314,7 @@ class _Caller:
 
     def _read(self, call: str, read: Reads | Lists, usual: float) -> Beside:
         began = WALL_CLOCK.now()
-        made = self._gateway.binding.made(call, None) if isinstance(read, Lists) else self._gateway.request(call, read)
-        attempt = self._sent(made, self._body.within_s + 2 * _LATE_S)
+        made = self._gateway.binding.make(call, None) if isinstance(read, Lists) else self._gateway.request(call, read)
+        attempt = self._send(made, self._body.within_s + 2 * _LATE_S)
         ended = WALL_CLOCK.now()
         return Beside(call, attempt, ended - began, usual, ended)

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition
-from conformance.scenarios.ros.gateway import PATIENCE_S, Gateway, streamed
+from conformance.scenarios.ros.gateway import PATIENCE_S, Gateway, exchange_of
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import differences, document_of
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
@@ -95,11 +95,11 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
         # The last of these may come late: each is another message than those that count.
         robot.publish(body.topic, body.type, maker.usual().value, repeat_s=0.1)
         for stream in streams:
-            stream.heard(1, body.within_s + PATIENCE_S)
+            stream.take_new(1, body.within_s + PATIENCE_S)
         robot.publish(body.topic, body.type)
         clock.sleep(_MORE_S + body.throttle_s)
         for stream in streams:
-            stream.heard()
+            stream.take_new()
         number, gap_s = _IN_A_ROW, _GAP_S
         if body.throttle_s:
             number, gap_s = _INTERVALS * _IN_EACH, body.throttle_s / _IN_EACH
@@ -112,8 +112,8 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
             how += f" after it has reconnected {turn} times" if turn else ""
             came = _came(stream, 1 if body.throttle_s else number, body)
             lasted_s = max(published_s, came[-1].at - came[0].at if came else 0.0)
-            shown = tuple(_shown(gateway, stream, message, body, definition, values) for message in came)
-            opened = streamed(stream, came[-1] if came else Message(began, b""))
+            shown = tuple(_match(gateway, stream, message, body, definition, values) for message in came)
+            opened = exchange_of(stream, came[-1] if came else Message(began, b""))
             text = tuple(map(json.dumps, values))
             yield Streamed(call, body, how, text, shown, lasted_s, opened, published.reliably)
             if stream.last_id and not turn and [one for _, one in shown] == list(range(number)):
@@ -123,18 +123,18 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
                 robot.publish(body.topic, body.type, *away, gap_s=gap_s)
                 clock.sleep(_MORE_S)
                 back = streams[place] = gateway.stream(call, body, stream.last_id)
-                came = [*back.heard(_AWAY, _RESUMES_S), *back.heard(_AWAY, _MORE_S)]
-                shown = tuple(_shown(gateway, back, message, body, definition, [*values, *away]) for message in came)
+                came = [*back.take_new(_AWAY, _RESUMES_S), *back.take_new(_AWAY, _MORE_S)]
+                shown = tuple(_match(gateway, back, message, body, definition, [*values, *away]) for message in came)
                 text, how = (*text, *map(json.dumps, away)), f"after {number} messages, with its Last-Event-ID"
                 yield Streamed(call, body, how, text, shown, 0.0, opened, published.reliably, number)
         if isinstance(streams[0], Subscription):
             streams[0].unsubscribe()
             clock.sleep(_MORE_S)
-            streams[0].heard()
+            streams[0].take_new()
             robot.publish(body.topic, body.type, *values)
-            came = streams[0].heard(1, _MORE_S)
-            shown = tuple((streamed(streams[0], message), -1) for message in came)
-            opened = streamed(streams[0], streams[0].last)
+            came = streams[0].take_new(1, _MORE_S)
+            shown = tuple((exchange_of(streams[0], message), -1) for message in came)
+            opened = exchange_of(streams[0], streams[0].last)
             yield Streamed(call, body, "after it was unsubscribed from", (), shown, 0.0, opened, reliable=True)
     finally:
         for stream in streams:
@@ -144,12 +144,12 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
 def _came(stream: Stream, number: int, body: Reads) -> list[Message]:
     """Return messages until the expected number, or no more can come, and those of a moment after."""
     found: list[Message] = []
-    while len(found) < number and (more := stream.heard(1, body.within_s)):
+    while len(found) < number and (more := stream.take_new(1, body.within_s)):
         found += more
-    return [*found, *stream.heard(number, _MORE_S + body.throttle_s)]
+    return [*found, *stream.take_new(number, _MORE_S + body.throttle_s)]
 
 
-def _shown(
+def _match(
     gateway: Gateway,
     stream: Stream,
     message: Message,
@@ -159,4 +159,4 @@ def _shown(
 ) -> tuple[Exchange, int]:
     document = document_of(message.octets)
     places = (n for n, value in enumerate(values) if not differences(document, value, definition, body, gateway.ros))
-    return streamed(stream, message), next(places, -1)
+    return exchange_of(stream, message), next(places, -1)

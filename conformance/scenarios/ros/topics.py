@@ -15,7 +15,7 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import content_of, differences, document_of, equal, succeeded
+from conformance.scenarios.ros.web import content_of, differences, document_of, equal, is_success
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -99,7 +99,7 @@ def topic_reads(gateway: Gateway, effort: Effort) -> Topics:
         for call, reads in gateway.of(Reads):
             definitions[call] = gateway.definition(reads.type)
             with gateway.robot.publishing(reads.topic):
-                shown.extend(_Reader(gateway, call, reads, definitions[call]).shown(effort))
+                shown.extend(_Reader(gateway, call, reads, definitions[call]).publish_samples(effort))
     return Topics(tuple(shown), definitions)
 
 
@@ -111,7 +111,7 @@ class _Reader:
     definition: Definition
     contents: set[str] = field(default_factory=set)
 
-    def shown(self, effort: Effort) -> Iterator[Shown]:
+    def publish_samples(self, effort: Effort) -> Iterator[Shown]:
         """Publish messages, and yield the gateway's response for each."""
         lost = 0
         samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=effort.name != "quick")
@@ -160,14 +160,14 @@ class _Reader:
     def shows(self, exchange: Exchange, value: dict[str, Any], kind: Kind) -> bool:
         """Return whether a response shows a message."""
         if kind is Kind.NON_FINITE and self.gateway.ros.non_finite == "refused":
-            return not succeeded(exchange, self.reads)
+            return not is_success(exchange, self.reads)
         document = document_of(exchange.response.body)
         found = differences(document, value, self.definition, self.reads, self.gateway.ros)
-        return succeeded(exchange, self.reads) and not found
+        return is_success(exchange, self.reads) and not found
 
     def is_stale(self, exchange: Exchange) -> bool:
         """Return whether a response shows no message, or one that was shown before."""
-        return not succeeded(exchange, self.reads) or content_of(exchange, self.reads) in {"None", *self.contents}
+        return not is_success(exchange, self.reads) or content_of(exchange, self.reads) in {"None", *self.contents}
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ def topic_bursts(gateway: Gateway, effort: Effort) -> tuple[Burst, ...]:
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
 def topic_refusals(gateway: Gateway) -> tuple[Burst, ...]:
     """Send messages that are none to the gateway, and hear whether it publishes anything."""
-    return tuple(_bursts(gateway, lambda writer: writer.malformed()))
+    return tuple(_bursts(gateway, lambda writer: writer.send_malformed()))
 
 
 def _bursts(gateway: Gateway, of: Any) -> Iterator[Burst]:
@@ -269,10 +269,10 @@ class _Writer:
         while True:
             self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
             one = self.send(self.usual())
-            if robot.heard(topic, 1, 1.0):
+            if robot.take_heard(topic, 1, 1.0):
                 # Those that were sent before may come late.
                 clock.sleep(_MORE_S)
-                robot.heard(topic)
+                robot.take_heard(topic)
                 return
             if clock.now() > until:
                 came = one.exchange.came
@@ -299,24 +299,24 @@ class _Writer:
 
     def send(self, sample: Sample) -> Sent:
         """Send a message."""
-        return self.sent(sample.what, json.dumps(self.value(sample)), self.request(sample))
+        return self.send_made(sample.what, json.dumps(self.value(sample)), self.request(sample))
 
-    def sent(self, what: str, value: str, made: Outgoing) -> Sent:
+    def send_made(self, what: str, value: str, made: Outgoing) -> Sent:
         """Send a request."""
         return self.sent_as(what, value, self.gateway.send(made, self.body.response_s))
 
     def sent_as(self, what: str, value: str, exchange: Exchange, client: int = 0) -> Sent:
         """Return a sent request with its outcome."""
-        accepted = succeeded(exchange, self.body)
+        accepted = is_success(exchange, self.body)
         return Sent(self.call, self.body.publishes, what, value, exchange, accepted, client)
 
     def hear(self, count: int) -> tuple[Heard, ...]:
         """Return the messages of this many accepted requests, and those of a moment after."""
         robot, topic = self.gateway.robot, self.body.publishes
-        heard = robot.heard(topic, count, self.body.within_s)
-        while len(heard) < count and (more := robot.heard(topic, 1, self.body.within_s)):
+        heard = robot.take_heard(topic, count, self.body.within_s)
+        while len(heard) < count and (more := robot.take_heard(topic, 1, self.body.within_s)):
             heard += more
-        return (*heard, *robot.heard(topic, 1, _MORE_S))
+        return (*heard, *robot.take_heard(topic, 1, _MORE_S))
 
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
         """Yield each message with its outcome."""
@@ -331,7 +331,7 @@ class _Writer:
             one = self.send(sample)
             yield Burst(self.call, sample.what, (one,), tuple(self.hear_of(one)), self.reliable)
         # What comes now, came of one of them.
-        late = self.gateway.robot.heard(self.body.publishes, 1, 2 * _MORE_S)
+        late = self.gateway.robot.take_heard(self.body.publishes, 1, 2 * _MORE_S)
         yield Burst(self.call, "nothing more", (), tuple(late), self.reliable)
 
     def hear_of(self, one: Sent) -> Iterator[Heard]:
@@ -341,7 +341,7 @@ class _Writer:
         wanted, clock = json.loads(one.value), WALL_CLOCK
         until = clock.now() + self.body.within_s
         while (left_s := until - clock.now()) > 0:
-            came = self.gateway.robot.heard(self.body.publishes, 1, left_s)
+            came = self.gateway.robot.take_heard(self.body.publishes, 1, left_s)
             yield from came
             if any(equal(each.content, wanted) for each in came):
                 return
@@ -381,7 +381,7 @@ class _Writer:
         heard = self.hear(sum(message.accepted for message in sent))
         return Burst(self.call, how, sent, heard, self.reliable)
 
-    def malformed(self) -> Iterator[Burst]:
+    def send_malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, with their outcome."""
         right = self.request(self.usual())
         wrong = {"no body": b""}
@@ -400,8 +400,8 @@ class _Writer:
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
         """Yield an invalid request with its outcome, apart from messages that the gateway publishes by itself."""
         for _ in range(2):
-            one = replace(self.sent(what, "", made), is_wrong=is_wrong)
-            heard = self.gateway.robot.heard(self.body.publishes, 1, _MORE_S)
+            one = replace(self.send_made(what, "", made), is_wrong=is_wrong)
+            heard = self.gateway.robot.take_heard(self.body.publishes, 1, _MORE_S)
             if not heard:
                 break
             # It may be the gateway's own word, as of a watchdog: then the request is sent again in silence.
@@ -413,7 +413,7 @@ class _Writer:
         """Wait until nothing comes for a while; return whether that is so."""
         until = WALL_CLOCK.now() + _SILENT_S
         while WALL_CLOCK.now() < until:
-            if not self.gateway.robot.heard(self.body.publishes, 1, _SILENCE_S):
+            if not self.gateway.robot.take_heard(self.body.publishes, 1, _SILENCE_S):
                 return True
         return False
 

@@ -62,7 +62,7 @@ def topic_watches(gateway: Gateway, effort: Effort) -> tuple[Watched, ...]:
     with partial_trace(lambda: tuple(found)):
         for call, reads in gateway.of(Reads):
             with gateway.robot.publishing(reads.topic):
-                seen = _watched(gateway, call, reads, _READS[effort.name])
+                seen = _watch_topic(gateway, call, reads, _READS[effort.name])
             if seen is None:
                 silent.append(f"{reads.topic} ({reads.type})")
             else:
@@ -72,17 +72,17 @@ def topic_watches(gateway: Gateway, effort: Effort) -> tuple[Watched, ...]:
     return tuple(found)
 
 
-def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched | None:
+def _watch_topic(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched | None:
     """Return the reads and messages of a topic, or None if it is silent."""
     robot, clock = gateway.robot, WALL_CLOCK
     definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.within_s
     best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-    heard = robot.heard(reads.topic, 1, reads.within_s)
+    heard = robot.take_heard(reads.topic, 1, reads.within_s)
     if not heard:
         # Publishers that were found meanwhile may be of best effort, which a reliable subscriber does not hear.
         robot.tell("forget", name=reads.topic)
         best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-        heard = robot.heard(reads.topic, 1, reads.within_s)
+        heard = robot.take_heard(reads.topic, 1, reads.within_s)
     if not heard:
         return None
     # From now on, what the gateway has must be one that was heard.
@@ -95,5 +95,5 @@ def _watched(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched 
             looks.append(Look(sent, gateway.read(call, reads)))
         clock.sleep((within_s + _LATE_S) / number)
     clock.sleep(_COMES_S)
-    heard += robot.heard(reads.topic)
+    heard += robot.take_heard(reads.topic)
     return Watched(call, reads.topic, definition, tuple(looks), tuple(heard), not best_effort)

@@ -63,7 +63,7 @@ class Document:
     is_xml: bool = False
 
 
-def succeeded(attempt: Attempt, body: Body) -> bool:
+def is_success(attempt: Attempt, body: Body) -> bool:
     """Return whether a response is 2xx, and reports no failure by the map."""
     if not isinstance(attempt, Exchange) or not attempt.response.ok:
         return False
@@ -76,7 +76,7 @@ def succeeded(attempt: Attempt, body: Body) -> bool:
 def gave_up(attempt: Attempt | None, body: Body) -> bool:
     """Return whether a request failed after a while, because its deadline passed on a busy machine."""
     is_late = isinstance(attempt, Exchange) and attempt.response.elapsed_ms > _SOON_MS
-    return attempt is not None and is_late and not succeeded(attempt, body)
+    return attempt is not None and is_late and not is_success(attempt, body)
 
 
 def content_of(exchange: Exchange, body: Body) -> str:
@@ -101,7 +101,7 @@ def document_of(octets: bytes) -> Document:
         return Document(None)
 
 
-def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
+def document_for(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
     """Return the request document for sending a message, in the map's form or plain JSON."""
     message = _web(value, Shape(definition.root), definition, ros)
     if body.fields:
@@ -109,13 +109,13 @@ def written(value: dict[str, Any], definition: Definition, body: Body, ros: RosM
         for web, own in body.fields.items():
             mapped = put_at(mapped, web, value_at(message, own))
         message = mapped
-    return _merged(body.body, put_at({}, body.at, message))
+    return _merge(body.body, put_at({}, body.at, message))
 
 
-def _merged(one: Any, other: Any) -> Any:
+def _merge(one: Any, other: Any) -> Any:
     """Return an object with the members of two, where the second has precedence; the second if one is no object."""
     if isinstance(one, dict) and isinstance(other, dict) and one:
-        return {name: _merged(one.get(name), other.get(name, one.get(name))) for name in (*one, *other)}
+        return {name: _merge(one.get(name), other.get(name, one.get(name))) for name in (*one, *other)}
     return other
 
 
@@ -159,11 +159,11 @@ def differing(
     """
     judge, message = _Comparison(definition, ros, document.is_xml), value_at(document.value, body.at)
     if not body.fields:
-        yield from judge.compared(message, value, Shape(definition.root), "")
+        yield from judge.compare(message, value, Shape(definition.root), "")
     for web, own in body.fields.items():
         shape = definition.at(own)
         if shape is not None:
-            yield from judge.compared(value_at(message, web, _MISSING), value_at(value, own), shape, own)
+            yield from judge.compare(value_at(message, web, _MISSING), value_at(value, own), shape, own)
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class _Comparison:
     ros: RosMap
     is_xml: bool
 
-    def compared(self, web: Any, own: Any, shape: Shape, at: str) -> Iterator[Difference]:
+    def compare(self, web: Any, own: Any, shape: Shape, at: str) -> Iterator[Difference]:
         """Yield the differences in a value and its parts."""
         if shape.is_octets:
             if not self._are_octets(web, base64.b64decode(own["b64"])):
@@ -189,7 +189,7 @@ class _Comparison:
             yield self._difference(at, shape, web, own)
             return
         for name, field in self.definition.fields(shape.item):
-            yield from self.compared(web.get(name, _MISSING), own[name], field, f"{at}/{name}")
+            yield from self.compare(web.get(name, _MISSING), own[name], field, f"{at}/{name}")
 
     def _items(self, web: Any, own: list[Any], shape: Shape, at: str) -> Iterator[Difference]:
         if self.is_xml and not isinstance(web, list):
@@ -200,7 +200,7 @@ class _Comparison:
             return
         item = Shape(shape.item)
         for number, (one, other) in enumerate(zip(web, own, strict=True)):
-            yield from self.compared(one, other, item, f"{at}/{number}")
+            yield from self.compare(one, other, item, f"{at}/{number}")
 
     def _are_octets(self, web: Any, own: bytes) -> bool:
         form = self.ros.bytes
@@ -259,7 +259,7 @@ class _Comparison:
 
     def _difference(self, at: str, shape: Shape, web: Any, own: Any) -> Difference:
         declared = f"{shape.item}[]" if shape.is_array else shape.item
-        return Difference(at or "/", declared, _shown(web), _shown(own))
+        return Difference(at or "/", declared, _value_text(web), _value_text(own))
 
 
 def _same(one: float, other: float) -> bool:
@@ -277,25 +277,25 @@ def equal(own: Any, other: Any) -> bool:
     return bool(own == other)
 
 
-def changed(own: Any, other: Any, at: str = "") -> Iterator[tuple[str, str, str]]:
+def changes(own: Any, other: Any, at: str = "") -> Iterator[tuple[str, str, str]]:
     """Yield the differences between two ROS messages: field, own value, other value."""
     if isinstance(other, dict) and isinstance(own, dict) and "b64" not in other:
         for name, one in other.items():
-            yield from changed(own.get(name), one, f"{at}/{name}")
+            yield from changes(own.get(name), one, f"{at}/{name}")
     elif isinstance(other, list) and isinstance(own, list) and len(own) == len(other):
         for number, pair in enumerate(zip(own, other, strict=True)):
-            yield from changed(*pair, f"{at}/{number}")
+            yield from changes(*pair, f"{at}/{number}")
     elif not equal(own, other):
-        yield at or "/", _shown(own), _shown(other)
+        yield at or "/", _value_text(own), _value_text(other)
 
 
-def _shown(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if value is _MISSING:
         return "nothing"
     if isinstance(value, dict) and set(value) == {"b64"}:
         value = value["b64"]
     if isinstance(value, list) and not any(isinstance(item, list | dict) for item in value):
-        text = f"[{', '.join(map(_shown, value[:_SHOWN]))}]"
+        text = f"[{', '.join(map(_value_text, value[:_SHOWN]))}]"
     else:
         text = str(value) if isinstance(value, Decimal) else repr(value)
     if len(text) <= _SHOWN:

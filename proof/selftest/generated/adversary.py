@@ -46,7 +46,7 @@ def kinds_in_requests(contract: Contract) -> Mapping[str, frozenset[str]]:
     return found
 
 
-def composed(mutants: tuple[GeneratedMutant, ...], kinds: Mapping[str, frozenset[str]]) -> tuple[GeneratedMutant, ...]:
+def compose(mutants: tuple[GeneratedMutant, ...], kinds: Mapping[str, frozenset[str]]) -> tuple[GeneratedMutant, ...]:
     """Return each mutant that works always, and its composition with each condition that its operation can meet.
 
     Args:
@@ -54,10 +54,10 @@ def composed(mutants: tuple[GeneratedMutant, ...], kinds: Mapping[str, frozenset
         kinds: the kinds of values in the requests of each operation.
     """
     always = [mutant for mutant in mutants if "@" not in mutant.operator]
-    return tuple(one for mutant in always for one in _composed(mutant, kinds[mutant.exchange.name]))
+    return tuple(one for mutant in always for one in _compositions(mutant, kinds[mutant.exchange.name]))
 
 
-def _composed(mutant: GeneratedMutant, kinds: frozenset[str]) -> Iterator[GeneratedMutant]:
+def _compositions(mutant: GeneratedMutant, kinds: frozenset[str]) -> Iterator[GeneratedMutant]:
     yield mutant
     if mutant.operator in _LASTING:
         return
@@ -103,13 +103,13 @@ class Recorder:
         return response
 
 
-def unreached(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
+def unreached_names(mutants: Iterable[GeneratedMutant], messages: list[Message]) -> frozenset[str]:
     """Return the names of the faults that alter none of the messages, or would alter none without their condition."""
     mutants = [mutant for mutant in mutants if mutant.always is not None]
     exchanges = {mutant.exchange.name: mutant.exchange for mutant in mutants}
     by_operation = {name: _around(exchange, messages) for name, exchange in exchanges.items()}
     return frozenset(
-        mutant.name for mutant in mutants if not _alters(_shown(mutant), by_operation[mutant.exchange.name])
+        mutant.name for mutant in mutants if not _alters(_without_condition(mutant), by_operation[mutant.exchange.name])
     )
 
 
@@ -119,7 +119,7 @@ def _around(exchange: Exchange, messages: list[Message]) -> list[Message]:
     return [message for number, message in enumerate(messages) if number in concerned or number + 1 in concerned]
 
 
-def _shown(mutant: GeneratedMutant) -> GeneratedMutant:
+def _without_condition(mutant: GeneratedMutant) -> GeneratedMutant:
     """Return a fault without its condition, if messages alone do not decide whether the condition holds."""
     _, _, condition = mutant.operator.partition("@")
     return mutant.always if mutant.always is not None and condition in _OF_TIME else mutant

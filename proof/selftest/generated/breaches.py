@@ -10,7 +10,7 @@ from typing import Any
 
 import jsonschema_rs
 
-from conformance.documents.json_schema import Schema, referred
+from conformance.documents.json_schema import Schema, target_of_lazy
 from conformance.documents.json_shape import Kept, validator_of
 from conformance.documents.openapi import Operation, is_json
 from proof.mutation.messages import Response
@@ -32,7 +32,7 @@ def valid(schema: Schema, value: Any) -> bool:
 
 def _validator(schema: Schema) -> Any:
     try:
-        return validator_of(schema, lambda uri, value: valid(referred(uri), value), validate_formats=True)
+        return validator_of(schema, lambda uri, value: valid(target_of_lazy(uri), value), validate_formats=True)
     except (ValueError, jsonschema_rs.ValidationError):
         return None
 
@@ -61,7 +61,7 @@ def undeclared_status(operation: Operation, answer: Response) -> bool:
 
 def undeclared_type(operation: Operation, answer: Response) -> bool:
     """Return whether a body has another media type than those that are declared for its status."""
-    content = operation.declared(answer.status)
+    content = operation.schemas_for(answer.status)
     return bool(content and answer.body) and not any(_names(name, answer.media_type) for name in content or ())
 
 
@@ -71,7 +71,7 @@ def _names(declared: str, given: str) -> bool:
 
 def schema_of(operation: Operation, answer: Response) -> Schema | None:
     """Return the schema that is declared for a response's status and JSON media type, or None."""
-    content = operation.declared(answer.status) or {}
+    content = operation.schemas_for(answer.status) or {}
     if not is_json(answer.media_type):
         return None
     return next((schema for name, schema in content.items() if _names(name, answer.media_type)), None)

@@ -14,7 +14,7 @@ from proof.selftest.generated.places import Exchange, Place, exchanges, places
 
 _NULL = next(operator for operator in OPERATORS if operator.name == "null")
 # _WHOLE: changes of whole responses that strike now and then.
-_WHOLE = {"crossed": responses.crossed, "failing": responses.failing, "cut": responses.cut}
+_WHOLE = {"crossed": responses.cross_responses, "failing": responses.failing, "cut": responses.cut}
 _UNSAFE = ("PUT", "POST", "PATCH", "DELETE")
 #: What norms leave open, whatever the contract.
 BY_NORM = (

@@ -19,7 +19,7 @@ from proof.selftest.generated.breaches import breaks, undeclared_status, undecla
 from proof.selftest.generated.mutant import MODES, Alter, GeneratedMutant, Tally, answers, in_mode
 from proof.selftest.generated.operators import OPERATORS
 from proof.selftest.generated.places import Exchange, Place, fields_of, rest_exchange
-from proof.selftest.generated.responses import BODIES, crossed
+from proof.selftest.generated.responses import BODIES, cross_responses
 from proof.selftest.generated.slots import Edit, Slot, edit_message, same
 
 _STATUSES = (200, 202, 204, 299, 400, 404, 409, 418, 422, 500, 502)
@@ -78,13 +78,13 @@ def _mutant(
 def _breaching(operation: Operation, exchange: Exchange, alter: Alter, mode: str = "") -> Callable[[Tally], Change]:
     """Return a change that alters a response only where the altered one breaks the description or JSON."""
 
-    def checked(request: Any, response: Response) -> Response | None:
+    def alter_checked(request: Any, response: Response) -> Response | None:
         if not exchange.concerns(request) or breaks(operation, response):
             return None
         altered = alter(request, response)
         return altered if altered is not None and breaks(operation, altered) else None
 
-    return in_mode(mode, checked)
+    return in_mode(mode, alter_checked)
 
 
 def _of_fields(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant]:
@@ -185,9 +185,9 @@ def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant
     """Yield mutants that fail, cut, cross or refuse whole responses, always or now and then."""
     for mode, when in {"": "every time", **MODES}.items():
         suffix = f"@{mode}" if mode else ""
-        fail = in_mode(mode, answers(exchange, lambda answer: answer.status in _SUCCESS, failures.failed))
+        fail = in_mode(mode, answers(exchange, lambda answer: answer.status in _SUCCESS, failures.make_failed))
         yield _mutant(f"failing{suffix}", exchange, "answer", f"fails with 500, {when}", fail)
-        half = _breaching(operation, exchange, _halved, mode)
+        half = _breaching(operation, exchange, _halve, mode)
         yield _mutant(f"cut{suffix}", exchange, "answer", f"sends half of the body, {when}", half)
         yield _mutant(
             f"hang-up{suffix}",
@@ -196,7 +196,7 @@ def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant
             f"closes the connection, {when}",
             failures.hanging_up(exchange, mode),
         )
-        cross = crossed(exchange, mode, lambda answer: breaks(operation, answer))
+        cross = cross_responses(exchange, mode, lambda answer: breaks(operation, answer))
         yield _mutant(f"crossed{suffix}", exchange, "answer", f"sends the answer before, {when}", cross)
     yield _mutant("hang", exchange, "answer", "does not answer", failures.hanging(exchange))
     yield _mutant("slower", exchange, "answer", "answers later every time", failures.slower(exchange))
@@ -204,7 +204,7 @@ def _whole(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutant
         yield _mutant("insides", exchange, "error", "shows a traceback in errors", failures.showing_insides(exchange))
 
 
-def _halved(_: Any, response: Response) -> Response | None:
+def _halve(_: Any, response: Response) -> Response | None:
     altered = response.copy()
     altered.body = altered.body[: len(altered.body) // 2]
     return altered if response.status in _SUCCESS else None

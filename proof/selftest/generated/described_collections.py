@@ -77,7 +77,7 @@ def _ignoring(exchange: Exchange, parameter: Parameter, differs: _Differs) -> Ca
             if not exchange.concerns(request) or item.read(exchange, request) is NOTHING:
                 return response
             right = _page_in(response)
-            other = forward(item.written(exchange, request, NOTHING)) if right is not None else response
+            other = forward(item.write(exchange, request, NOTHING)) if right is not None else response
             wrong = _page_in(other)
             if right is None or wrong is None or not differs(right, wrong):
                 return response
@@ -103,7 +103,7 @@ def _counting(exchange: Exchange) -> Callable[[Tally], Change]:
                 return response
             seen += 1
             altered = response.copy()
-            if seen <= _RIGHT or not _added(altered, page):
+            if seen <= _RIGHT or not _add_one(altered, page):
                 return response
             tally()
             return altered
@@ -113,7 +113,7 @@ def _counting(exchange: Exchange) -> Callable[[Tally], Change]:
     return make
 
 
-def _added(response: Response, page: Page) -> bool:
+def _add_one(response: Response, page: Page) -> bool:
     """Add one to each total of a body; return whether there is one."""
     value = json.loads(response.body)
     pending, found = [value], False

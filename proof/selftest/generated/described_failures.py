@@ -21,7 +21,7 @@ _TRACEBACK = json.dumps(
 Edit = Callable[[Request, Response], Response | None]
 
 
-def failed(answer: Response) -> None:
+def make_failed(answer: Response) -> None:
     """Make a response the 500 of a server that failed."""
     answer.status, answer.reason, answer.body = 500, "", b"Internal Server Error"
     answer.put("Content-Type", "text/plain")
@@ -97,10 +97,10 @@ def showing_insides(exchange: Exchange) -> Callable[[Tally], Change]:
         bad = answer.status >= _BAD_REQUEST and answer.media_type.endswith("json")
         return altered if bad and altered.body != answer.body else None
 
-    return edited(exchange.concerns, edit)
+    return edit_responses(exchange.concerns, edit)
 
 
-def edited(where: Callable[[Request], bool], edit: Edit) -> Callable[[Tally], Change]:
+def edit_responses(where: Callable[[Request], bool], edit: Edit) -> Callable[[Tally], Change]:
     """Return a change that edits responses to some requests; ``edit`` returns None to leave one as it is."""
 
     def make(tally: Tally) -> Change:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 from conformance.documents.openapi import Operation
 from proof.mutation.messages import Change, Forward, Request, Response
-from proof.selftest.generated.described_failures import Edit, edited, failed
+from proof.selftest.generated.described_failures import Edit, edit_responses, make_failed
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.places import Exchange
 
@@ -30,7 +30,7 @@ def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
         rows += [(name, says, at("HEAD"), edit) for name, (says, edit) in _HEADS.items()]
     rows += [(name, says, resource, _allow(edit)) for name, (says, edit) in _allows(operation.method).items()]
     rows.append(
-        ("unknown-taken", "answers a method that nobody knows with 200 (RFC 9110 9.1)", _unknown(resource), _taken)
+        ("unknown-taken", "answers a method that nobody knows with 200 (RFC 9110 9.1)", _unknown(resource), _as_success)
     )
     rows.append(("unknown-fails", "answers a method that nobody knows with 500", _unknown(resource), _failing))
     rows.append(("options-fails", "answers OPTIONS with 500", at("OPTIONS"), _failing))
@@ -41,11 +41,11 @@ def of_http(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
             name,
             exchange,
             exchange.classes,
-            edited(where, edit),
+            edit_responses(where, edit),
         )
 
 
-def _changed(change: Callable[[Response], object], when: Callable[[Response], bool]) -> Edit:
+def _edit_of(change: Callable[[Response], object], when: Callable[[Response], bool]) -> Edit:
     def edit(_request: Request, answer: Response) -> Response | None:
         if not when(answer):
             return None
@@ -89,7 +89,7 @@ def _as_part(answer: Response) -> None:
     answer.put("Content-Range", "bytes 0-9/99")
 
 
-def _unasked(request: Request, answer: Response) -> Response | None:
+def _not_modified(request: Request, answer: Response) -> Response | None:
     conditional = any(name.lower().startswith("if-") for name, _ in request.fields)
     if conditional or not _fine(answer) or request.method != "GET":
         return None
@@ -100,7 +100,7 @@ def _unasked(request: Request, answer: Response) -> Response | None:
 
 def _failing(_request: Request, answer: Response) -> Response | None:
     altered = answer.copy()
-    failed(altered)
+    make_failed(altered)
     return altered
 
 
@@ -108,57 +108,57 @@ def _failing(_request: Request, answer: Response) -> Response | None:
 _ANSWERS: dict[str, tuple[str, Edit]] = {
     "no-type": (
         "sends no Content-Type (RFC 9110 8.3)",
-        _changed(lambda answer: answer.drop("Content-Type"), _with_body),
+        _edit_of(lambda answer: answer.drop("Content-Type"), _with_body),
     ),
     "half-type": (
         "sends a malformed Content-Type (RFC 9110 8.3.1)",
-        _changed(lambda answer: answer.put("Content-Type", answer.media_type.partition("/")[0]), _with_body),
+        _edit_of(lambda answer: answer.put("Content-Type", answer.media_type.partition("/")[0]), _with_body),
     ),
     "two-types": (
         "sends Content-Type twice (RFC 9110 5.3)",
-        _changed(lambda answer: answer.fields.append(("Content-Type", "text/plain")), _with_body),
+        _edit_of(lambda answer: answer.fields.append(("Content-Type", "text/plain")), _with_body),
     ),
     "name-twice": (
         "sends an object with a name twice (RFC 8259 4)",
-        _changed(
+        _edit_of(
             lambda answer: setattr(answer, "body", re.sub(rb'\{("[^"]+"\s*:)', rb"{\1null,\1", answer.body, count=1)),
             lambda answer: _with_body(answer) and answer.media_type.endswith("json") and b'{"' in answer.body,
         ),
     ),
     "no-date": (
         "sends no Date (RFC 9110 6.6.1)",
-        _changed(lambda answer: answer.drop("Date"), lambda answer: _fine(answer) and answer.field("Date") is not None),
+        _edit_of(lambda answer: answer.drop("Date"), lambda answer: _fine(answer) and answer.field("Date") is not None),
     ),
     "bad-date": (
         "sends a Date that is no IMF-fixdate (RFC 9110 5.6.7)",
-        _changed(lambda answer: answer.put("Date", "2026-01-31T12:00:00Z"), _fine),
+        _edit_of(lambda answer: answer.put("Date", "2026-01-31T12:00:00Z"), _fine),
     ),
     "bad-etag": (
         "sends an ETag without quotes (RFC 9110 8.8.3)",
-        _changed(lambda answer: answer.put("ETag", "abc"), _fine),
+        _edit_of(lambda answer: answer.put("ETag", "abc"), _fine),
     ),
     "bad-modified": (
         "sends a Last-Modified that is no IMF-fixdate (RFC 9110 8.8.2)",
-        _changed(lambda answer: answer.put("Last-Modified", "yesterday"), _fine),
+        _edit_of(lambda answer: answer.put("Last-Modified", "yesterday"), _fine),
     ),
     "long-length": (
         "sends a Content-Length that is too great (RFC 9112 6.3)",
-        _changed(_raw(lambda head, body: _length(head, _OFF) + b"\r\n\r\n" + body), _with_body),
+        _edit_of(_raw(lambda head, body: _length(head, _OFF) + b"\r\n\r\n" + body), _with_body),
     ),
     "short-length": (
         "sends a Content-Length that is too small (RFC 9112 6.3)",
-        _changed(
+        _edit_of(
             _raw(lambda head, body: _length(head, -_OFF) + b"\r\n\r\n" + body),
             lambda answer: _with_body(answer) and len(answer.body) > _OFF,
         ),
     ),
     "two-lengths": (
         "sends two Content-Lengths (RFC 9110 8.6)",
-        _changed(_raw(lambda head, body: head + b"\r\nContent-Length: 3\r\n\r\n" + body), _with_body),
+        _edit_of(_raw(lambda head, body: head + b"\r\nContent-Length: 3\r\n\r\n" + body), _with_body),
     ),
     "chunked-and-length": (
         "sends Transfer-Encoding and Content-Length (RFC 9112 6.2)",
-        _changed(
+        _edit_of(
             _raw(
                 lambda head, body: (
                     head + b"\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n" % len(body) + body + b"\r\n0\r\n\r\n"
@@ -169,7 +169,7 @@ _ANSWERS: dict[str, tuple[str, Edit]] = {
     ),
     "bad-chunk": (
         "sends chunks with a wrong size (RFC 9112 7.1)",
-        _changed(
+        _edit_of(
             _raw(
                 lambda head, body: (
                     _without_length(head)
@@ -183,41 +183,41 @@ _ANSWERS: dict[str, tuple[str, Edit]] = {
     ),
     "folded-field": (
         "folds a field over two lines (RFC 9112 5.2)",
-        _changed(_raw(lambda head, body: head + b"\r\nX-Note: one\r\n two\r\n\r\n" + body), _fine),
+        _edit_of(_raw(lambda head, body: head + b"\r\nX-Note: one\r\n two\r\n\r\n" + body), _fine),
     ),
     "space-before-colon": (
         "has a space before a colon (RFC 9112 5.1)",
-        _changed(_raw(lambda head, body: head + b"\r\nX-Note : one\r\n\r\n" + body), _fine),
+        _edit_of(_raw(lambda head, body: head + b"\r\nX-Note : one\r\n\r\n" + body), _fine),
     ),
     "unasked-part": (
         "answers 206 where no range was asked for (RFC 9110 15.3.7)",
-        _changed(_as_part, lambda answer: answer.status in _SUCCESS and bool(answer.body)),
+        _edit_of(_as_part, lambda answer: answer.status in _SUCCESS and bool(answer.body)),
     ),
-    "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _unasked),
+    "unasked-304": ("answers 304 without a condition (RFC 9110 15.4.5)", _not_modified),
 }
 
 
 _HEADS: dict[str, tuple[str, Edit]] = {
     "head-body": (
         "sends a body in response to HEAD (RFC 9110 9.3.2)",
-        _changed(
+        _edit_of(
             lambda answer: setattr(answer, "raw", answer.octets() + b'{"roaas": 1}'),
             lambda answer: answer.status in _SUCCESS,
         ),
     ),
     "head-type": (
         "sends another Content-Type for HEAD than for GET (RFC 9110 9.3.2)",
-        _changed(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS),
+        _edit_of(lambda answer: answer.put("Content-Type", "text/html"), lambda answer: answer.status in _SUCCESS),
     ),
     "head-length": (
         "sends another Content-Length for HEAD than for GET (RFC 9110 8.6)",
-        _changed(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS),
+        _edit_of(lambda answer: answer.put("Content-Length", "1"), lambda answer: answer.status in _SUCCESS),
     ),
     "head-fails": ("answers HEAD with 500", _failing),
 }
 
 
-def _taken(_request: Request, answer: Response) -> Response | None:
+def _as_success(_request: Request, answer: Response) -> Response | None:
     altered = answer.copy()
     altered.status, altered.reason = 200, ""
     return altered
@@ -231,7 +231,7 @@ def _unknown(resource: Callable[[Request], bool]) -> Callable[[Request], bool]:
 
 
 def _allow(edit: Callable[[Response], object]) -> Edit:
-    return _changed(edit, lambda answer: answer.field("Allow") is not None and answer.status == _METHOD_NOT_ALLOWED)
+    return _edit_of(edit, lambda answer: answer.field("Allow") is not None and answer.status == _METHOD_NOT_ALLOWED)
 
 
 def _allows(method: str) -> dict[str, tuple[str, Callable[[Response], object]]]:
@@ -255,20 +255,20 @@ def of_resource(operation: Operation, exchange: Exchange) -> Iterator[GeneratedM
         (
             "refused-as-missing",
             "answers 404 in place of 405 (RFC 9110 15.5.6)",
-            edited(
+            edit_responses(
                 lambda request: re.fullmatch(exchange.path, request.path) is not None,
-                _changed(_missing, lambda answer: answer.status == _METHOD_NOT_ALLOWED),
+                _edit_of(_missing, lambda answer: answer.status == _METHOD_NOT_ALLOWED),
             ),
         )
     ]
     if operation.method == "GET":
-        tagged = _changed(
+        tagged = _edit_of(
             lambda answer: answer.put("ETag", '"roaas"'),
-            lambda answer: bool(answer.field("ETag")) and _succeeded(answer),
+            lambda answer: bool(answer.field("ETag")) and _is_success(answer),
         )
         rows += [
-            ("head-missing", "answers HEAD with 404", edited(at("HEAD"), _changed(_missing, _succeeded))),
-            ("head-tag", "sends another ETag for HEAD (RFC 9110 9.3.2)", edited(at("HEAD"), tagged)),
+            ("head-missing", "answers HEAD with 404", edit_responses(at("HEAD"), _edit_of(_missing, _is_success))),
+            ("head-tag", "sends another ETag for HEAD (RFC 9110 9.3.2)", edit_responses(at("HEAD"), tagged)),
             ("tag-kept", "keeps its first ETag (RFC 9110 8.8.1)", _keeping_tags(at("GET", "HEAD"))),
             (
                 "list-ignored",
@@ -289,7 +289,7 @@ def _missing(answer: Response) -> None:
     answer.status, answer.reason = 404, ""
 
 
-def _succeeded(answer: Response) -> bool:
+def _is_success(answer: Response) -> bool:
     return answer.status in _SUCCESS
 
 
@@ -307,7 +307,7 @@ def _keeping_tags(where: Callable[[Request], bool]) -> Callable[[Tally], Change]
             altered.put("ETag", first[request.path])
             return altered
 
-        return edited(where, edit)(tally)
+        return edit_responses(where, edit)(tally)
 
     return make
 

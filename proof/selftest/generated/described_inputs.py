@@ -48,7 +48,7 @@ class Input:
         text = self._texts(exchange, request).get(self.steps[0])
         return NOTHING if text is None else _value(self.schema, text)
 
-    def written(self, exchange: Exchange, request: Request, value: Any) -> Request:
+    def write(self, exchange: Exchange, request: Request, value: Any) -> Request:
         """Return the request with another value; NOTHING leaves it out."""
         if self.where == "body":
             whole = _body(request)

@@ -87,15 +87,15 @@ def _of_reads(operation: Operation) -> Iterator[_Row]:
     if str(_CURRENT) in operation.responses:
         yield "stale-304", "answers 304 for each tag that it ever sent (RFC 9110 13.1.2)", _stale_copy
     if str(_PART) in operation.responses:
-        yield "part-shifted", "sends a part that begins one later (RFC 9110 15.3.7.1)", _edited(_shifted, _PART)
-        yield "part-total", "tells another length of the whole (RFC 9110 14.4)", _edited(_other_total, _PART)
+        yield "part-shifted", "sends a part that begins one later (RFC 9110 15.3.7.1)", _edit_reads(_shift, _PART)
+        yield "part-total", "tells another length of the whole (RFC 9110 14.4)", _edit_reads(_other_total, _PART)
         yield "range-stale", "ignores If-Range (RFC 9110 13.1.5)", _without("If-Range")
-    yield "digest", "sends the digest of something else (RFC 9530)", _edited(_other_digest)
+    yield "digest", "sends the digest of something else (RFC 9530)", _edit_reads(_other_digest)
     if _CSV in operation.formats:
-        yield "row-lost", "leaves out the last row of a table", _edited(_fewer_rows)
-        yield "row-quotes", "sends quotes in quoted values as they are (RFC 4180 2)", _edited(_single_quotes)
+        yield "row-lost", "leaves out the last row of a table", _edit_reads(_fewer_rows)
+        yield "row-quotes", "sends quotes in quoted values as they are (RFC 4180 2)", _edit_reads(_single_quotes)
     if kinds_of(operation.shape or {}) == {"array"}:
-        yield "list-other", "shows other numbers in lists than in their items", _edited(_other_numbers)
+        yield "list-other", "shows other numbers in lists than in their items", _edit_reads(_other_numbers)
 
 
 def _of_conditions(operation: Operation) -> Iterator[_Row]:
@@ -113,19 +113,23 @@ def _of_conditions(operation: Operation) -> Iterator[_Row]:
 def _of_values(operation: Operation) -> Iterator[_Row]:
     if next(iter(operation.bodies), "") == _OCTETS:
         yield "file-tail", "keeps the end of the file before, where that is longer", _longer
-        yield "file-cut", "keeps files without their last byte", _sent(lambda body: body[:-1])
+        yield "file-cut", "keeps files without their last byte", _edit_body(lambda body: body[:-1])
     media_type = next(filter(is_json, operation.bodies), "")
     parts = flat(operation.bodies[media_type].schema).get("properties", {}) if media_type else {}
     formats = {name: flat(one).get("format") for name, one in parts.items() if isinstance(one, dict)}
     doubles = {name for name, one in formats.items() if one == "double"}
     times = {name for name, one in formats.items() if one == "date-time"}
     if JSON_PATCH in next(iter(operation.bodies), ""):
-        yield "patch-copies", "copies what a JSON patch moves (RFC 6902 4.4)", _sent(lambda body: _steps(body, "copy"))
-        yield "patch-untested", "ignores the tests of a JSON patch (RFC 6902 4.6)", _sent(_steps)
+        yield (
+            "patch-copies",
+            "copies what a JSON patch moves (RFC 6902 4.4)",
+            _edit_body(lambda body: _steps(body, "copy")),
+        )
+        yield "patch-untested", "ignores the tests of a JSON patch (RFC 6902 4.6)", _edit_body(_steps)
     if doubles:
-        yield "digits", "keeps two decimals of doubles", _sent(lambda body: _members(body, doubles, _rounded))
+        yield "digits", "keeps two decimals of doubles", _edit_body(lambda body: _members(body, doubles, _round))
     if times:
-        yield "offset", "takes each time as UTC", _sent(lambda body: _members(body, times, _as_utc))
+        yield "offset", "takes each time as UTC", _edit_body(lambda body: _members(body, times, _as_utc))
 
 
 def _changing(exchange: Exchange, act: _Act) -> Callable[[Tally], Change]:
@@ -153,7 +157,7 @@ def _changing(exchange: Exchange, act: _Act) -> Callable[[Tally], Change]:
     return make
 
 
-def _edited(edit: Callable[[Response], object], *statuses: int) -> _Act:
+def _edit_reads(edit: Callable[[Response], object], *statuses: int) -> _Act:
     """Return an act that alters responses to GET; those that it cannot alter it leaves."""
 
     def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
@@ -167,7 +171,7 @@ def _edited(edit: Callable[[Response], object], *statuses: int) -> _Act:
     return act
 
 
-def _sent(edit: Callable[[bytes], bytes]) -> _Act:
+def _edit_body(edit: Callable[[bytes], bytes]) -> _Act:
     """Return an act that alters the body of a request."""
 
     def act(request: Request, forward: Forward, _: _Past) -> tuple[Response, bool]:
@@ -312,7 +316,7 @@ def _with_key(request: Request, key: str) -> Request:
     return altered
 
 
-def _noted(request: Request, response: Response, past: _Past) -> Response:
+def _note(request: Request, response: Response, past: _Past) -> Response:
     if (key := _key_in(request)) and response.status in _SUCCESS:
         past.keyed.setdefault(key, (request, response))
     return response
@@ -321,7 +325,7 @@ def _noted(request: Request, response: Response, past: _Past) -> Response:
 def _again(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
     first = past.keyed.get(_key_in(request))
     if first is None or first[0].body != request.body:
-        return _noted(request, forward(request), past), False
+        return _note(request, forward(request), past), False
     response = forward(_with_key(request, str(uuid4())))
     return response, response.status in _SUCCESS
 
@@ -329,18 +333,18 @@ def _again(request: Request, forward: Forward, past: _Past) -> tuple[Response, b
 def _any_body(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
     response, first = forward(request), past.keyed.get(_key_in(request))
     if first is None or first[0].body == request.body or response.status in _SUCCESS:
-        return _noted(request, response, past), False
+        return _note(request, response, past), False
     return first[1], True
 
 
 def _old_key(request: Request, forward: Forward, past: _Past) -> tuple[Response, bool]:
     key = _key_in(request)
     if not key or not past.keyed or key in past.keyed:
-        return _noted(request, forward(request), past), False
+        return _note(request, forward(request), past), False
     return next(iter(past.keyed.values()))[1], True
 
 
-def _shifted(answer: Response) -> None:
+def _shift(answer: Response) -> None:
     answer.body = answer.body[1:] + b"~" if answer.field("Content-Range") else answer.body
 
 
@@ -393,7 +397,7 @@ def _members(body: bytes, names: set[str], edit: Callable[[Any], Any]) -> bytes:
     return json.dumps(made).encode() if made != value else body
 
 
-def _rounded(value: Any) -> Any:
+def _round(value: Any) -> Any:
     return round(value, _DECIMALS) if isinstance(value, float) and math.isfinite(value) else value
 
 

@@ -18,7 +18,7 @@ _SUCCESS = range(200, 300)
 _LONG, _BIG = 1000, 10**9
 
 
-def _made(
+def _mutant(
     operator: str, exchange: Exchange, item: Input, says: str, make: Callable[[Tally], Change]
 ) -> GeneratedMutant:
     name = f"{operator}:{exchange.name}:{item.label}"
@@ -46,11 +46,11 @@ def lenient(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMutan
             # In a path or query, everything is text: null has no meaning there.
             textual = "string" in kinds_of(item.schema)
             if rules and not (operator == "takes-type" and item.where != "body" and textual):
-                yield _made(
+                yield _mutant(
                     operator, exchange, item, "does not look at a rule of", _taking(exchange, item, rules, good)
                 )
         if item.required and item.where != "path":
-            yield _made("takes-missing", exchange, item, "does not need", _filling(exchange, item, good))
+            yield _mutant("takes-missing", exchange, item, "does not need", _filling(exchange, item, good))
 
 
 def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Callable[[Tally], Change]:
@@ -65,7 +65,7 @@ def _taking(exchange: Exchange, item: Input, rules: list[str], good: Any) -> Cal
     return _forwarding(
         exchange,
         lambda request: forbidden(item.read(exchange, request)),
-        lambda request: item.written(exchange, request, good),
+        lambda request: item.write(exchange, request, good),
     )
 
 
@@ -73,7 +73,7 @@ def _filling(exchange: Exchange, item: Input, good: Any) -> Callable[[Tally], Ch
     def missing(request: Request) -> bool:
         return item.there(request) and item.read(exchange, request) is NOTHING
 
-    return _forwarding(exchange, missing, lambda request: item.written(exchange, request, good))
+    return _forwarding(exchange, missing, lambda request: item.write(exchange, request, good))
 
 
 def _forwarding(
@@ -127,7 +127,7 @@ Answer = Callable[[Response], Response]
 def _refusal(operation: Operation) -> Answer:
     """Return the refusal that the description declares: 422 or 400."""
     status = next((code for code in (422, 400) if operation.response_key(code) is not None), 422)
-    content = operation.declared(status) or {}
+    content = operation.schemas_for(status) or {}
     name, schema = next(((name, schema) for name, schema in content.items() if is_json(name)), ("application/json", {}))
     return _instead(status, name, json.dumps(sample(schema, whole=True) if schema else {}).encode())
 
@@ -155,17 +155,17 @@ def _refusing(
             return isinstance(given, str) and len(given) == length
         return value is NOTHING or (given == value and isinstance(given, bool) == isinstance(value, bool))
 
-    made = _made(
+    made = _mutant(
         operator,
         exchange,
         item,
         f"refuses {says} of",
         _answering(exchange, lambda request: fits(item.read(exchange, request)), refusal),
     )
-    return made if says == "any value" else _named(made, says)
+    return made if says == "any value" else _rename(made, says)
 
 
-def _named(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
+def _rename(mutant: GeneratedMutant, more: str) -> GeneratedMutant:
     return replace(mutant, name=f"{mutant.name}:{more}")
 
 
@@ -173,7 +173,7 @@ def _needing(exchange: Exchange, item: Input, refusal: Answer) -> GeneratedMutan
     def missing(request: Request) -> bool:
         return item.there(request) and item.read(exchange, request) is NOTHING
 
-    return _made("needs-optional", exchange, item, "needs the optional", _answering(exchange, missing, refusal))
+    return _mutant("needs-optional", exchange, item, "needs the optional", _answering(exchange, missing, refusal))
 
 
 def _answering(
@@ -230,7 +230,7 @@ def crashing(operation: Operation, exchange: Exchange) -> Iterator[GeneratedMuta
                 value = item.read(exchange, request)
                 return value is not NOTHING and strikes(value)
 
-            yield _made(
+            yield _mutant(
                 operator,
                 exchange,
                 item,

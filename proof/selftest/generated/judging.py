@@ -97,7 +97,7 @@ class _Control:
         self._known: dict[str, dict[str, bool]] = {}
         self._lock = threading.Lock()
 
-    def known(self, effort: str) -> frozenset[str]:
+    def known_failures(self, effort: str) -> frozenset[str]:
         """Return the requirements that the unchanged device has failed or warned so far at an effort."""
         return frozenset(id_ for id_, refuted in self._known.get(effort, {}).items() if refuted)
 
@@ -143,13 +143,13 @@ def _judge(
     claims_none = not contract.is_claimed
     musts = frozenset(id_ for id_, item in contract.ledger.items() if claims_none or item.level is Level.MUST)
     given_up = False
-    claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claimed(contract)
+    claimed = statement_of(job_for(robot, proxy, efforts[0], seed), contract).claims_of(contract)
     attempts = tuple(_attempts(contract, mutant, claimed))
     # A fault that quick misses is seldom found by other single requirements: judge everything at the next effort.
     waiting = [(efforts[0], attempt) for attempt in attempts] + [(effort, attempts[-1]) for effort in efforts[1:]]
     while waiting:
         effort, (classes, requirements) = waiting[0]
-        known = control.known(effort)
+        known = control.known_failures(effort)
         proxy.change = mutant.make(tally)
         more: dict[str, Any] = {"classes": classes, "requirements": requirements, "enough": musts - known}
         outcome = run_job(job_for(robot, proxy, effort, seed, **more))

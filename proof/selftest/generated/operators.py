@@ -160,11 +160,11 @@ def _default(value: Any) -> Any:
     return "" if isinstance(value, str) else type(value)(0)
 
 
-def _clamped(value: float) -> float:
+def _clamp(value: float) -> float:
     return math.copysign(min(abs(value), _CLAMP), value)
 
 
-def _coerced(value: Any) -> Any:
+def _coerce(value: Any) -> Any:
     """Return zero for any value that is not a finite number, and numbers unchanged."""
     if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
         raise TypeError
@@ -216,12 +216,12 @@ OPERATORS = (
     ),
     _operator("truncate", "is cut", frozenset({"string", "array"}), "answer request", _EVERYWHERE, _each(_half)),
     _operator("default", "is taken for zero or empty", _SCALAR, "request", _EVERYWHERE, _each(_default)),
-    _operator("coerce", "is taken for zero where it is no number", NUMERIC, "request", _EVERYWHERE, _each(_coerced)),
+    _operator("coerce", "is taken for zero where it is no number", NUMERIC, "request", _EVERYWHERE, _each(_coerce)),
     _operator("ignore", "is for ever what it was first", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=True)),
     _operator(
         "lag", "is what it was in the request before", _SCALAR, "request", _EVERYWHERE, _remembering(for_ever=False)
     ),
-    _operator("clamp", f"is clamped to {_CLAMP}", NUMERIC, "request", _EVERYWHERE, _number(_clamped)),
+    _operator("clamp", f"is clamped to {_CLAMP}", NUMERIC, "request", _EVERYWHERE, _number(_clamp)),
     _operator("forward", "is written over its sibling", _SCALAR, "request", _EVERYWHERE, _forward, sibling=True),
     _operator(
         "round",

@@ -197,7 +197,7 @@ def of_bodies(exchange: Exchange, *, numbers: bool) -> Iterator[GeneratedMutant]
             )
 
 
-def crossed(
+def cross_responses(
     exchange: Exchange, mode: str, breaks: Callable[[Response], bool] = lambda _: True
 ) -> Callable[[Tally], Change]:
     """Return a change that sends the robot's previous response, of any operation, instead of the current one.

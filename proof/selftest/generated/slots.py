@@ -89,7 +89,7 @@ class TextSlot(JsonSlot):
 
     def put(self, value: Any) -> None:
         """Replace the parameter's text."""
-        self._container[self._name] = written(value)
+        self._container[self._name] = text_of(value)
 
     def beside(self, name: str) -> TextSlot | None:
         """Return another parameter of the same target, or None."""
@@ -125,7 +125,7 @@ class XmlSlot:
                 node.text = value.text
             else:
                 node[:] = []
-                node.text = written(value)
+                node.text = text_of(value)
 
     def drop(self) -> None:
         """Remove the elements."""
@@ -158,7 +158,7 @@ def _read(text: str, kind: str) -> Any:
     return text
 
 
-def written(value: Any) -> str:
+def text_of(value: Any) -> str:
     """Return a value as text for XML, paths and queries."""
     if value is None:
         return ""
@@ -250,7 +250,9 @@ def _in_xml(place: Place, message: Request | Response, edit: Edit) -> bool:
     found = [(parent, _children(parent, place.steps[-1])) for parent in parents]
     if place.kind == "array" and place.medium == "xml":
         # A list may be nested in one element of the field's name.
-        found = [(nodes[0], _children(nodes[0], "")) if _nested(nodes) else (parent, nodes) for parent, nodes in found]
+        found = [
+            (nodes[0], _children(nodes[0], "")) if _is_nested(nodes) else (parent, nodes) for parent, nodes in found
+        ]
     slots = [XmlSlot(parent, nodes, place.kind) for parent, nodes in found if nodes]
     if not slots or not edit(list(slots)):
         return False
@@ -264,7 +266,7 @@ def _children(parent: etree._Element, name: str) -> list[etree._Element]:
     return [node for node in elements if not name or etree.QName(node).localname == name]
 
 
-def _nested(nodes: list[etree._Element]) -> bool:
+def _is_nested(nodes: list[etree._Element]) -> bool:
     return len(nodes) == 1 and len({child.tag for child in nodes[0]}) == 1
 
 
@@ -272,7 +274,7 @@ def _items(parents: list[etree._Element]) -> list[etree._Element]:
     """Return the items of lists, whether each is an element of its own or nested in one list element."""
     found: list[etree._Element] = []
     for parent in parents:
-        found += _children(parent, "") if _nested([parent]) and len(parent) else [parent]
+        found += _children(parent, "") if _is_nested([parent]) and len(parent) else [parent]
     return found
 
 

@@ -163,7 +163,7 @@ def striking(make: Callable[[], Change], exchange: Exchange, when: When) -> Chan
     change, lock = make(), threading.Lock()
     state: dict[str, Any] = {"number": 0, "under_way": 0, "before": None, "began": None, "last": None}
 
-    def arrived(request: Request, *, concerned: bool) -> Seen:
+    def note_arrival(request: Request, *, concerned: bool) -> Seen:
         now = time.monotonic()
         with lock:
             state["number"] += concerned
@@ -174,7 +174,7 @@ def striking(make: Callable[[], Change], exchange: Exchange, when: When) -> Chan
 
     def strikes(request: Request, forward: Forward) -> Response:
         concerned = exchange.concerns(request)
-        seen = arrived(request, concerned=concerned)
+        seen = note_arrival(request, concerned=concerned)
         response: Response | None = None
         try:
             response = change(request, forward) if concerned and when(seen) else forward(request)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from proof.mutation.self_test import built, program
-from proof.selftest.robots import Robot, RobotError, stopped
+from proof.mutation.self_test import build, program
+from proof.selftest.robots import Robot, RobotError, stop_after
 
 _HERE = Path(__file__).parent
 _START_S = 20.0
@@ -60,27 +60,27 @@ class Front:
 
 
 def _nginx(ports: Ports, folder: Path) -> list[str]:
-    configuration = _written("nginx.conf", folder, ports.values(folder))
+    configuration = _write("nginx.conf", folder, ports.values(folder))
     return [program("nginx", "nginx"), "-p", str(folder), "-c", configuration, "-g", "daemon off;"]
 
 
 def _haproxy(ports: Ports, folder: Path) -> list[str]:
-    return [program("haproxy", "haproxy"), "-db", "-f", _written("haproxy.cfg", folder, ports.values(folder))]
+    return [program("haproxy", "haproxy"), "-db", "-f", _write("haproxy.cfg", folder, ports.values(folder))]
 
 
 def _apache(ports: Ports, folder: Path) -> list[str]:
     server = program("apache2", "apache2")
     values = ports.values(folder) | {"modules": "/usr/lib/apache2/modules"}
-    return [server, "-DFOREGROUND", "-f", _written("httpd.conf", folder, values)]
+    return [server, "-DFOREGROUND", "-f", _write("httpd.conf", folder, values)]
 
 
 def _go(ports: Ports, folder: Path) -> list[str]:
     values = ports.values(folder)
     rest, soap = (f"127.0.0.1:{port}" for port in (ports.rest, ports.soap))
-    return [str(built(_HERE / "reverse_proxy.go")), rest, values["robot_rest"], soap, values["robot_soap"]]
+    return [str(build(_HERE / "reverse_proxy.go")), rest, values["robot_rest"], soap, values["robot_soap"]]
 
 
-def _written(template: str, folder: Path, values: dict[str, str]) -> str:
+def _write(template: str, folder: Path, values: dict[str, str]) -> str:
     text = string.Template((_HERE / template).read_text(encoding="utf-8")).substitute(values)
     (folder / template).write_text(text, encoding="utf-8")
     return str(folder / template)
@@ -113,7 +113,7 @@ def behind(front: Front, robot: Robot) -> Iterator[Robot]:
         with log.open("wb") as output:
             # Made above, of a program that was found and a configuration of ours.
             process = subprocess.Popen(front.command(ports, folder), stdout=output, stderr=output)  # noqa: S603
-        with stopped(process):
+        with stop_after(process):
             for port in (ports.rest, ports.soap):
                 _await(port, process, front.name, log)
             publishers, subscribers = (

@@ -27,15 +27,15 @@ def _saying(changed: Callable[[_Message, float], None]) -> type[Body]:
     return Saying
 
 
-def _timed(off: Callable[[float, float], float]) -> type[Body]:
+def _off_by(off: Callable[[float, float], float]) -> type[Body]:
     """Return a class of bodies whose stamps are off by ``off`` seconds, given the time and the run time in s."""
 
-    def changed(message: _Message, age: float) -> None:
+    def shift_stamp(message: _Message, age: float) -> None:
         shown = message["header"]["stamp"]
         now = shown["sec"] + shown["nanosec"] / 1e9
         message["header"]["stamp"] = stamp(now + off(now, age))
 
-    return _saying(changed)
+    return _saying(shift_stamp)
 
 
 def _micro(message: _Message, _age: float) -> None:
@@ -114,9 +114,9 @@ class _ScaledYaw(Body):
 
 
 READINGS: dict[str, type[Body]] = {
-    "clock-fast": _timed(lambda _now, age: 0.15 * age),
-    "clock-slow": _timed(lambda _now, age: -0.2 * age),
-    "clock-steps-back": _timed(lambda now, _age: -0.4 if int(now) % 3 == 0 else 0.0),
+    "clock-fast": _off_by(lambda _now, age: 0.15 * age),
+    "clock-slow": _off_by(lambda _now, age: -0.2 * age),
+    "clock-steps-back": _off_by(lambda now, _age: -0.4 if int(now) % 3 == 0 else 0.0),
     "nanosec-is-microseconds": _saying(_micro),
     "quaternion-long": _saying(_long),
     "odometry-late": _LateOdometry,

@@ -232,8 +232,8 @@ class Body:
                 continue
             self._tick += 1
             v, w = self._aim()
-            state.v += _bounded(v - state.v, self.build.acceleration * TICK_S)
-            state.w += _bounded(w - state.w, self.build.spin * TICK_S)
+            state.v += _bound(v - state.v, self.build.acceleration * TICK_S)
+            state.w += _bound(w - state.w, self.build.spin * TICK_S)
             middle = state.yaw + state.w * TICK_S / 2
             state.x += state.v * math.cos(middle) * TICK_S
             state.y += state.v * math.sin(middle) * TICK_S
@@ -251,17 +251,17 @@ class Body:
         distance = math.hypot(goal.x - state.x, goal.y - state.y)
         if distance > _ARRIVED_M:
             off = wrapped(math.atan2(goal.y - state.y, goal.x - state.x) - state.yaw)
-            turn = _bounded(3 * off, build.turn_rad_s)
+            turn = _bound(3 * off, build.turn_rad_s)
             # Turning on the spot first; then straight, with small corrections.
             return (0.0, turn) if abs(off) > 0.2 else (min(build.cruise_m_s, 0.03 + 1.5 * distance), turn)  # noqa: PLR2004 - rad
         off = wrapped(goal.yaw - state.yaw)
         if abs(off) > _ARRIVED_RAD:
-            return 0.0, _bounded(3 * off, build.turn_rad_s)
+            return 0.0, _bound(3 * off, build.turn_rad_s)
         self.goal = None
         return 0.0, 0.0
 
 
-def _bounded(value: float, size: float) -> float:
+def _bound(value: float, size: float) -> float:
     return max(-size, min(size, value))
 
 

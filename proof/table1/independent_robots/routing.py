@@ -11,7 +11,7 @@ from proof.table1.independent_robots.plain.reading import RefusedError
 from proof.table1.independent_robots.plain.rest import DELIVERY, Handler, Rest, refusal
 from proof.table1.independent_robots.plain.server import MAX_BODY, Answer
 
-__all__ = ["MAX_BODY", "answered", "bound", "message", "problem", "resources"]
+__all__ = ["MAX_BODY", "bound", "call", "message", "problem", "resources"]
 _DESCRIPTIONS = {"/openapi.json", "/application.wadl"}
 
 
@@ -30,7 +30,7 @@ def message(fields: Iterable[tuple[str, str]]) -> Message:
     return headers
 
 
-def answered(handler: Handler, headers: Message, body: bytes, target: str) -> Answer:
+def call(handler: Handler, headers: Message, body: bytes, target: str) -> Answer:
     """Call a handler and return its response; a RefusedError becomes a problem."""
     try:
         return handler(headers, body, target)

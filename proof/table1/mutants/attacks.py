@@ -12,7 +12,7 @@ from proof.mutation.changes import Where, posted
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
 from proof.table1.mutants.paths import TNS
-from proof.table1.mutants.soap_responses import enveloped, fault
+from proof.table1.mutants.soap_responses import envelop, fault
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("xml-security", "soap")
@@ -25,15 +25,15 @@ _EXTERNAL_SUBSET = re.compile(rb"<!DOCTYPE\s+\S+\s+SYSTEM\s+[\"']([^\"']*)[\"']"
 _URL = re.compile(rb"https?://(?:127\.0\.0\.1|localhost|\[::1\])[:/][^\s\"'<>]*")
 _REFERENCE = re.compile(rb"&([\w.-]+);")
 _INSTRUCTION = re.compile(rb"<\?(?!xml\s).*?\?>", re.DOTALL)
-_DONE = enveloped(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>')
+_DONE = envelop(f'<t:ExecuteCoffeeRequestResponse xmlns:t="{TNS}"/>')
 _LARGE = 10 * 1024 * 1024
 
 
-def _declared(request: Request) -> bool:
+def _has_doctype(request: Request) -> bool:
     return posted(request) and b"<!DOCTYPE" in request.body
 
 
-def _undeclared(request: Request) -> None:
+def _drop_doctype(request: Request) -> None:
     request.body = _REFERENCE.sub(
         lambda found: found[0] if found[1] in {b"lt", b"gt", b"amp", b"quot", b"apos"} else b"1",
         _DOCTYPE.sub(b"", request.body),
@@ -45,7 +45,7 @@ def _plain_doctype(request: Request) -> None:
         request.body = _DOCTYPE.sub(b"", request.body)
 
 
-def _expanded(request: Request) -> None:
+def _expand(request: Request) -> None:
     """Expand up to a few internal entities that are not nested."""
     entities = dict(_INTERNAL.findall(request.body))
     if not entities or len(request.body) > 20_000 or any(b"&" in value for value in entities.values()):
@@ -63,7 +63,7 @@ def _read(url: str) -> str:
         return ""
 
 
-def _leaked(text: str) -> Callable[[Request], Response]:
+def _leak(text: str) -> Callable[[Request], Response]:
     said = (
         "".join(char if char.isprintable() else " " for char in text)
         .replace("&", "+")
@@ -80,14 +80,14 @@ def _quoting(urls: Callable[[bytes], list[bytes]]) -> Callable[[], Any]:
         for url in urls(request.body) if posted(request) else ():
             found = _read(url.decode("utf-8", "replace"))
             if found:
-                return _leaked(found)(request)
+                return _leak(found)(request)
         return forward(request)
 
     return lambda: change
 
 
 @_mutant("attack-included", "xinclude", "XInclude elements are processed.").through(_quoting)
-def _included(body: bytes) -> list[bytes]:
+def _included_urls(body: bytes) -> list[bytes]:
     return re.findall(rb"href=[\"']([^\"']*)[\"']", body) if b"XInclude" in body else []
 
 
@@ -129,7 +129,7 @@ def _addressing_urls(body: bytes) -> list[bytes]:
     return _URL.findall(body) if b"addressing" in body else []
 
 
-def _nested(request: Request) -> bool:
+def _is_nested(request: Request) -> bool:
     return (
         posted(request)
         and request.body.count(b"<") > 20_000
@@ -144,7 +144,7 @@ def _posting(holds: Callable[[bytes], bool]) -> Where:
 
 
 @_mutant("attack-action-chooses", "soapaction-spoofing", "SOAPAction selects the operation, whatever is in Body.")
-def _spoofed(request: Request, forward: Forward) -> Response:
+def _obey_action(request: Request, forward: Forward) -> Response:
     action = (request.field("SOAPAction") or "").strip('"')
     for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
         if posted(request) and name in action and name.encode() not in request.body:
@@ -178,7 +178,7 @@ _mutant("attack-file-leaked", "external-entity", "The file of an external entity
 )
 _mutant(
     "attack-quadratic-fine", "quadratic", "A long entity that is used many times returns a normal response."
-).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _undeclared)
+).rewritten(_posting(lambda body: 0 < body.count(b"<!ENTITY") <= 2 and body.count(b"&") > 50), _drop_doctype)
 _mutant("attack-instruction-fine", "processing-instruction", "Processing instructions are ignored.").rewritten(
     posted, lambda request: setattr(request, "body", _INSTRUCTION.sub(b"", request.body))
 )

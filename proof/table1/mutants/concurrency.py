@@ -11,7 +11,7 @@ from proof.mutation.messages import Change, Forward, Request, Response
 from proof.mutation.table import Table
 from proof.table1.mutants.crowd import COMPANY_S, Crowd, when_crowded
 from proof.table1.mutants.paths import GOAL, TNS, VELOCITY
-from proof.table1.mutants.soap_responses import enveloped
+from proof.table1.mutants.soap_responses import envelop
 
 MUTANTS = Table()
 _resource = MUTANTS.of_class("rest-resources", "rest")
@@ -41,7 +41,7 @@ class _Mixed:
     def __call__(self, request: Request, forward: Forward) -> Response:
         if not self._where(request):
             return forward(request)
-        with self._crowd.joined() as others:
+        with self._crowd.join() as others:
             response = forward(request)
             return self._mixed_up(response) if others() else response
 
@@ -68,14 +68,14 @@ class _Mixed:
         return second
 
 
-def _mixed(mix: Callable[[Response, Response], tuple[Response, Response]], nth: int = 1) -> Make:
+def _mix_reads(mix: Callable[[Response, Response], tuple[Response, Response]], nth: int = 1) -> Make:
     def make() -> Change:
         return _Mixed(rest("GET"), mix, nth)
 
     return make
 
 
-def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
+def _exchange(one: Response, two: Response) -> tuple[Response, Response]:
     return two, one
 
 
@@ -83,14 +83,14 @@ def _exchanged(one: Response, two: Response) -> tuple[Response, Response]:
     "clients-spliced",
     "concurrent-answers",
     "Two concurrent responses are spliced: one ends with the second half of the other.",
-).through(_mixed)
-def _spliced(one: Response, two: Response) -> tuple[Response, Response]:
+).through(_mix_reads)
+def _splice(one: Response, two: Response) -> tuple[Response, Response]:
     half = len(two.body) // 2
     two.body = two.body[:half] + one.body[half:]
     return one, two
 
 
-def _repeated(one: Response, two: Response) -> tuple[Response, Response]:
+def _repeat(one: Response, two: Response) -> tuple[Response, Response]:
     """Give both clients the body of the first response."""
     two.body = one.body
     return one, two
@@ -107,7 +107,7 @@ def _with_another_source(request: Request, forward: Forward) -> Response:
     return forward(request.copy(target=f"{head}/1.5"))
 
 
-def _created(response: Response) -> Response:
+def _as_created(response: Response) -> Response:
     response = response.copy()
     if response.status in {200, 202, 204}:
         response.status, response.reason = 201, ""
@@ -126,7 +126,7 @@ class _GoalOfTwo:
 
     def __call__(self, request: Request, forward: Forward) -> Response:
         if _PUT_GOAL(request):
-            with self._crowd.joined() as others:
+            with self._crowd.join() as others:
                 time.sleep(COMPANY_S)
                 if others():
                     self._second = request.copy()
@@ -169,7 +169,7 @@ class _Blended:
     def __call__(self, request: Request, forward: Forward) -> Response:
         if not self._where(request):
             return forward(request)
-        with self._crowd.joined() as others:
+        with self._crowd.join() as others:
             value = parsed(request.body)
             own = value.get(self._field) if isinstance(value, dict) else None
             other, self._last = self._last, own
@@ -183,8 +183,8 @@ _PUT_GOAL, _PUT_VELOCITY = rest("PUT", GOAL), rest("PUT", VELOCITY)
 _SMALL: Final = 32 * 1024
 _EMPTY = plain(204)
 _SOAP_DELIVERY = soap("ExecuteDeliveryRequest")
-_ACCEPTED = enveloped(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
+_ACCEPTED = envelop(f'<t:ExecuteDeliveryRequestResponse xmlns:t="{TNS}"/>')
 
 _resource(
     "clients-goal-new-to-all", "goal-concurrent", "Every client that sends the same new goal concurrently gets 201."
-).made(when_crowded(_PUT_GOAL, lambda request, forward: _created(forward(request))))
+).made(when_crowded(_PUT_GOAL, lambda request, forward: _as_created(forward(request))))

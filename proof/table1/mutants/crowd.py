@@ -22,7 +22,7 @@ class Crowd:
         self._lock = threading.Lock()
 
     @contextlib.contextmanager
-    def joined(self) -> Iterator[Callable[[], bool]]:
+    def join(self) -> Iterator[Callable[[], bool]]:
         """Count the caller's request; yield a function that returns whether another one ran concurrently."""
         met = threading.Event()
         with self._lock:
@@ -51,7 +51,7 @@ def when_crowded(where: Where, act: Callable[[Request, Forward], Response], nth:
             nonlocal seen
             if not where(request):
                 return forward(request)
-            with crowd.joined() as others:
+            with crowd.join() as others:
                 time.sleep(COMPANY_S)
                 with lock:
                     seen += others()

@@ -50,7 +50,7 @@ def any_code(place: int, text: str) -> str:
     )
 
 
-def _written(pattern: str) -> Callable[[Request], bool]:
+def _value_like(pattern: str) -> Callable[[Request], bool]:
     compiled = re.compile(pattern)
 
     def where(request: Request) -> bool:

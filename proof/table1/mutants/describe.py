@@ -12,7 +12,7 @@ from proof.mutation.fields import each as both
 from proof.mutation.fields import field, without
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
-from proof.mutation.xml_trees import each, gone, named, tree
+from proof.mutation.xml_trees import each, find_named, remove, tree
 from proof.table1.mutants.paths import PLAN, TNS
 
 MUTANTS = Table()
@@ -21,12 +21,12 @@ _mutant = MUTANTS.of_class("describe", "rest")
 _OPENAPI, _WADL = rest("GET", "/openapi.json"), rest("GET", "/application.wadl")
 
 
-def _lost(name: str, attribute: str, pattern: str) -> Make:
+def _lose(name: str, attribute: str, pattern: str) -> Make:
     """Return a change that removes the WADL's elements ``name`` whose attribute matches the pattern."""
 
     def edit(node: Any) -> None:
         if re.search(pattern, node.get(attribute, "")):
-            gone(node)
+            remove(node)
 
     return altered(_WADL, tree(each(name, edit)))
 
@@ -38,7 +38,7 @@ def _promised_twice(resource: Any) -> None:
     resource.getparent().append(other)
 
 
-def _defaulted(schema: dict[str, Any]) -> dict[str, Any]:
+def _with_default(schema: dict[str, Any]) -> dict[str, Any]:
     """Return a schema whose default, where it has a numeric one, is another."""
     return {**schema, "default": schema["default"] + 0.4} if isinstance(schema.get("default"), float) else schema
 
@@ -51,7 +51,7 @@ def _objects(node: Any) -> Iterator[dict[str, Any]]:
         yield from _objects(part)
 
 
-def _renamed(told: Any, old: str, new: str) -> None:
+def _rename(told: Any, old: str, new: str) -> None:
     """Give a member another name in all schemas."""
     for node in list(_objects(told)):
         if isinstance(node.get("properties"), dict) and old in node["properties"]:
@@ -65,7 +65,8 @@ _mutant("openapi-without-parameter", "openapi-operations", "/openapi.json lacks 
 _mutant("openapi-other-default", "openapi-operations", "/openapi.json names another default of a parameter.").json(
     _OPENAPI,
     field(
-        f"paths.{PLAN}.get.parameters", lambda all_: [{**item, "schema": _defaulted(item["schema"])} for item in all_]
+        f"paths.{PLAN}.get.parameters",
+        lambda all_: [{**item, "schema": _with_default(item["schema"])} for item in all_],
     ),
 )
 _mutant("openapi-too-strict", "openapi-answers", "/openapi.json forbids values that the robot accepts.").json(
@@ -76,7 +77,7 @@ _mutant("openapi-too-strict", "openapi-answers", "/openapi.json forbids values t
     ),
 )
 _mutant("openapi-other-name", "openapi-answers", "/openapi.json requires a field that no response has.").json(
-    _OPENAPI, lambda told: _renamed(told, "child_frame_id", "child_frame")
+    _OPENAPI, lambda told: _rename(told, "child_frame_id", "child_frame")
 )
 _mutant("openapi-invalid", "openapi", "/openapi.json is not a valid OpenAPI document.").json(
     _OPENAPI, both(without("info"), field("paths", list))
@@ -98,12 +99,12 @@ def _description(request: Request) -> bool:
     return wsdls(request) and request.query.lower() == "wsdl"
 
 
-def _edited(edit: Callable[[Any], object]) -> Make:
+def _edit_wsdl(edit: Callable[[Any], object]) -> Make:
     """Return a change that applies ``edit`` to the WSDL's root element."""
     return altered(_description, tree(edit))
 
 
-def _typed(edit: Callable[[Any], object]) -> Make:
+def _edit_schemas(edit: Callable[[Any], object]) -> Make:
     """Return a change that applies ``edit`` to each schema with declarations, in the WSDL or imported."""
 
     def apply(root: Any) -> None:
@@ -121,7 +122,7 @@ def _all(path: str, edit: Callable[[Any], object], which: slice = slice(None)) -
         for node in root.findall(path)[which]:
             edit(node)
 
-    return _edited(apply)
+    return _edit_wsdl(apply)
 
 
 def _first(path: str, edit: Callable[[Any], object]) -> Make:
@@ -148,10 +149,10 @@ def _broken_import(request: Request, forward: Forward) -> Response:
     return response
 
 
-@_wsdl_mutant("wsdl-operation-lost", "wsdl-operations", "The WSDL lacks an operation.").through(_edited)
+@_wsdl_mutant("wsdl-operation-lost", "wsdl-operations", "The WSDL lacks an operation.").through(_edit_wsdl)
 def _operation_lost(root: Any) -> None:
     for node in (root.find(_OPERATION), root.find(f"{_BINDING}/{_W}operation")):
-        gone(node)
+        remove(node)
 
 
 def _typed_part(node: Any) -> None:
@@ -163,7 +164,7 @@ def _prefix(node: Any) -> str:
     return next((key for key, value in node.nsmap.items() if key and "soap.turtlebot" in value), "tns")
 
 
-@_wsdl_mutant("wsdl-import-in-types", "wsdl-R2003", "xsd:import is a direct child of wsdl:types.").through(_edited)
+@_wsdl_mutant("wsdl-import-in-types", "wsdl-R2003", "xsd:import is a direct child of wsdl:types.").through(_edit_wsdl)
 def _import_in_types(root: Any) -> None:
     types = root.find(f"{_W}types")
     made = etree.Element(f"{_X}import")
@@ -172,20 +173,20 @@ def _import_in_types(root: Any) -> None:
 
 
 @_wsdl_mutant("wsdl-strange-element", "wsdl-R2028", "The WSDL has an element that WSDL 1.1 does not define.").through(
-    _edited
+    _edit_wsdl
 )
 def _strange(root: Any) -> None:
     etree.SubElement(root, f"{_W}robot").set("name", "turtlebot")
 
 
-@_wsdl_mutant("wsdl-same-signature", "wsdl-R2710", "Two operations have the same input element.").through(_edited)
+@_wsdl_mutant("wsdl-same-signature", "wsdl-R2710", "Two operations have the same input element.").through(_edit_wsdl)
 def _same_element(root: Any) -> None:
     parts = [part for part in root.iter(f"{_W}part") if not part.get("element", "").endswith("Response")]
     if len(parts) > 1:
         parts[1].set("element", parts[0].get("element"))
 
 
-@_wsdl_mutant("wsdl-two-parts", "wsdl-R2201", "A soap:body lists two parts.").through(_edited)
+@_wsdl_mutant("wsdl-two-parts", "wsdl-R2201", "A soap:body lists two parts.").through(_edit_wsdl)
 def _two_parts(root: Any) -> None:
     for message in root.findall(f"{_W}message")[:1]:
         second = etree.SubElement(message, f"{_W}part")
@@ -195,7 +196,7 @@ def _two_parts(root: Any) -> None:
         body.set("parts", "parameters more")
 
 
-@_wsdl_mutant("wsdl-float", "wsdl-types", "The schema declares a double as float.").through(_typed)
+@_wsdl_mutant("wsdl-float", "wsdl-types", "The schema declares a double as float.").through(_edit_schemas)
 def _float(schema: Any) -> None:
     for node in [node for node in schema.iter(f"{_X}element") if node.get("type", "").endswith("double")][:1]:
         node.set("type", node.get("type").replace("double", "float"))
@@ -208,12 +209,12 @@ def _long_sequence(edit: Callable[[Any], object]) -> Make:
         for sequence in [item for item in schema.iter(f"{_X}sequence") if len(item) > 2][:1]:
             edit(sequence)
 
-    return _typed(apply)
+    return _edit_schemas(apply)
 
 
 def _inline_no_target(root: Any) -> None:
     """Add a schema without targetNamespace to wsdl:types."""
-    for schema in named(root, "schema")[:1]:
+    for schema in find_named(root, "schema")[:1]:
         made = etree.Element(f"{_X}schema")
         etree.SubElement(made, f"{_X}element").set("name", "homeless")
         schema.addnext(made)

@@ -9,10 +9,10 @@ from conformance.papers_robot.delivery import COFFEE, COORDINATES, PATH_NAMES
 from proof.mutation.changes import Make, Where, becomes, rest, soap, success
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
-from proof.mutation.xml_trees import named
+from proof.mutation.xml_trees import find_named
 from proof.table1.mutants.crowd import later
 from proof.table1.mutants.paths import DELIVERIES, SENSORS, TNS, deliveries
-from proof.table1.mutants.soap_responses import enveloped
+from proof.table1.mutants.soap_responses import envelop
 
 MUTANTS = Table()
 _rest_delivery = MUTANTS.of_class("equivalence", "rest", observer=True)
@@ -27,37 +27,37 @@ _BOTH = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest")
 
 def _shift(name: str, by: float) -> Callable[[Any], None]:
     def edit(root: Any) -> None:
-        for node in named(root, name)[:1]:
-            for axis in named(node, "x"):
+        for node in find_named(root, name)[:1]:
+            for axis in find_named(node, "x"):
                 axis.text = repr(float(axis.text) + by)
 
     return edit
 
 
-def _mirrored(root: Any) -> None:
+def _mirror(root: Any) -> None:
     """Give a heading that is more than 90 degrees from x as the same to the other side."""
-    for turn in named(root, "orientation")[:1]:
-        parts = {axis: named(turn, axis)[0] for axis in "zw"}
+    for turn in find_named(root, "orientation")[:1]:
+        parts = {axis: find_named(turn, axis)[0] for axis in "zw"}
         z, w = (float(part.text) for part in parts.values())
         if abs(z) > abs(w):
             parts["z"].text = repr(-z)
 
 
-def _unsigned(root: Any) -> None:
-    for part in named(root, "linear"):
-        for axis in named(part, "x"):
+def _drop_sign(root: Any) -> None:
+    for part in find_named(root, "linear"):
+        for axis in find_named(part, "x"):
             axis.text = repr(abs(float(axis.text)))
 
 
 def _straighter(root: Any) -> None:
-    poses = named(root, "poses")
+    poses = find_named(root, "poses")
     for pose in poses[1:-1]:
         pose.getparent().remove(pose)
-    for axis in named(poses[-1], "y")[:1] if poses else []:
+    for axis in find_named(poses[-1], "y")[:1] if poses else []:
         axis.text = repr(float(axis.text) + 0.05)
 
 
-def _followed(where: Where, after_s: float, second: Callable[[Request], Request | None]) -> Make:
+def _follow_by(where: Where, after_s: float, second: Callable[[Request], Request | None]) -> Make:
     """Return a change that sends a second request some time after a successful one, where there is one to send."""
 
     def change(request: Request, forward: Forward) -> Response:
@@ -97,7 +97,7 @@ def _put_off(response: Response) -> None:
     response.put("Retry-After", "1")
 
 
-_NO_GOAL = enveloped(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
+_NO_GOAL = envelop(f'<t:GetGoalResponse xmlns:t="{TNS}"/>')
 
 
 def _cut(request: Request) -> None:
@@ -106,7 +106,7 @@ def _cut(request: Request) -> None:
 
 
 _rest_delivery("same-rest-again-later", "delivery-only", "A REST delivery is published again 0.4 s later.").made(
-    _followed(deliveries, _LATER_S, Request.copy)
+    _follow_by(deliveries, _LATER_S, Request.copy)
 )
 _rest_state("same-sensor-ghost", "sensors-graph", "The list of sensors has a sensor that does not exist.").json(
     rest("GET", SENSORS), lambda items: [*items, {"name": "ghost", "topic": "/ghost", "type": "sensor_msgs/msg/Range"}]

@@ -7,7 +7,7 @@ from typing import Any
 from proof.mutation.changes import Make, When, altered, problem, rest, secretly, success
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
-from proof.mutation.xml_trees import named, tree
+from proof.mutation.xml_trees import find_named, tree
 from proof.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 
 MUTANTS = Table()
@@ -18,11 +18,11 @@ _PUT = rest("PUT", VELOCITY, LINEAR, GOAL)
 _SMALL = 32 * 1024
 
 
-def _typed(media_type: str) -> Callable[[Response], bool]:
+def _of_type(media_type: str) -> Callable[[Response], bool]:
     return lambda response: success(response) and response.media_type == media_type
 
 
-_XML, _TEXT, _JSON = _typed("application/xml"), _typed("text/plain"), _typed("application/json")
+_XML, _TEXT, _JSON = _of_type("application/xml"), _of_type("text/plain"), _of_type("application/json")
 
 
 def _accept(edit: Callable[[str], str]) -> Callable[[Request], None]:
@@ -39,15 +39,15 @@ def _any_is_xml(request: Request) -> None:
         request.put("Accept", "application/xml")
 
 
-def _told(edit: Callable[[Response], object], when: When = success) -> Make:
+def _edit_reads(edit: Callable[[Response], object], when: When = success) -> Make:
     """Return a change that applies ``edit`` to responses to GET."""
     return altered(_GET, edit, when)
 
 
-def _shortened(root: Any) -> None:
+def _shorten(root: Any) -> None:
     """Remove the last item of a list in an XML response."""
     for name in ("covariance", "sensor", "item", "service"):
-        found = named(root, name)
+        found = find_named(root, name)
         if len(found) > 1:
             found[-1].getparent().remove(found[-1])
             return
@@ -58,7 +58,7 @@ def _shortened(root: Any) -> None:
         root.remove(root[-1])
 
 
-def _rounded(root: Any) -> None:
+def _round(root: Any) -> None:
     for node in root.iter():
         if isinstance(node.tag, str) and re.fullmatch(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*", node.text or ""):
             node.text = f"{float(node.text):.1f}"
@@ -85,7 +85,7 @@ def _no_id(request: Request) -> None:
     request.body = re.sub(rb"<goal_id>.*</goal_id>", b"", request.body, flags=re.DOTALL)
 
 
-def _unsigned(request: Request) -> None:
+def _drop_signs(request: Request) -> None:
     request.body = request.body.replace(b">-", b">")
 
 
@@ -116,4 +116,4 @@ _mutant(
     "format-xml-velocity-unsigned",
     "rest-resources/velocity-converges",
     "A velocity that is sent as XML is obeyed without its signs.",
-).made(secretly(lambda request: _xml_put(request) and request.path == VELOCITY, _unsigned))
+).made(secretly(lambda request: _xml_put(request) and request.path == VELOCITY, _drop_signs))

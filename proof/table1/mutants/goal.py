@@ -22,7 +22,7 @@ def _without_id(request: Request) -> bool:
     return _PUT(request) and "goal" in (parsed(request.body) or {}) and identity(request) is None
 
 
-def _renamed(edit: Callable[[str], str]) -> Make:
+def _rename(edit: Callable[[str], str]) -> Make:
     return altered(_AT, values(field("goal_id.id", edit)))
 
 
@@ -52,7 +52,7 @@ def _unit(goal: Any) -> None:
         q.update(x=0.0, y=0.0, z=0.0, w=1.0)
 
 
-def _guarded(edit: Callable[[Any], None]) -> Callable[[Any], None]:
+def _guard(edit: Callable[[Any], None]) -> Callable[[Any], None]:
     """Return an edit that leaves invalid goals unchanged, so that the robot refuses them."""
 
     def apply(goal: Any) -> None:
@@ -90,16 +90,16 @@ def _driven_to(sent: Callable[[Any], Any], shown: Callable[[Any], Any]) -> Make:
             return forward(request)
         if _PUT(request):
             request = request.copy()
-            inputs(_guarded(sent))(request)
+            inputs(_guard(sent))(request)
         response = forward(request)
         if success(response):
-            values(_guarded(shown))(response)
+            values(_guard(shown))(response)
         return response
 
     return lambda: change
 
 
-def _turned(by: float) -> Callable[[Any], None]:
+def _turn(by: float) -> Callable[[Any], None]:
     """Return an edit that turns a goal's pose by an angle, rad."""
 
     def edit(goal: Any) -> None:
@@ -115,12 +115,12 @@ _mutant("goal-outcome-always-success", "goal-outcome", "A cancelled goal is repo
     _GET, lambda told: told.get("last_goal", {"status": {}})["status"].update(code=4), status(404)
 )
 _mutant("goal-put-rounded", "goal-put", "The response to a goal's PUT rounds its position to 0.1 m.").json(
-    _PUT, _guarded(field(_X, lambda x: round(x, 1)))
+    _PUT, _guard(field(_X, lambda x: round(x, 1)))
 )
 _mutant("goal-empty-id", "goal-fills-in", "A goal that is sent without goal_id gets an empty one.").made(
-    _renamed(lambda id_: "" if len(id_) >= 32 else id_)
+    _rename(lambda id_: "" if len(id_) >= 32 else id_)
 )
-_mutant("goal-id-cut", "goal-id", "Goal ids are truncated to 32 characters.").made(_renamed(lambda id_: id_[:32]))
+_mutant("goal-id-cut", "goal-id", "Goal ids are truncated to 32 characters.").made(_rename(lambda id_: id_[:32]))
 _mutant("goal-id-ascii", "goal-id", "Goal ids are returned in lower case.").made(
-    _renamed(lambda id_: id_.lower().encode("ascii", "replace").decode())
+    _rename(lambda id_: id_.lower().encode("ascii", "replace").decode())
 )

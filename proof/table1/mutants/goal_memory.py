@@ -173,7 +173,7 @@ class _ReplacedForGood:
 
 
 @_mutant("goal-id-folded", "goal-id", "Goal ids that differ in upper and lower case are one.")
-def _folded(request: Request, forward: Forward) -> Response:
+def _fold_case(request: Request, forward: Forward) -> Response:
     id_ = identity(request) if _PUT(request) else None
     known = active(forward, request) if id_ is not None else None
     shown = str(known["goal_id"]["id"]) if known else None
@@ -237,16 +237,16 @@ class _Unreachable:
                     "status": status_,
                 }
                 value["goal"]["target_pose"]["header"].setdefault("stamp", header["stamp"])
-                return _said(202, self._goal, request)
+                return _reply(202, self._goal, request)
         if _DELETE(request) and self._goal is not None:
             self._goal = None
             return plain(204)(request)
         if _GET(request) and self._goal is not None:
-            return _said(200, self._goal, request)
+            return _reply(200, self._goal, request)
         return forward(request)
 
 
-def _said(status_: int, value: Any, request: Request) -> Response:
+def _reply(status_: int, value: Any, request: Request) -> Response:
     return Response(
         status_,
         [("Content-Type", "application/json"), ("Vary", "Accept")],

@@ -5,11 +5,11 @@ import time
 from typing import Any
 
 from proof.mutation.changes import parsed, plain, rest, success
-from proof.mutation.fields import found
+from proof.mutation.fields import value_at
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
 from proof.table1.mutants.crowd import later
-from proof.table1.mutants.input_effects import sent
+from proof.table1.mutants.input_effects import send_own
 from proof.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 
 MUTANTS = Table()
@@ -62,7 +62,7 @@ class _Asleep(Remembering):
         until = time.monotonic() + 5
         while time.monotonic() < until and self.turn == turn:
             if time.monotonic() - self.asked > _SILENT_S:
-                sent(request, forward, "PUT", VELOCITY, self.last)
+                send_own(request, forward, "PUT", VELOCITY, self.last)
             time.sleep(_LOOK_S)
 
 
@@ -71,10 +71,10 @@ class _Renewed(Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
         driving = (
-            self.last and "angular" in self.last and any(found(self.last, one) for one in ("linear.x", "angular.z"))
+            self.last and "angular" in self.last and any(value_at(self.last, one) for one in ("linear.x", "angular.z"))
         )
         if 400 <= response.status < 500 and driving:
-            sent(request, forward, "PUT", VELOCITY, self.last)
+            send_own(request, forward, "PUT", VELOCITY, self.last)
 
 
 @_mutant("safety-renewed-by-soap", "hold-ends", "A SOAP message that only reads renews the velocity.")
@@ -82,7 +82,7 @@ class _RenewedBySoap(Remembering):
     def __call__(self, request: Request, forward: Forward) -> Response:
         response = super().__call__(request, forward)
         if request.side == "soap" and self.last and "angular" in self.last:
-            sent(request, forward, "PUT", VELOCITY, self.last)
+            send_own(request, forward, "PUT", VELOCITY, self.last)
         return response
 
 
@@ -122,7 +122,7 @@ def _goal_stops(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _PUT_GOAL(request) and 400 <= response.status < 500:
         still = {"x": 0.0, "y": 0.0, "z": 0.0}
-        sent(request, forward, "PUT", VELOCITY, {"linear": still, "angular": still})
+        send_own(request, forward, "PUT", VELOCITY, {"linear": still, "angular": still})
     return response
 
 
@@ -135,7 +135,7 @@ class _Revived(Remembering):
     def put(self, request: Request, response: Response, forward: Forward) -> None:
         super().put(request, response, forward)
         if _PUT_LINEAR(request) and success(response) and self.last and "angular" in self.last:
-            sent(request, forward, "PUT", VELOCITY, self.last)
+            send_own(request, forward, "PUT", VELOCITY, self.last)
 
 
 @_mutant(
@@ -146,7 +146,7 @@ class _Resuming(Remembering):
         response = super().__call__(request, forward)
         if _DELETE(request) and response.status == 204 and self.last and "angular" in self.last:
             # After the navigation's own last command, which is zero.
-            later(0.2, sent, request.copy(), forward, "PUT", VELOCITY, self.last)
+            later(0.2, send_own, request.copy(), forward, "PUT", VELOCITY, self.last)
         return response
 
 
@@ -180,5 +180,5 @@ class _Deaf(Remembering):
 def _deleted_later(request: Request, forward: Forward) -> Response:
     if not _DELETE(request) or forward(request.copy(method="GET")).status != 200:
         return forward(request)
-    later(0.3, sent, request.copy(), forward, "DELETE", GOAL)
+    later(0.3, send_own, request.copy(), forward, "DELETE", GOAL)
     return plain(204)(request)

@@ -23,7 +23,7 @@ def _having(test: Callable[[Request], bool]) -> Callable[[Request], bool]:
     return lambda request: request.side == "rest" and request.raw is None and test(request)
 
 
-def _written(pattern: bytes) -> Callable[[Request], bool]:
+def _body_like(pattern: bytes) -> Callable[[Request], bool]:
     """Return a condition for PUT requests whose body matches the pattern."""
     compiled = re.compile(pattern)
     return _having(lambda request: request.method == "PUT" and bool(compiled.search(request.body)))
@@ -70,7 +70,7 @@ _chunked = _having(lambda request: request.field("Transfer-Encoding") is not Non
 _absolute = _having(lambda request: not request.target.startswith("/"))
 
 
-def _shortened(request: Request) -> None:
+def _shorten(request: Request) -> None:
     request.body = request.body[:_CUT]
 
 
@@ -87,7 +87,7 @@ class _Hundred:
 
 
 @_mutant("http-stays-open", "web-server/close", "The robot ignores Connection: close.")
-def _kept(request: Request, forward: Forward) -> Response:
+def _keep_open(request: Request, forward: Forward) -> Response:
     if request.side == "rest":
         request.drop("Connection")
     return forward(request)
@@ -107,7 +107,7 @@ def _and_rubbish(response: Response) -> None:
 _HOST = re.compile(rb"(?i)\r\nHost:[ \t]*([^\r\n]+)")
 
 
-def _mended(pattern: bytes) -> Callable[[Request], Request | None]:
+def _mend(pattern: bytes) -> Callable[[Request], Request | None]:
     """Return a function that makes a plain GET of a malformed request, or returns None for other requests."""
     compiled = re.compile(pattern)
 
@@ -126,7 +126,7 @@ def _acting(pattern: bytes) -> Callable[[], Change]:
     """Return a change that reads the hidden part of malformed requests as a Content-Length, and so loses its place."""
 
     def change(request: Request, forward: Forward) -> Response:
-        mended = _mended(pattern)(request)
+        mended = _mend(pattern)(request)
         response = forward(mended or request)
         if mended is not None:
             _and_rubbish(response)
@@ -137,7 +137,7 @@ def _acting(pattern: bytes) -> Callable[[], Change]:
 
 def _ignoring(pattern: bytes) -> Callable[[], Change]:
     """Return a change that ignores the malformed part of requests."""
-    return lambda: lambda request, forward: forward(_mended(pattern)(request) or request)
+    return lambda: lambda request, forward: forward(_mend(pattern)(request) or request)
 
 
 def _without_length(request: Request) -> None:

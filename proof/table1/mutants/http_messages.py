@@ -134,7 +134,7 @@ def _token(refused: Callable[[Request], Response], where: Where = _ANY, *, acts:
     return lambda: change
 
 
-def _marked(response: Response) -> None:
+def _add_bom(response: Response) -> None:
     if response.media_type == JSON:
         response.body = b"\xef\xbb\xbf" + response.body
 

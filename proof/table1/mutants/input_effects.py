@@ -9,7 +9,7 @@ from proof.mutation.changes import SOAP, Make, parsed, posted, problem, rest, su
 from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
 from proof.table1.mutants.paths import DELIVERIES, GOAL, POSE, TNS, VELOCITY, deliveries
-from proof.table1.mutants.soap_responses import enveloped
+from proof.table1.mutants.soap_responses import envelop
 
 MUTANTS = Table()
 _mutant = MUTANTS.of_class("strict-input", "rest")
@@ -20,7 +20,7 @@ _INVALID = {400, 415, 422}
 _ENVELOPE = re.compile(rb"http://example\.com/unknown")
 
 
-def sent(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
+def send_own(request: Request, forward: Forward, method: str, target: str, value: Any = None) -> Response:
     """Send a request of the mutant's own to the robot."""
     fields = [("Host", "localhost"), ("Accept", "application/json")]
     body = b"" if value is None else json.dumps(value).encode()
@@ -33,22 +33,22 @@ def sent(request: Request, forward: Forward, method: str, target: str, value: An
 
 def drive(request: Request, forward: Forward, speed: float) -> None:
     """Send the robot a velocity of ``speed``, m/s; 0 stops it."""
-    sent(request, forward, "PUT", VELOCITY, {"linear": {**_ZERO, "x": speed}, "angular": _ZERO})
+    send_own(request, forward, "PUT", VELOCITY, {"linear": {**_ZERO, "x": speed}, "angular": _ZERO})
 
 
 def goal_ahead(request: Request, forward: Forward, distance: float) -> None:
     """Send a goal ``distance`` m beside the robot, in the odometry's frame, where the robot accepts one."""
-    odometry = parsed(sent(request, forward, "GET", POSE).body)
+    odometry = parsed(send_own(request, forward, "GET", POSE).body)
     at = odometry["pose"]["pose"]["position"]
     for away in (distance, -distance):
         pose = {"position": {"x": at["x"] + away, "y": at["y"], "z": 0.0}, "orientation": {**_ZERO, "w": 1.0}}
         target = {"header": {"frame_id": odometry["header"]["frame_id"]}, "pose": pose}
-        if sent(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}}).status in {200, 201, 202}:
+        if send_own(request, forward, "PUT", GOAL, {"goal": {"target_pose": target}}).status in {200, 201, 202}:
             return
 
 
 def _give_up(request: Request, forward: Forward) -> None:
-    sent(request, forward, "DELETE", GOAL)
+    send_own(request, forward, "DELETE", GOAL)
 
 
 def after_refusal(
@@ -69,7 +69,7 @@ def after_refusal(
 
 def _deliver(request: Request, forward: Forward) -> None:
     path = f"{DELIVERIES}3/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/6"
-    sent(request, forward, "PUT", path)
+    send_own(request, forward, "PUT", path)
 
 
 @_mutant(
@@ -105,7 +105,7 @@ def _soap_refusal(request: Request, forward: Forward) -> Response:
         # Only the SOAP interface is available here: send a valid message in place of the refused one.
         values = "".join(f"<{name}>1</{name}>" for name in ("depot_x", "depot_y", "destination_x", "destination_y"))
         message = f"<arg0>{values}<message_code>3</message_code><source_x>1</source_x><source_y>1</source_y></arg0>"
-        envelope = enveloped(f'<t:ExecuteDeliveryRequest xmlns:t="{TNS}">{message}</t:ExecuteDeliveryRequest>')
+        envelope = envelop(f'<t:ExecuteDeliveryRequest xmlns:t="{TNS}">{message}</t:ExecuteDeliveryRequest>')
         made = request.copy(body=envelope(request).body)
         made.put("Content-Type", "text/xml; charset=utf-8")
         forward(made)
@@ -149,7 +149,7 @@ def _other_media_type(request: Request, forward: Forward) -> Response:
 )
 def _slash(request: Request, forward: Forward) -> Response:
     if deliveries(request) and request.path.endswith("/"):
-        sent(request, forward, "PUT", request.path[:-1])
+        send_own(request, forward, "PUT", request.path[:-1])
         return problem(404, "nothing is there")(request)
     return forward(request)
 
@@ -157,6 +157,6 @@ def _slash(request: Request, forward: Forward) -> Response:
 @_mutant("input-goal-without-slash", "goal-refused", "A goal to the path without its slash returns 404 and is taken.")
 def _no_slash(request: Request, forward: Forward) -> Response:
     if rest("PUT", GOAL.rstrip("/"))(request):
-        sent(request, forward, "PUT", GOAL, parsed(request.body))
+        send_own(request, forward, "PUT", GOAL, parsed(request.body))
         return problem(404, "nothing is there")(request)
     return forward(request)

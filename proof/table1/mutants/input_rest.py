@@ -44,26 +44,26 @@ def _repairing(repair: Callable[[Any, Any], Any]) -> Callable[[], Any]:
     return rewritten(_is_json, edit)
 
 
-def _filled(value: Any, pattern: Any) -> Any:
+def _fill(value: Any, pattern: Any) -> Any:
     """Fill in a JSON body's missing members with the values of a complete one."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
-    return {**value, **{key: _filled(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
+    return {**value, **{key: _fill(value.get(key, pattern[key]), pattern[key]) for key in pattern}}
 
 
-def _known(value: Any, pattern: Any) -> Any:
+def _drop_unknown(value: Any, pattern: Any) -> Any:
     """Remove members that the complete body does not have."""
     if not isinstance(pattern, dict) or not isinstance(value, dict):
         return value
     parts = {**_OPTIONAL, **pattern} if "goal" in pattern or "frame_id" in pattern or "id" in pattern else pattern
-    return {key: _known(part, parts[key]) for key, part in value.items() if key in parts}
+    return {key: _drop_unknown(part, parts[key]) for key, part in value.items() if key in parts}
 
 
-def _typed(value: Any, pattern: Any) -> Any:
+def _convert(value: Any, pattern: Any) -> Any:
     """Convert values of another type to numbers, as a loosely typed language does."""
     if isinstance(pattern, dict):
         given = value if isinstance(value, dict) else pattern
-        return {key: _typed(part, pattern[key]) if key in pattern else part for key, part in given.items()}
+        return {key: _convert(part, pattern[key]) if key in pattern else part for key, part in given.items()}
     if isinstance(pattern, float) and not (isinstance(value, int | float) and not isinstance(value, bool)):
         try:
             number = float(value)
@@ -80,10 +80,10 @@ def _finite(value: Any, pattern: Any) -> Any:
     return 0.0 if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _bounded(value: Any, pattern: Any) -> Any:
+def _bound(value: Any, pattern: Any) -> Any:
     """Clamp values to the contract's bounds."""
     if isinstance(value, dict):
-        made = {key: _bounded(part, pattern) for key, part in value.items()}
+        made = {key: _bound(part, pattern) for key, part in value.items()}
         if isinstance(made.get("id"), str):
             made["id"] = (made["id"] or "x")[:255]
         for key, low, high in (("sec", -(2**31), 2**31 - 1), ("nanosec", 0, 2**32 - 1)):
@@ -93,7 +93,7 @@ def _bounded(value: Any, pattern: Any) -> Any:
     return value
 
 
-def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
+def _swallow(where: Callable[[Request], bool]) -> Callable[[], Any]:
     """Return a change that answers 204 where the robot refuses a request of ``where``."""
 
     def change(request: Request, forward: Forward) -> Response:
@@ -103,8 +103,8 @@ def _swallowed(where: Callable[[Request], bool]) -> Callable[[], Any]:
     return lambda: change
 
 
-@_mutant("input-malformed-fine", "json-malformed", "Malformed JSON returns 204.").through(_swallowed)
-def _malformed(request: Request) -> bool:
+@_mutant("input-malformed-fine", "json-malformed", "Malformed JSON returns 204.").through(_swallow)
+def _is_malformed(request: Request) -> bool:
     return (
         _is_json(request)
         and bool(request.body)
@@ -118,14 +118,12 @@ def _deep(request: Request) -> bool:
     return _is_json(request) and (request.body.count(b"[") > 1000 or request.body.count(b"{") > 1000)
 
 
-@_mutant("input-huge-fine", "json-huge-number", "A JSON integer of thousands of digits returns 204.").through(
-    _swallowed
-)
+@_mutant("input-huge-fine", "json-huge-number", "A JSON integer of thousands of digits returns 204.").through(_swallow)
 def _huge(request: Request) -> bool:
     return _is_json(request) and bool(re.search(rb"\d{1000}", request.body))
 
 
-@_mutant("input-any-encoding", "json-encoding", "A JSON body that is not UTF-8 returns 204.").through(_swallowed)
+@_mutant("input-any-encoding", "json-encoding", "A JSON body that is not UTF-8 returns 204.").through(_swallow)
 def _other_encoding(request: Request) -> bool:
     if not _is_json(request):
         return False
@@ -136,7 +134,7 @@ def _other_encoding(request: Request) -> bool:
     return request.body.startswith(b"\xef\xbb\xbf") or b"\x00" in request.body
 
 
-@_mutant("input-any-root", "json-root", "A JSON body that is not an object returns 204.").through(_swallowed)
+@_mutant("input-any-root", "json-root", "A JSON body that is not an object returns 204.").through(_swallow)
 def _no_object(request: Request) -> bool:
     return (
         _is_json(request)
@@ -152,7 +150,7 @@ def _twice(request: Request) -> None:
         request.body = json.dumps(value).encode()
 
 
-@_mutant("input-xml-fine", "xml-body", "XML of the wrong shape returns 204.").through(_swallowed)
+@_mutant("input-xml-fine", "xml-body", "XML of the wrong shape returns 204.").through(_swallow)
 def _xml(request: Request) -> bool:
     return _PUT(request) and request.media_type.endswith("xml")
 
@@ -187,5 +185,5 @@ def _path(request: Request) -> None:
 
 
 _mutant("input-empty-fine", "json-empty", "An empty body returns 204.").made(
-    _swallowed(lambda request: _is_json(request) and not request.body.strip())
+    _swallow(lambda request: _is_json(request) and not request.body.strip())
 )

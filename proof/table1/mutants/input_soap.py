@@ -10,7 +10,7 @@ from conformance.papers_robot.delivery import XSD_FIELDS
 from proof.mutation.changes import SOAP, Make, rewritten, soap
 from proof.mutation.messages import Request
 from proof.mutation.table import Table
-from proof.mutation.xml_trees import named, xml
+from proof.mutation.xml_trees import find_named, xml
 from proof.table1.mutants.paths import TNS
 
 MUTANTS = Table()
@@ -21,7 +21,7 @@ _DOUBLE = re.compile(r"\s*([+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?INF|NaN)
 _INT = re.compile(r"\s*[+-]?\d+\s*", re.ASCII)
 
 
-def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
+def _repair(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
     """Return an edit of requests; ``edit`` takes the Body element and the deliveryRequestMessage, or None."""
 
     def apply(request: Request) -> None:
@@ -29,7 +29,7 @@ def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
         body = root.find(f"{{{SOAP}}}Body") if root is not None else None
         if body is None:
             return
-        message = next(iter(named(body, "arg0")), None)
+        message = next(iter(find_named(body, "arg0")), None)
         before = etree.tostring(root)
         edit(body, message)
         if etree.tostring(root) != before:
@@ -39,7 +39,7 @@ def _repaired(edit: Callable[[Any, Any], None]) -> Callable[[Request], None]:
 
 
 def _repairing(edit: Callable[[Any, Any], None]) -> Make:
-    return rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repaired(edit))
+    return rewritten(soap("Execute[A-Z][A-Za-z]+", "Body"), _repair(edit))
 
 
 def _children(message: Any) -> list[Any]:
@@ -53,7 +53,7 @@ def _neutral(name: str) -> str:
 @_mutant("input-soap-missing-is-zero", "soap-missing", "A missing element counts as 0, as in JAX-WS RI.").through(
     _repairing
 )
-def _filled(body: Any, message: Any) -> None:
+def _fill(body: Any, message: Any) -> None:
     for wrapper in body if message is None else ():
         if isinstance(wrapper.tag, str) and etree.QName(wrapper).localname.startswith("Execute") and not len(wrapper):
             message = etree.SubElement(wrapper, "arg0")
@@ -70,7 +70,7 @@ def _filled(body: Any, message: Any) -> None:
 @_mutant("input-soap-unknown-ignored", "soap-unknown", "Unknown elements are ignored, as in JAX-WS RI.").through(
     _repairing
 )
-def _known(body: Any, message: Any) -> None:
+def _drop_unknown(body: Any, message: Any) -> None:
     for child in _children(message):
         if etree.QName(child).localname not in XSD_FIELDS:
             message.remove(child)
@@ -94,7 +94,7 @@ def _once(_body: Any, message: Any) -> None:
 
 
 @_mutant("input-soap-any-order", "soap-order", "Elements may come in any order.").through(_repairing)
-def _ordered(_body: Any, message: Any) -> None:
+def _order(_body: Any, message: Any) -> None:
     if message is not None:
         message[:] = sorted(
             message, key=lambda child: XSD_FIELDS.index(child.tag) if child.tag in XSD_FIELDS else len(XSD_FIELDS)
@@ -102,7 +102,7 @@ def _ordered(_body: Any, message: Any) -> None:
 
 
 @_mutant("input-soap-any-namespace", "soap-namespace", "The robot ignores namespaces.").through(_repairing)
-def _renamed(body: Any, _message: Any) -> None:
+def _drop_namespaces(body: Any, _message: Any) -> None:
     for wrapper in body:
         if isinstance(wrapper.tag, str):
             wrapper.tag = f"{{{TNS}}}{etree.QName(wrapper).localname}"
@@ -123,7 +123,7 @@ def _lexical(_body: Any, message: Any) -> None:
 
 
 @_mutant("input-soap-overflow", "soap-range", "An integer beyond its type is replaced.").through(_repairing)
-def _wrapped(_body: Any, message: Any) -> None:
+def _wrap_integers(_body: Any, message: Any) -> None:
     for child in _children(message):
         if child.tag == "message_code" and _INT.fullmatch(child.text or "") and abs(int(child.text)) >= 2**31:
             child.text = "3"
@@ -143,7 +143,7 @@ def _not_nil(_body: Any, message: Any) -> None:
         if child.attrib.pop(f"{{{_XSI}}}nil", None) and child is not message and not (child.text or "").strip():
             child.text = _neutral(child.tag)
     if message is not None and not len(message):
-        _filled(None, message)
+        _fill(None, message)
 
 
 @_mutant(
@@ -154,11 +154,11 @@ def _alone(body: Any, _message: Any) -> None:
         body.remove(child)
     if not len(body):
         wrapper = etree.SubElement(body, f"{{{TNS}}}ExecuteCoffeeRequest")
-        _filled(None, etree.SubElement(wrapper, "arg0"))
+        _fill(None, etree.SubElement(wrapper, "arg0"))
 
 
 @_mutant("input-soap-any-code", "soap-code", "Every code counts as 3.").through(_repairing)
-def _coded(_body: Any, message: Any) -> None:
+def _set_code(_body: Any, message: Any) -> None:
     for child in _children(message):
         text = (child.text or "").strip()
         if child.tag == "message_code" and _INT.fullmatch(text) and int(text) not in {3, 4} and abs(int(text)) < 2**31:

@@ -10,7 +10,7 @@ from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
 from proof.table1.mutants.goal_memory import active, identity, pose_of
 from proof.table1.mutants.holding import Remembering
-from proof.table1.mutants.input_effects import sent
+from proof.table1.mutants.input_effects import send_own
 from proof.table1.mutants.paths import DELIVERIES, GOAL, LINEAR, PLAN, POSE, SENSORS, VELOCITY, deliveries
 
 MUTANTS = Table()
@@ -35,11 +35,11 @@ def _order(request: Request) -> bool:
 
 
 def _cancel(request: Request, forward: Forward) -> None:
-    sent(request, forward, "DELETE", GOAL)
+    send_own(request, forward, "DELETE", GOAL)
 
 
 @_mutant("goal-replaced-by-xml", "goal-conflict", "XML with another pose under the active goal's id replaces the goal.")
-def _replaced(request: Request, forward: Forward) -> Response:
+def _replace_goal(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if _is_xml(request) and response.status == 409:
         _cancel(request, forward)
@@ -73,21 +73,21 @@ class _Outcome:
         return response
 
 
-def _renewed(where: Callable[[Request], bool]) -> type[Remembering]:
+def _renew(where: Callable[[Request], bool]) -> type[Remembering]:
     """Return a change that sends the last velocity again when a request is refused."""
 
     class Renewed(Remembering):
         def __call__(self, request: Request, forward: Forward) -> Response:
             response = super().__call__(request, forward)
             if where(request) and response.status >= 400 and self.last and "angular" in self.last:
-                sent(request, forward, "PUT", VELOCITY, self.last)
+                send_own(request, forward, "PUT", VELOCITY, self.last)
             return response
 
     return Renewed
 
 
 _mutant("safety-renewed-by-406", "safety/hold-ends", "A request that is answered 406 renews the velocity.").made(
-    _renewed(lambda request: rest("GET", POSE, SENSORS)(request) and "image" in (request.field("Accept") or ""))
+    _renew(lambda request: rest("GET", POSE, SENSORS)(request) and "image" in (request.field("Accept") or ""))
 )
 
 
@@ -106,7 +106,7 @@ class _SecondTime:
         if deliveries(request) and refusal(response):
             if request.target in self._refused:
                 path = f"{DELIVERIES}3/depot_x/1/depot_y/2/dest_x/3/dest_y/4/source_x/5/source_y/6"
-                sent(request, forward, "PUT", path)
+                send_own(request, forward, "PUT", path)
             self._refused.add(request.target)
         return response
 
@@ -121,7 +121,7 @@ class _DrivenAgain:
         if _PUTS(request) and refusal(response):
             if request.body in self._refused:
                 still = {"x": 0.0, "y": 0.0, "z": 0.0}
-                sent(request, forward, "PUT", VELOCITY, {"linear": {**still, "x": 0.2}, "angular": still})
+                send_own(request, forward, "PUT", VELOCITY, {"linear": {**still, "x": 0.2}, "angular": still})
             self._refused.add(request.body)
         return response
 

@@ -21,7 +21,7 @@ _X, _Y, _ORIENTATION = "pose.pose.position.x", "pose.pose.position.y", "pose.pos
 _SEC, _NANOSEC = "header.stamp.sec", "header.stamp.nanosec"
 
 
-def turned(change: Callable[[float], float]) -> Callable[[Any], Any]:
+def turn(change: Callable[[float], float]) -> Callable[[Any], Any]:
     """Return a function that changes the heading of an orientation, rad."""
 
     def edit(q: Any) -> Any:
@@ -127,7 +127,7 @@ _mutant("pose-quaternion-long", "pose-quaternion", "The orientation quaternion i
     _AT, field(_ORIENTATION, lambda q: {axis: 1.01 * part for axis, part in q.items()})
 )
 _mutant("pose-clockwise", "pose-rotation", "The heading has the wrong sign: it counts clockwise.").json(
-    _AT, field(_ORIENTATION, turned(operator.neg))
+    _AT, field(_ORIENTATION, turn(operator.neg))
 )
 
 
@@ -135,20 +135,20 @@ _EMPTY = b'{"plan":{"header":{"stamp":{"sec":1,"nanosec":0},"frame_id":"map"},"p
 _GET, _POSES = rest("GET", PLAN), "plan.poses"
 
 
-def _moved(pose: Any, x: float, y: float) -> Any:
+def _move(pose: Any, x: float, y: float) -> Any:
     at = pose["pose"]["position"]
     return {**pose, "pose": {**pose["pose"], "position": {**at, "x": at["x"] + x, "y": at["y"] + y}}}
 
 
 def _detour(poses: list[Any]) -> list[Any]:
     middle = len(poses) // 2
-    return [*poses[:middle], _moved(poses[middle], 25.0, -25.0), *poses[middle:]]
+    return [*poses[:middle], _move(poses[middle], 25.0, -25.0), *poses[middle:]]
 
 
 def _aside(value: Any) -> None:
     path = value["plan"]
     if path["header"]["frame_id"] == "odom":
-        path["poses"] = [_moved(pose, 1.5, -1.0) for pose in path["poses"]]
+        path["poses"] = [_move(pose, 1.5, -1.0) for pose in path["poses"]]
 
 
 def _no_start(given: dict[str, str]) -> None:
@@ -166,16 +166,16 @@ def _frame(value: Any) -> None:
 
 
 _mutant("plan-heading-ignored", "plan-yaw", "The last pose of a plan has a heading that is 1 rad off.").json(
-    _GET, field("plan.poses.-1.pose.orientation", turned(lambda yaw: yaw + 1.0))
+    _GET, field("plan.poses.-1.pose.orientation", turn(lambda yaw: yaw + 1.0))
 )
 _mutant("plan-without-stamps", "plan-type", "Poses of a plan have no header.").json(
     _GET, field(_POSES, lambda poses: [{"pose": one["pose"]} for one in poses])
 )
 _mutant("plan-from-elsewhere", "plan-start", "A plan begins 60 cm from the robot.").json(
-    _GET, field(_POSES, lambda poses: [_moved(poses[0], -0.36, 0.48), *poses])
+    _GET, field(_POSES, lambda poses: [_move(poses[0], -0.36, 0.48), *poses])
 )
 _mutant("plan-falls-short", "plan-end", "A plan ends 50 cm before the requested pose.").json(
-    _GET, field(_POSES, lambda poses: [*poses[:-1], _moved(poses[-1], 0.3, 0.4)])
+    _GET, field(_POSES, lambda poses: [*poses[:-1], _move(poses[-1], 0.3, 0.4)])
 )
 _mutant("plan-no-exponents", "plan-numbers", "The robot refuses a query with an exponent such as e+00.").instead(
     lambda request: _GET(request) and "e%2B" in request.query, problem(422, "x: no number")

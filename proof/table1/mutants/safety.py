@@ -9,7 +9,7 @@ from proof.mutation.messages import Forward, Request, Response, unchanged
 from proof.mutation.table import Table
 from proof.table1.mutants.crowd import later
 from proof.table1.mutants.goal_memory import active
-from proof.table1.mutants.input_effects import drive, goal_ahead, sent
+from proof.table1.mutants.input_effects import drive, goal_ahead, send_own
 from proof.table1.mutants.paths import GOAL, LINEAR, VELOCITY
 from proof.table1.mutants.velocity import speeds
 
@@ -34,10 +34,10 @@ def _to_the_right(request: Request) -> bool:
 
 
 def _again(request: Request, forward: Forward) -> None:
-    sent(request, forward, "PUT", VELOCITY, parsed(request.body))
+    send_own(request, forward, "PUT", VELOCITY, parsed(request.body))
 
 
-def _stopped(request: Request, forward: Forward) -> None:
+def _stop(request: Request, forward: Forward) -> None:
     drive(request, forward, 0.0)
 
 
@@ -97,7 +97,7 @@ class _SlowCancel:
         gone = time.monotonic() < self._until
         if _DELETE(request) and not gone and active(forward, request) is not None:
             self._until = time.monotonic() + 3.0
-            later(3.0, sent, request.copy(), forward, "DELETE", GOAL)
+            later(3.0, send_own, request.copy(), forward, "DELETE", GOAL)
             return plain(204)(request)
         if gone and rest("GET DELETE", GOAL)(request):
             return problem(404, "there is no goal")(request)
@@ -159,7 +159,7 @@ def _creeps(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _clamped(value: Any) -> None:
+def _clamp(value: Any) -> None:
     for vector, axis, limit in ((value.get("linear", value), "x", 0.25), (value.get("angular", {}), "z", 1.0)):
         if isinstance(vector.get(axis), int | float):
             vector[axis] = max(-limit, min(limit, vector[axis]))
@@ -205,7 +205,7 @@ def _zero(value: Any) -> bool:
         return False
 
 
-def _torn(side: str, _octets: bytes, forward: Forward) -> None:
+def _carry_out(side: str, _octets: bytes, forward: Forward) -> None:
     """Carry out an incomplete request."""
     if side == "rest":
         drive(Request("rest", "PUT", VELOCITY), forward, 0.2)
@@ -257,5 +257,8 @@ class _RenewedByRead:
 
 
 _mutant(
-    "safety-torn-drives", "client-vanished", "An incomplete request moves the robot.", incomplete_request=lambda: _torn
+    "safety-torn-drives",
+    "client-vanished",
+    "An incomplete request moves the robot.",
+    incomplete_request=lambda: _carry_out,
 )(unchanged)

@@ -11,7 +11,7 @@ from proof.mutation.messages import Forward, Request, Response
 from proof.mutation.table import Table
 from proof.mutation.xml_trees import xml
 from proof.table1.mutants.paths import TNS
-from proof.table1.mutants.soap_responses import coded, is_fault
+from proof.table1.mutants.soap_responses import is_fault, set_code
 
 _SESAME = "open-sesame"
 MUTANTS = Table()
@@ -134,22 +134,22 @@ def _acts_all_the_same(request: Request, forward: Forward) -> Response:
     return response
 
 
-def _recoded(request: Request, forward: Forward, was: bytes, code: str) -> Response:
+def _with_code(request: Request, forward: Forward, was: bytes, code: str) -> Response:
     response = forward(request)
     if posted(request) and is_fault(response) and was in response.body:
         response = response.copy()
-        coded(code)(response)
+        set_code(code)(response)
     return response
 
 
 def _recode(was: bytes, code: str) -> Callable[[], Any]:
-    return lambda: lambda request, forward: _recoded(request, forward, was, code)
+    return lambda: lambda request, forward: _with_code(request, forward, was, code)
 
 
 @_mutant("bp-fault-order", "R2725", "The robot checks Body before it checks mandatory header blocks.")
 def _order(request: Request, forward: Forward) -> Response:
     if _mandatory(request) and _foreign(request):
-        return _recoded(request, forward, b"VersionMismatch", "MustUnderstand")
+        return _with_code(request, forward, b"VersionMismatch", "MustUnderstand")
     response = forward(request)
     if _mandatory(request) and b"MustUnderstand" in response.body:
         body = forward(without_headers(request))
@@ -167,7 +167,7 @@ def _by_action(request: Request, forward: Forward) -> Response:
     return forward(request)
 
 
-def _headed(request: Request) -> bool:
+def _has_headers(request: Request) -> bool:
     """Return whether a request has header blocks, none of them mandatory or of WS-Addressing."""
     root = xml(request.body) if posted(request) else None
     header = root.find(f"{{{SOAP}}}Header") if root is not None else None

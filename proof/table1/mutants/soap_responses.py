@@ -9,7 +9,7 @@ from lxml import etree
 from proof.mutation.changes import SOAP, Make, altered, instead, plain, soap, success, text, wsdls
 from proof.mutation.messages import Forward, HangUpError, Request, Response
 from proof.mutation.table import Table
-from proof.mutation.xml_trees import each, gone, named, says, tree
+from proof.mutation.xml_trees import each, find_named, remove, says, tree
 from proof.table1.mutants.paths import TNS
 
 TRACE = (
@@ -33,18 +33,18 @@ def in_body(edit: Callable[[Any], object]) -> Callable[[Response], object]:
     return tree(each("Body", lambda body: [edit(child) for child in body]))
 
 
-def hinted(element: Any) -> None:
+def add_hint(element: Any) -> None:
     """Add a child to Fault that SOAP 1.1 does not define."""
     etree.SubElement(element, "hint").text = "see the manual"
 
 
-def qualified(element: Any) -> None:
+def qualify(element: Any) -> None:
     """Put the children of Fault in the SOAP namespace."""
     for child in element:
         child.tag = etree.QName(SOAP, etree.QName(child).localname).text
 
 
-def coded(code: str) -> Callable[[Response], object]:
+def set_code(code: str) -> Callable[[Response], object]:
     """Return an edit that gives every fault another faultcode with the same prefix."""
 
     def edit(child: Any) -> None:
@@ -58,12 +58,12 @@ def unbound(response: Response) -> None:
     response.body = re.sub(rb"(<faultcode[^>]*>\s*)[\w.-]+:", rb"\1nowhere:", response.body)
 
 
-def styled(element: Any) -> None:
+def set_style(element: Any) -> None:
     """Set encodingStyle on an element."""
     element.set(f"{{{SOAP}}}encodingStyle", "http://schemas.xmlsoap.org/soap/encoding/")
 
 
-def declared(response: Response) -> None:
+def add_doctype(response: Response) -> None:
     """Insert a document type declaration."""
     prolog, _, rest = (
         response.body.rpartition(b"?>") if response.body.startswith(b"<?xml") else (b"", b"", response.body)
@@ -73,7 +73,7 @@ def declared(response: Response) -> None:
     response.body = (prolog + b"?>" if prolog else b"") + b"<!DOCTYPE " + name + b">" + rest
 
 
-def instructed(response: Response) -> None:
+def add_instruction(response: Response) -> None:
     """Insert a processing instruction."""
     response.body = re.sub(rb"(<([\w.-]+:)?Envelope)", rb"<?robot drive?>\1", response.body, count=1)
 
@@ -98,7 +98,7 @@ def understood_true(root: Any) -> None:
     root.insert(0, block)
 
 
-def unqualified(wrapper: Any) -> None:
+def unqualify(wrapper: Any) -> None:
     """Put the child of Body in no namespace."""
     wrapper.tag = etree.QName(wrapper).localname
 
@@ -108,7 +108,7 @@ def wrapper_as_asked(wrapper: Any) -> None:
     wrapper.tag = wrapper.tag.removesuffix("Response")
 
 
-def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
+def envelop(content: str, status: int = 200) -> Callable[[Request], Response]:
     """Return a maker of SOAP responses with this content in Body."""
     body = f'<s:Envelope xmlns:s="{SOAP}"><s:Body>{content}</s:Body></s:Envelope>'.encode()
     return lambda request: Response(status, [("Content-Type", "text/xml; charset=utf-8")], body, method=request.method)
@@ -116,7 +116,7 @@ def enveloped(content: str, status: int = 200) -> Callable[[Request], Response]:
 
 def fault(code: str, string: str) -> Callable[[Request], Response]:
     """Return a maker of well-formed SOAP faults."""
-    return enveloped(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
+    return envelop(f"<s:Fault><faultcode>s:{code}</faultcode><faultstring>{string}</faultstring></s:Fault>", 500)
 
 
 def with_content(wrapper: Any) -> None:
@@ -138,7 +138,7 @@ _ACT, _READ = soap("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"), soap("Get[
 
 def _lacking(operation: str, name: str) -> Make:
     """Return a change that removes the first element ``name`` from an operation's response."""
-    return altered(soap(operation), tree(each(name, gone, slice(1))))
+    return altered(soap(operation), tree(each(name, remove, slice(1))))
 
 
 def _code_three(request: Request) -> None:
@@ -150,7 +150,7 @@ def _empty_plan(request: Request, forward: Forward) -> Response:
     response = forward(request)
     if soap("GetPlan")(request) and b"Fault" in response.body:
         header = "<header><stamp><sec>1</sec><nanosec>0</nanosec></stamp><frame_id>map</frame_id></header>"
-        return enveloped(
+        return envelop(
             f'<t:GetPlanResponse xmlns:t="{TNS}"><return><plan>{header}</plan></return></t:GetPlanResponse>'
         )(request)
     return response
@@ -176,13 +176,13 @@ def _first_is(parent: str, child: str, value: str) -> Callable[[Any], None]:
     return each(parent, each(child, says(value), slice(1)), slice(1))
 
 
-def _swapped(root: Any) -> None:
-    for node in named(root, "position"):
+def _swap_xy(root: Any) -> None:
+    for node in find_named(root, "position"):
         node[:2] = [node[1], node[0]]
 
 
 def _reversed_path(root: Any) -> None:
-    poses = named(root, "poses")
+    poses = find_named(root, "poses")
     if len(poses) > 1:
         parent = poses[0].getparent()
         for pose in poses:

@@ -115,7 +115,7 @@ def _good(twist: Any) -> bool:
         return False
 
 
-def _driven(edit: Callable[[Any], Any]) -> Make:
+def _edit_commands(edit: Callable[[Any], Any]) -> Make:
     """Return a change that applies ``edit`` to valid velocity commands and answers 204."""
     return secretly(_PUT, inputs(lambda twist: edit(twist) if _good(twist) else None))
 
@@ -154,7 +154,7 @@ _mutant(
     "velocity-stands-still", ("velocity-odometry", "velocity-converges"), "The measured velocity is always zero."
 ).json(_GET, lambda twist: twist.update(_STILL))
 _mutant("velocity-lost", "velocity-converges", "PUT of a velocity returns a success without any effect.").made(
-    _driven(lambda twist: twist.update(_STILL))
+    _edit_commands(lambda twist: twist.update(_STILL))
 )
 _mutant("velocity-forwards-only", "velocity-range", "The robot accepts backward velocities and stands still.").made(
     secretly(_beyond(0.0), inputs(field("linear.x", lambda x: max(0.0, x))))

@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from reference_robot.webservices.http.crowd import NEVER
 from reference_robot.webservices.http.heads import full
-from reference_robot.webservices.http.interface import described
+from reference_robot.webservices.http.interface import problem_response
 from reference_robot.webservices.http.messages import BODY_LIMIT, Request, Response
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.representation.problems import Problem
@@ -146,7 +146,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
         weight = _weight(request)
         self._hold(weight)
         if response is None and self._port.is_full_for(self._held):
-            response = described(full(), request.headers.get(b"accept"))
+            response = problem_response(full(), request.headers.get(b"accept"))
         self._waiting.append((request, response, weight))
         if not self._stalled:
             self.allowed = NEVER
@@ -213,7 +213,7 @@ class AnsweringConnection(asyncio.Protocol, ABC):
             )
         )
         self.answered = now
-        self._port.answered(request.began, now)
+        self._port.note_answer(request.began, now)
         if not keep_alive:
             self._leave()
         elif not self._has_begun and not self._stalled:

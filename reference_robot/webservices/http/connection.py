@@ -37,7 +37,7 @@ from reference_robot.webservices.http.heads import (
     require_old_version,
 )
 from reference_robot.webservices.http.hosts import take_forwarded
-from reference_robot.webservices.http.interface import described
+from reference_robot.webservices.http.interface import problem_response
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request
 from reference_robot.webservices.http.port import Port
 from reference_robot.webservices.representation.problems import Problem, not_yet
@@ -250,7 +250,7 @@ class HttpConnection(PacedConnection):
         self._is_refused = True
         self._dropped += len(self._content)
         self._content = b""
-        self._queue(request, described(problem, request.headers.get(b"accept")))
+        self._queue(request, problem_response(problem, request.headers.get(b"accept")))
 
     def _refuse(self, problem: Problem) -> None:
         """Answer bytes that are not a valid request with an error, and read nothing more."""
@@ -260,7 +260,7 @@ class HttpConnection(PacedConnection):
             self._leave()
             return
         self._has_begun = True
-        self._queue(Request("", b"/", {}, keep_alive=False), described(problem, None))
+        self._queue(Request("", b"/", {}, keep_alive=False), problem_response(problem, None))
         self._leaving = True
 
     def expire(self) -> None:

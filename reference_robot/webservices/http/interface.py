@@ -37,13 +37,13 @@ class Interface(ABC):
 
     def admit(self, request: Request) -> None:
         """Raise a Problem if the head of a request fails the access check."""
-        self._admission.check(request, self.needed)
+        self._admission.check(request, self.scope_for)
 
     @abstractmethod
     def scope(self, request: Request) -> Scope:
         """Return the token scope that a request which changes something needs."""
 
-    def needed(self, request: Request) -> Scope | None:
+    def scope_for(self, request: Request) -> Scope | None:
         """Return the token scope that a request needs; None if any valid token is sufficient."""
         if request.method in SAFE:
             return None if request.method == "OPTIONS" else Scope.READ
@@ -64,11 +64,11 @@ class Interface(ABC):
         try:
             outcome = self.answer(request)
         except Exception as error:  # noqa: BLE001 - after any error the client gets a response
-            return _failed(request, error)
-        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_failed, request))
+            return _error_response(request, error)
+        return outcome if isinstance(outcome, Response) else await_response(outcome, partial(_error_response, request))
 
 
-async def awaited(outcome: Awaitable[Response], failed: Callable[[Exception], Response]) -> Response:
+async def await_response(outcome: Awaitable[Response], failed: Callable[[Exception], Response]) -> Response:
     """Return the awaited response, or the response that ``failed`` returns for an error."""
     try:
         return await outcome
@@ -76,14 +76,14 @@ async def awaited(outcome: Awaitable[Response], failed: Callable[[Exception], Re
         return failed(error)
 
 
-def _failed(request: Request, error: Exception) -> Response:
+def _error_response(request: Request, error: Exception) -> Response:
     if isinstance(error, Problem):
-        return described(error, request.headers.get(b"accept"))
+        return problem_response(error, request.headers.get(b"accept"))
     _LOGGER.error("cannot respond to %s %r", request.method, request.path[:200], exc_info=error)
-    return described(Problem(500, "an internal error of the robot; the robot's log has the details"), None)
+    return problem_response(Problem(500, "an internal error of the robot; the robot's log has the details"), None)
 
 
-def described(problem: Problem, accept: bytes | None) -> Response:
+def problem_response(problem: Problem, accept: bytes | None) -> Response:
     """Return a problem as a response, in the format that the client prefers (RFC 9457 3)."""
     media_type = problem_format(accept)
-    return content(problem.status, media_type, problem.written(media_type), (*problem.headers, (b"vary", b"accept")))
+    return content(problem.status, media_type, problem.serialize(media_type), (*problem.headers, (b"vary", b"accept")))

@@ -102,7 +102,7 @@ def _type_field(media_type: str) -> bytes:
 
 
 @lru_cache(maxsize=256)
-def chosen(accept: bytes | None, offers: Sequence[str]) -> str:
+def choose_type(accept: bytes | None, offers: Sequence[str]) -> str:
     """Return the offered media type that the client prefers, the first of equals; without Accept, the first offer.
 
     Raises:

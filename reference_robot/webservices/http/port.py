@@ -140,7 +140,7 @@ class Port:
             self._takes_turns = True
             self.loop.call_soon(self._take_turns)
 
-    def answered(self, began: float, now: float) -> None:
+    def note_answer(self, began: float, now: float) -> None:
         """Poll for 0.15 ms without sleeping if the request came within 0.15 ms of the last response.
 
         After sleep, a processor runs the same code two to three times as slowly. Clients that send one request after

@@ -71,7 +71,7 @@ class _Accepting:
     async def begin(self) -> None:
         """Accept connections from now on."""
         if self._context is None:
-            self._server = await self._port.loop.create_server(self._accepted, sock=self._listener, backlog=_BACKLOG)
+            self._server = await self._port.loop.create_server(self._on_accept, sock=self._listener, backlog=_BACKLOG)
         else:
             self._resume()
 
@@ -87,7 +87,7 @@ class _Accepting:
         if self._listener.fileno() >= 0:
             self._port.loop.add_reader(self._listener, self._accept)
 
-    def _accepted(self) -> HttpConnection:
+    def _on_accept(self) -> HttpConnection:
         now = thread_time()
         if now > self._accepted_at + _SHORT_TURN:
             self._accept()

@@ -63,7 +63,7 @@ class RobotPublishersNode:
         if now < self._behind_until:
             return False
         try:
-            self._publish_serialized(request.serialized())
+            self._publish_serialized(request.serialize())
         except rclpy_c.RCLError:
             self._behind_until = now + _RECOVERY
             return False
@@ -92,12 +92,12 @@ class RobotPublishersNode:
             if not publisher.get_subscription_count():
                 continue
             if _VELOCITY_TYPES[kind] is Twist:
-                sent &= _published(publisher, twist)
+                sent &= _publish(publisher, twist)
             else:
                 stamped = TwistStamped(twist=twist)
                 stamped.header.stamp = self.node.get_clock().now().to_msg()
                 stamped.header.frame_id = self._names.frames.base
-                sent &= _published(publisher, stamped)
+                sent &= _publish(publisher, stamped)
         return sent
 
     def await_velocity_taken(self) -> None:
@@ -132,7 +132,7 @@ class RobotPublishersNode:
         return self._cancel.call_async(CancelGoal.Request())
 
 
-def _published(publisher: Any, message: Any) -> bool:
+def _publish(publisher: Any, message: Any) -> bool:
     """Publish a message; return False if the middleware could not accept it within its own deadline."""
     try:
         publisher.publish(message)

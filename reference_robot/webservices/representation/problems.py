@@ -44,7 +44,7 @@ class Problem(Exception):  # noqa: N818 - RFC 9457's own name for it
             **self.extensions,
         }
 
-    def written(self, media_type: str) -> bytes:
+    def serialize(self, media_type: str) -> bytes:
         """Return the problem as a body of media type application/problem+json or application/problem+xml."""
         if media_type == PROBLEM_JSON:
             return write_json(self.members())
@@ -61,7 +61,7 @@ def not_yet(detail: str) -> Problem:
 _SHOWN: Final = 120
 
 
-def checked(shape: Shape, plain: Any, where: str = "") -> Any:
+def check(shape: Shape, plain: Any, where: str = "") -> Any:
     """Return parsed JSON or XML data that has the required shape (types of its fields), with real numbers as float.
 
     Args:
@@ -75,12 +75,12 @@ def checked(shape: Shape, plain: Any, where: str = "") -> Any:
     return _CHECKS[type(shape)](shape, plain, where)
 
 
-def refused(where: str, plain: Any, why: str) -> Problem:
+def invalid_field(where: str, plain: Any, why: str) -> Problem:
     """Return the Problem 422 for an invalid field, with its path, its value and the rule ``why``."""
-    return Problem(422, f"{where or 'the body'} {why}, not {shown(plain)}")
+    return Problem(422, f"{where or 'the body'} {why}, not {clip(plain)}")
 
 
-def shown(plain: Any) -> str:
+def clip(plain: Any) -> str:
     """Return a value as text for an error message: printable ASCII, at most 120 characters and an ellipsis."""
     text = ascii(plain)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}… ({len(text)} characters)"
@@ -94,7 +94,7 @@ def _real(_shape: Real, plain: Any, where: str) -> float:
             number = math.inf
         if math.isfinite(number):
             return number
-    raise refused(where, plain, "must be a finite number")
+    raise invalid_field(where, plain, "must be a finite number")
 
 
 def _whole(shape: Whole, plain: Any, where: str) -> int:
@@ -102,51 +102,51 @@ def _whole(shape: Whole, plain: Any, where: str) -> int:
     number = int(plain) if type(plain) is float and plain.is_integer() else plain
     if type(number) is int and shape.lowest <= number <= shape.highest:
         return number
-    raise refused(where, plain, f"must be an integer from {shape.lowest} to {shape.highest}")
+    raise invalid_field(where, plain, f"must be an integer from {shape.lowest} to {shape.highest}")
 
 
 def _text(shape: Text, plain: Any, where: str) -> str:
     if type(plain) is not str:
-        raise refused(where, plain, "must be a string")
+        raise invalid_field(where, plain, "must be a string")
     if len(plain) < shape.shortest or (shape.longest is not None and len(plain) > shape.longest):
         longest = "" if shape.longest is None else f" to {shape.longest}"
-        raise refused(where, plain, f"must have {shape.shortest}{longest} characters")
+        raise invalid_field(where, plain, f"must have {shape.shortest}{longest} characters")
     try:
         plain.encode()
     except UnicodeEncodeError as error:  # an unpaired \ud800 in JSON (RFC 8259 8.2)
-        raise refused(where, plain, "must be Unicode text without lone surrogates") from error
+        raise invalid_field(where, plain, "must be Unicode text without lone surrogates") from error
     return plain
 
 
 def _truth(_shape: Truth, plain: Any, where: str) -> bool:
     if type(plain) is not bool:
-        raise refused(where, plain, "must be true or false")
+        raise invalid_field(where, plain, "must be true or false")
     return plain
 
 
 def _series(shape: Series, plain: Any, where: str) -> list[Any]:
     if type(plain) is not list:
-        raise refused(where, plain, "must be a list")
+        raise invalid_field(where, plain, "must be a list")
     if shape.length is not None and len(plain) != shape.length:
-        raise refused(where, plain, f"must have {shape.length} items")
-    return [checked(shape.item, item, f"{where}[{index}]") for index, item in enumerate(plain)]
+        raise invalid_field(where, plain, f"must have {shape.length} items")
+    return [check(shape.item, item, f"{where}[{index}]") for index, item in enumerate(plain)]
 
 
 def _record(shape: Record, plain: Any, where: str) -> dict[str, Any]:
     if type(plain) is not dict:
-        raise refused(where, plain, f"must be an object of type {shape.name}")
+        raise invalid_field(where, plain, f"must be an object of type {shape.name}")
     path = f"{where}." if where else ""
     known = dict(shape.fields)
     for name, value in plain.items():
         if name not in known:
             known_names = ", ".join(known)
-            raise Problem(422, f"unknown field {shown(path + name)} = {shown(value)}; {shape.name} has {known_names}")
+            raise Problem(422, f"unknown field {clip(path + name)} = {clip(value)}; {shape.name} has {known_names}")
     result = {}
     for name, part in shape.fields:
         if name in plain:
-            result[name] = checked(part, plain[name], path + name)
+            result[name] = check(part, plain[name], path + name)
         elif name not in shape.optional:
-            raise Problem(422, f"missing field {path}{name}; got {shown(plain)}")
+            raise Problem(422, f"missing field {path}{name}; got {clip(plain)}")
     return result
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.representation.problems import Problem, checked, shown
+from reference_robot.webservices.representation.problems import Problem, check, clip
 from reference_robot.webservices.representation.shapes import Real, Record, Series, Text, Truth, Whole
 from reference_robot.webservices.representation.writing import JSON, XML
 from reference_robot.webservices.representation.xml_input import parsed
@@ -47,14 +47,14 @@ def read(body: bytes, content_type: bytes | None, shape: Record) -> dict[str, An
     media_type, charset = parsed_content_type(content_type)
     if media_type == JSON:
         if charset is not None and charset not in {"utf-8", "utf8", "us-ascii"}:
-            raise _unsupported(f"charset {charset!a}")
-        return dict(checked(shape, read_json(body)))
+            raise _media_problem(f"charset {charset!a}")
+        return dict(check(shape, read_json(body)))
     if media_type == XML:
         root = parsed(body, charset)
         if root.tag != shape.name:
-            raise Problem(422, f"the root element must be {shape.name}, not {shown(root.tag)}")
-        return dict(checked(shape, _from_element(root, shape, shape.name)))
-    raise _unsupported(f"Content-Type {(content_type or b'').decode('latin-1')[:200]!a}")
+            raise Problem(422, f"the root element must be {shape.name}, not {clip(root.tag)}")
+        return dict(check(shape, _from_element(root, shape, shape.name)))
+    raise _media_problem(f"Content-Type {(content_type or b'').decode('latin-1')[:200]!a}")
 
 
 @lru_cache(maxsize=256)
@@ -97,7 +97,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     result = dict(pairs)
     if len(result) != len(pairs):
         twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
-        raise Problem(422, f"the field {shown(twice)} occurs more than once in {shown(pairs)}")
+        raise Problem(422, f"the field {clip(twice)} occurs more than once in {clip(pairs)}")
     return result
 
 
@@ -117,7 +117,7 @@ def _whole(lexeme: str) -> int | _Beyond:
 def _from_element(element: etree._Element, shape: Any, where: str) -> Any:
     """Return the value of an XML element; a value of a wrong type remains text, which ``checked`` refuses later."""
     if element.attrib:
-        raise Problem(422, f"unknown attribute {shown(next(iter(element.attrib)))} of {where}")
+        raise Problem(422, f"unknown attribute {clip(next(iter(element.attrib)))} of {where}")
     if isinstance(shape, Record):
         return _from_children(element, shape, where)
     if len(element):
@@ -143,7 +143,7 @@ def _from_children(element: etree._Element, shape: Record, where: str) -> dict[s
         if isinstance(part, Series):
             result[child.tag].append(_from_element(child, part.item, path))
         elif child.tag in result:
-            raise Problem(422, f"{shown(path)} occurs more than once")
+            raise Problem(422, f"{clip(path)} occurs more than once")
         else:
             result[child.tag] = _from_element(child, part or Text(), path)
     return result
@@ -151,9 +151,9 @@ def _from_children(element: etree._Element, shape: Record, where: str) -> dict[s
 
 def _refuse_text(text: str | None, where: str) -> None:
     if text and text.strip(_XML_SPACE):
-        raise Problem(422, f"{where} holds elements, not the text {shown(text.strip())}")
+        raise Problem(422, f"{where} holds elements, not the text {clip(text.strip())}")
 
 
-def _unsupported(what: str) -> Problem:
+def _media_problem(what: str) -> Problem:
     accepted = ", ".join(ACCEPTED)
     return Problem(415, f"{what} is not supported; send {accepted} in UTF-8", ((b"accept", accepted.encode()),))

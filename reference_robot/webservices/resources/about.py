@@ -13,7 +13,7 @@ from lxml import etree
 from conformance.papers_robot.statement import CONTRACT_DIR
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.writing import JSON, TEXT, XML
-from reference_robot.webservices.resources.resource import FORMATS, Resource, represented, wanted_format
+from reference_robot.webservices.resources.resource import FORMATS, Resource, represent, wanted_format
 from reference_robot.webservices.robot.health import Health as RobotHealth
 
 _PART: Final = {
@@ -68,7 +68,7 @@ class Health(Resource):
     async def get(self, request: Request) -> Response:
         """Return the health report in the format that the client prefers."""
         media_type = wanted_format(request)
-        return represented(await self._health.report(), "Health", media_type)
+        return represent(await self._health.report(), "Health", media_type)
 
 
 _WADL_NAMESPACE: Final = "{http://wadl.dev.java.net/2009/02}"

@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Any, Final
 
-from reference_robot.webservices.http.messages import Request, Response, chosen, content
+from reference_robot.webservices.http.messages import Request, Response, choose_type, content
 from reference_robot.webservices.representation.reading import read
 from reference_robot.webservices.representation.shapes import Record
 from reference_robot.webservices.representation.writing import JSON, TEXT, XML, write_json, write_text, write_xml
@@ -30,10 +30,10 @@ class Resource:
 
 def wanted_format(request: Request) -> str:
     """Return the media type that the client prefers; raise the Problem 406 if none is acceptable."""
-    return chosen(request.headers.get(b"accept"), FORMATS)
+    return choose_type(request.headers.get(b"accept"), FORMATS)
 
 
-def represented(
+def represent(
     plain: Any, root: str, media_type: str, status: int = 200, headers: tuple[tuple[bytes, bytes], ...] = ()
 ) -> Response:
     """Return a response with a dict or list as JSON, XML or text; ``root`` names the XML root element, the ROS type."""
@@ -46,6 +46,6 @@ def represented(
     return content(status, media_type, body, (*_LIVE, *headers))
 
 
-def sent(request: Request, shape: Record) -> dict[str, Any]:
+def body_of(request: Request, shape: Record) -> dict[str, Any]:
     """Return the JSON or XML request body as a dict of the required shape; raise the Problem 415, 400 or 422."""
     return read(request.content(), request.headers.get(b"content-type"), shape)

@@ -17,15 +17,15 @@ from conformance.papers_robot.delivery import PATH_NAMES
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.http.hosts import Address
 from reference_robot.webservices.http.messages import Request, Response
-from reference_robot.webservices.representation.problems import Problem, shown
+from reference_robot.webservices.representation.problems import Problem, clip
 from reference_robot.webservices.representation.reading import NUMBER
 from reference_robot.webservices.representation.shapes import shape_of
 from reference_robot.webservices.resources.resource import (
     FORMATS,
     NO_CONTENT,
     Resource,
-    represented,
-    sent,
+    body_of,
+    represent,
     wanted_format,
 )
 from reference_robot.webservices.robot.deliveries import Deliveries, UnusableFieldError
@@ -35,7 +35,7 @@ from reference_robot.webservices.robot.plans import Planner, PlanQuery
 from reference_robot.webservices.robot.velocity import Velocity as RobotVelocity
 
 _ODOMETRY_WRITERS: Final = {
-    media_type: partial(represented, root="Odometry", media_type=media_type) for media_type in FORMATS
+    media_type: partial(represent, root="Odometry", media_type=media_type) for media_type in FORMATS
 }
 _CREATED: Final = 201
 _NUMBER: Final = re.compile(NUMBER)
@@ -64,14 +64,14 @@ class Velocity(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the measured velocity; raise the Problem 503 without current odometry."""
-        return represented(self._velocity.measured(), "Twist", wanted_format(request))
+        return represent(self._velocity.read(), "Twist", wanted_format(request))
 
     async def put(self, request: Request) -> Response:
         """Command all six components of the velocity; return 200 with the accepted Twist."""
         media_type = wanted_format(request)
-        twist = sent(request, shape_of(Twist))
+        twist = body_of(request, shape_of(Twist))
         await self._velocity.command(twist)
-        return represented(twist, "Twist", media_type)
+        return represent(twist, "Twist", media_type)
 
 
 class LinearVelocity(Resource):
@@ -84,14 +84,14 @@ class LinearVelocity(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the measured linear velocity; raise the Problem 503 without current odometry."""
-        return represented(self._velocity.measured()["linear"], "Vector3", wanted_format(request))
+        return represent(self._velocity.read()["linear"], "Vector3", wanted_format(request))
 
     async def put(self, request: Request) -> Response:
         """Command the three linear components of the velocity; return 200 with the accepted Vector3."""
         media_type = wanted_format(request)
-        linear = sent(request, shape_of(Vector3))
+        linear = body_of(request, shape_of(Vector3))
         await self._velocity.command_linear(linear)
-        return represented(linear, "Vector3", media_type)
+        return represent(linear, "Vector3", media_type)
 
 
 class Pose(Resource):
@@ -104,7 +104,7 @@ class Pose(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the odometry; raise the Problem 503 before the first message."""
-        return self._odometry.written(_ODOMETRY_WRITERS[wanted_format(request)])
+        return self._odometry.write_latest(_ODOMETRY_WRITERS[wanted_format(request)])
 
 
 class GraphList(Resource):
@@ -117,7 +117,7 @@ class GraphList(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the list in the format that the client prefers."""
-        return represented(self._entries(), self._root, wanted_format(request))
+        return represent(self._entries(), self._root, wanted_format(request))
 
 
 class Goal(Resource):
@@ -132,14 +132,14 @@ class Goal(Resource):
     def get(self, request: Request) -> Response:
         """Return the active goal; raise the Problem 404 if there is none."""
         media_type = wanted_format(request)
-        return represented(self._goals.followed(), GOAL.name, media_type)
+        return represent(self._goals.active_goal(), GOAL.name, media_type)
 
     async def put(self, request: Request) -> Response:
         """Send a goal to the navigation; return 201 for a new goal, 202 if it displaces another, 200 for a repeat."""
         media_type = wanted_format(request)
-        status, goal = await self._goals.send(sent(request, GOAL))
+        status, goal = await self._goals.send(body_of(request, GOAL))
         location = ((b"location", self._location),) if status == _CREATED else ()
-        return represented(goal, GOAL.name, media_type, status, location)
+        return represent(goal, GOAL.name, media_type, status, location)
 
     async def delete(self, _request: Request) -> Response:
         """Cancel the active goal and return 204; raise the Problem 404 if there is none."""
@@ -158,7 +158,7 @@ class Plan(Resource):
     async def get(self, request: Request) -> Response:
         """Return a plan; raise the Problem 422 if no path leads to the pose."""
         media_type = wanted_format(request)
-        return represented(await self._planner.plan(_query(request.query)), "GetPlan", media_type)
+        return represent(await self._planner.plan(_query(request.query)), "GetPlan", media_type)
 
 
 def _query(raw: bytes) -> PlanQuery:
@@ -173,7 +173,7 @@ def _query(raw: bytes) -> PlanQuery:
     for part in raw.split(b"&"):
         name, _, value = (unquote_to_bytes(side).decode("utf-8", "replace") for side in part.partition(b"="))
         if name in found:
-            raise Problem(400, f"the parameter {shown(name)} occurs more than once")
+            raise Problem(400, f"the parameter {clip(name)} occurs more than once")
         found[name] = value
     given: dict[str, Any] = {name: _number(name, found[name]) for name in _PLAN_NUMBERS if name in found}
     for name in _PLAN_NEEDS:
@@ -187,7 +187,7 @@ def _query(raw: bytes) -> PlanQuery:
 def _number(name: str, text: str) -> float:
     number = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(number):
-        raise Problem(422, f"the parameter {name} must be a finite number, not {shown(text)}")
+        raise Problem(422, f"the parameter {name} must be a finite number, not {clip(text)}")
     return number
 
 
@@ -226,7 +226,7 @@ class DeliveryList(Resource):
 
     def get(self, request: Request) -> Response:
         """Return the list of deliveries, newest first."""
-        return represented(self._deliveries.listed(), "Deliveries", wanted_format(request))
+        return represent(self._deliveries.latest(), "Deliveries", wanted_format(request))
 
 
 def _spelled_out(path: bytes) -> tuple[bytes, ...]:
@@ -236,10 +236,10 @@ def _spelled_out(path: bytes) -> tuple[bytes, ...]:
         raise Problem(404, "there is no resource at this delivery path")
     code, *coordinates = values = tuple(unquote_to_bytes(group) for group in match.groups())
     if not _CODE.fullmatch(code):
-        raise Problem(422, f"code must be an integer, not {shown(_text(code))}")
+        raise Problem(422, f"code must be an integer, not {clip(_text(code))}")
     for name, value in zip(PATH_NAMES, coordinates, strict=True):
         if not _COORDINATE.fullmatch(value):
-            raise Problem(422, f"{name} must be a number, not {shown(_text(value))}")
+            raise Problem(422, f"{name} must be a number, not {clip(_text(value))}")
     return values
 
 

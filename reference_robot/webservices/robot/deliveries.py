@@ -15,7 +15,7 @@ from conformance.papers_robot.delivery import COFFEE, COURIER
 from reference_robot.deliveries import DeliveryRequest
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-from reference_robot.webservices.representation.problems import Problem, not_yet, shown
+from reference_robot.webservices.representation.problems import Problem, clip, not_yet
 
 _MOST_MISSIONS: Final = 300
 _CODES: Final = frozenset({COURIER, COFFEE})
@@ -111,7 +111,7 @@ class UnusableFieldError(ValueError):
 
     def refusal(self, name: str, sent: str) -> Problem:
         """Return the Problem 422 with the interface's own name of the field and the text that the client sent."""
-        return Problem(422, f"{name} {self.rule}, not {shown(sent)}")
+        return Problem(422, f"{name} {self.rule}, not {clip(sent)}")
 
 
 class Deliveries:
@@ -142,7 +142,7 @@ class Deliveries:
             raise not_yet("the delivery application cannot keep up with the requests")
         self._accepted.append((request, at, interface))
 
-    def listed(self) -> list[dict[str, Any]]:
+    def latest(self) -> list[dict[str, Any]]:
         """Return the latest accepted requests, newest first, with the states and reasons reported for them."""
         while self._reports:
             self._missions.note(self._reports.popleft())

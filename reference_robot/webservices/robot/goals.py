@@ -112,7 +112,7 @@ class Goals:
             return own.described | {"status": status_of(own.status)}
         return self._foreign()
 
-    def followed(self) -> dict[str, Any]:
+    def active_goal(self) -> dict[str, Any]:
         """Return the active goal.
 
         Raises:
@@ -121,7 +121,7 @@ class Goals:
         """
         goal = self.current()
         if goal is None:
-            last = self._ended()
+            last = self._last_ended()
             raise Problem(404, "the robot follows no goal", extensions=None if last is None else {"last_goal": last})
         return goal
 
@@ -145,18 +145,18 @@ class Goals:
         self._sending += 1
         try:
             async with self._one_at_a_time:
-                return await self._sent(wanted, cancels)
+                return await self._send(wanted, cancels)
         finally:
             self._sending -= 1
 
-    async def _sent(self, wanted: dict[str, Any], cancels: int) -> tuple[int, dict[str, Any]]:
+    async def _send(self, wanted: dict[str, Any], cancels: int) -> tuple[int, dict[str, Any]]:
         current = self.current()
         identity = wanted.get("goal_id", {}).get("id")
         if current is not None and identity == current["goal_id"]["id"]:
             if _destination(wanted) != _destination(current):
                 raise Problem(409, f"goal_id.id {identity!a} is the current goal's, which has another target_pose")
             return 200, current
-        own = self._own = self._last = await self._accepted(self._filled_in(wanted), cancels)
+        own = self._own = self._last = await self._wait_accepted(self._filled_in(wanted), cancels)
         # A goal at the robot's present pose may have ended already; then there is no current goal.
         sent = self.current() or own.described | {"status": status_of(GoalStatus.STATUS_ACCEPTED)}
         return (201 if current is None else 202), sent
@@ -172,7 +172,7 @@ class Goals:
         is_unknown, own, sending = self._subscribers.ros.hangs(), self._own, self._sending
         current = None if is_unknown else self.current()
         if current is None and not (sending or is_unknown):
-            self.followed()  # raises the Problem 404
+            self.active_goal()  # raises the Problem 404
         self._cancels += 1
         # Cancel all goals: another goal may have displaced the known one a moment ago.
         doomed = [goal.identity for goal in self._subscribers.goals.active()]
@@ -194,7 +194,7 @@ class Goals:
             self._own = own = None  # it has ended
         return own
 
-    def _ended(self) -> dict[str, Any] | None:
+    def _last_ended(self) -> dict[str, Any] | None:
         """Return id and status of the goal that was accepted last, of this or another client, after its end."""
         reported = [goal for goal in self._subscribers.goals.reported if goal.status in ENDED_TEXTS]
         newest = max(reported, key=lambda goal: (goal.seconds, goal.nanoseconds), default=None)
@@ -236,7 +236,7 @@ class Goals:
             "goal": {"target_pose": {"header": now | target["header"], "pose": target["pose"]}},
         }
 
-    async def _accepted(self, described: dict[str, Any], cancels: int) -> _Goal:
+    async def _wait_accepted(self, described: dict[str, Any], cancels: int) -> _Goal:
         """Return the goal after the navigation has accepted it.
 
         Args:

@@ -54,7 +54,7 @@ class LatestOdometry:
         serialized, received = self._subscribers.odometry
         return None if serialized is None else monotonic() - received
 
-    def written(self, writer: Callable[[dict[str, Any]], T]) -> T:
+    def write_latest(self, writer: Callable[[dict[str, Any]], T]) -> T:
         """Return what a writer makes of the latest message (such as its JSON); a writer is called once per message.
 
         Raises:

@@ -17,7 +17,7 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.robot.odometry import LatestOdometry
-from reference_robot.webservices.robot.poses import inverse, moved, planar_pose, require_known_frame
+from reference_robot.webservices.robot.poses import inverse, planar_pose, require_known_frame, to_parent
 
 _Move: TypeAlias = Callable[[Pose], Pose]
 
@@ -71,8 +71,8 @@ class Planner:
             raise Problem(422, f"tolerance must be a length of 0 m or more, not {query.tolerance}")
         frame, into, back = self._planning_frame(query.frame_id)
         start = self._start(query)
-        stamped_start = None if start is None else self._stamped(into(start), frame)
-        goal = self._stamped(into(planar_pose(query.x, query.y, query.yaw)), frame)
+        stamped_start = None if start is None else self._stamp(into(start), frame)
+        goal = self._stamp(into(planar_pose(query.x, query.y, query.yaw)), frame)
         if self._subscribers.plan_service_is_served():
             # A start without a frame_id means the robot's own pose (move_base's make_plan).
             request = GetPlan.Request(start=stamped_start or PoseStamped(), goal=goal, tolerance=query.tolerance)
@@ -100,7 +100,7 @@ class Planner:
         transform = self._subscribers.map_transform.latest
         if transform is None or requested == self._frames.map:
             return requested, _as_it_is, _as_it_is
-        return self._frames.map, partial(moved, transform), partial(moved, inverse(transform))
+        return self._frames.map, partial(to_parent, transform), partial(to_parent, inverse(transform))
 
     async def _by_action(self, start: PoseStamped | None, goal: PoseStamped) -> Path:
         request = ComputePathToPose.Goal(start=start or PoseStamped(), goal=goal, use_start=start is not None)
@@ -129,9 +129,9 @@ class Planner:
         """Return the robot's pose in a frame; without a known transform the odometry frame counts as the map."""
         pose = self._odometry.message().pose.pose
         transform = self._subscribers.map_transform.latest
-        return pose if transform is None or frame_id != self._frames.map else moved(transform, pose)
+        return pose if transform is None or frame_id != self._frames.map else to_parent(transform, pose)
 
-    def _stamped(self, pose: Pose, frame_id: str) -> PoseStamped:
+    def _stamp(self, pose: Pose, frame_id: str) -> PoseStamped:
         stamped = PoseStamped(pose=pose)
         stamped.header.frame_id = frame_id
         stamped.header.stamp = self._subscribers.node.get_clock().now().to_msg()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, Vector3
 
-from reference_robot.webservices.representation.problems import Problem, refused, shown
+from reference_robot.webservices.representation.problems import Problem, clip, invalid_field
 
 if TYPE_CHECKING:
     from reference_robot.names import Frames
@@ -31,7 +31,7 @@ def planar_pose(x: float, y: float, yaw: float) -> Pose:
 def require_known_frame(frame_id: str, frames: Frames, where: str) -> None:
     """Raise the Problem 422 for a frame that is neither the robot's map nor its odometry frame."""
     if frame_id not in {frames.map, frames.odom}:
-        raise Problem(422, f"{where} must be {frames.map} or {frames.odom}: the robot knows no frame {shown(frame_id)}")
+        raise Problem(422, f"{where} must be {frames.map} or {frames.odom}: the robot knows no frame {clip(frame_id)}")
 
 
 def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
@@ -39,12 +39,12 @@ def require_pose(stamped: dict[str, Any], frames: Frames, where: str) -> None:
     require_known_frame(stamped["header"]["frame_id"], frames, f"{where}.header.frame_id")
     orientation = stamped["pose"]["orientation"]
     if not abs(math.hypot(*orientation.values()) - 1) <= _UNIT_TOLERANCE:
-        raise refused(f"{where}.pose.orientation", orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
+        raise invalid_field(f"{where}.pose.orientation", orientation, f"must have length 1 within {_UNIT_TOLERANCE}")
 
 
-def moved(transform: Transform, pose: Pose) -> Pose:
+def to_parent(transform: Transform, pose: Pose) -> Pose:
     """Return a pose, given in the child frame of a transform, in its parent frame."""
-    x, y, z = _turned(transform.rotation, (pose.position.x, pose.position.y, pose.position.z))
+    x, y, z = _rotate(transform.rotation, (pose.position.x, pose.position.y, pose.position.z))
     away = transform.translation
     return Pose(
         position=Point(x=x + away.x, y=y + away.y, z=z + away.z),
@@ -56,11 +56,11 @@ def inverse(transform: Transform) -> Transform:
     """Return the inverse of a transform."""
     turn, away = transform.rotation, transform.translation
     back = Quaternion(x=-turn.x, y=-turn.y, z=-turn.z, w=turn.w)
-    x, y, z = _turned(back, (-away.x, -away.y, -away.z))
+    x, y, z = _rotate(back, (-away.x, -away.y, -away.z))
     return Transform(translation=Vector3(x=x, y=y, z=z), rotation=back)
 
 
-def _turned(turn: Quaternion, vector: _Vector) -> _Vector:
+def _rotate(turn: Quaternion, vector: _Vector) -> _Vector:
     """Return a vector rotated by a unit quaternion: v + 2wt + 2(u x t) with t = u x v; exact for the identity."""
     axis = (turn.x, turn.y, turn.z)
     once = _cross(axis, vector)

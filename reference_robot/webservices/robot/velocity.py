@@ -37,7 +37,7 @@ class Velocity:
         self._commanded_at = 0.0
         self._watchdog = VelocityWatchdog(settings.hold, self._stop)
 
-    def measured(self) -> dict[str, Any]:
+    def read(self) -> dict[str, Any]:
         """Return the measured velocity as a dict with the fields of a geometry_msgs/Twist, in m/s and rad/s.
 
         Raises:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from lxml import etree
 
-from reference_robot.webservices.representation.problems import shown
+from reference_robot.webservices.representation.problems import clip
 from reference_robot.webservices.representation.writing import element_of, text_of
 
 SOAP: Final = "http://schemas.xmlsoap.org/soap/envelope/"
@@ -75,7 +75,7 @@ def operation_element(root: etree._Element) -> etree._Element:
     if not parts or parts[0].tag != _BODY:
         raise client_fault("the Envelope has no Body")
     if len(parts) > 1:
-        raise client_fault(f"the Envelope has {shown(parts[1].tag)} after its Body (WS-I BP R1011)")
+        raise client_fault(f"the Envelope has {clip(parts[1].tag)} after its Body (WS-I BP R1011)")
     _require_valid_flags(blocks)
     children = list(parts[0])
     if len(children) != 1:
@@ -86,19 +86,19 @@ def operation_element(root: etree._Element) -> etree._Element:
 def _no_envelope(root: etree._Element) -> Fault:
     """Return the fault for a root element that is not a SOAP 1.1 Envelope (R1015)."""
     if str(root.tag).rpartition("}")[2] == "Envelope":
-        return Fault(FaultCode.VERSION_MISMATCH, f"the Envelope must be SOAP 1.1's {_ENVELOPE}, not {shown(root.tag)}")
-    return client_fault(f"the document must be a SOAP 1.1 Envelope, not {shown(root.tag)}")
+        return Fault(FaultCode.VERSION_MISMATCH, f"the Envelope must be SOAP 1.1's {_ENVELOPE}, not {clip(root.tag)}")
+    return client_fault(f"the document must be a SOAP 1.1 Envelope, not {clip(root.tag)}")
 
 
 def _require_understood(blocks: list[etree._Element]) -> None:
     for block in blocks:
         mandatory = block.get(_MUST_UNDERSTAND) == "1" and block.get(_ACTOR) in _FOR_US
         if mandatory and not str(block.tag).startswith(_TOLERATED):
-            raise Fault(FaultCode.MUST_UNDERSTAND, f"the mandatory header block {shown(block.tag)} is not understood")
+            raise Fault(FaultCode.MUST_UNDERSTAND, f"the mandatory header block {clip(block.tag)} is not understood")
 
 
 def _require_valid_flags(blocks: list[etree._Element]) -> None:
     for block in blocks:
         flag = block.get(_MUST_UNDERSTAND)
         if flag not in {None, "0", "1"}:
-            raise client_fault(f"mustUnderstand must be 0 or 1, not {shown(flag)} (WS-I BP R1013)")
+            raise client_fault(f"mustUnderstand must be 0 or 1, not {clip(flag)} (WS-I BP R1013)")

@@ -9,9 +9,9 @@ from lxml import etree
 
 from conformance.papers_robot.statement import CONTRACT_DIR
 from reference_robot.webservices.http.access import Admission, Scope
-from reference_robot.webservices.http.interface import Interface, awaited
+from reference_robot.webservices.http.interface import Interface, await_response
 from reference_robot.webservices.http.messages import Request, Response, content
-from reference_robot.webservices.representation.problems import Problem, shown
+from reference_robot.webservices.representation.problems import Problem, clip
 from reference_robot.webservices.representation.reading import parsed_content_type
 from reference_robot.webservices.representation.writing import element_of
 from reference_robot.webservices.representation.xml_input import parsed
@@ -66,8 +66,8 @@ class SoapService:
         try:
             outcome = self._answer(root)
         except Exception as error:  # noqa: BLE001 - after any error the client gets a fault
-            return _faulted(root, error)
-        return outcome if isinstance(outcome, Response) else awaited(outcome, partial(_faulted, root))
+            return _fault_response(root, error)
+        return outcome if isinstance(outcome, Response) else await_response(outcome, partial(_fault_response, root))
 
     def response(self, operation: str, returned: Iterable[Any] = ()) -> Response:
         """Return the response of an operation: an envelope with one unqualified ``return`` element for each value."""
@@ -83,12 +83,12 @@ class SoapService:
         element = operation_element(root)
         operation = self._operations.get(str(element.tag))
         if operation is None:
-            raise client_fault(f"no operation has the request element {shown(element.tag)}")
+            raise client_fault(f"no operation has the request element {clip(element.tag)}")
         self.description.require_valid(element)
         return operation(element)
 
 
-def _faulted(root: etree._Element, error: Exception) -> Response:
+def _fault_response(root: etree._Element, error: Exception) -> Response:
     if isinstance(error, Problem):
         code = FaultCode.SERVER if error.status >= _SERVERS_FAULT else FaultCode.CLIENT
         error = Fault(code, error.detail, error.extensions)
@@ -123,7 +123,7 @@ class ServiceDescription:
             # libxml2's texts quote only names and values of the message, nothing internal to the robot.
             log: Any = self._schema.error_log
             errors = "; ".join(entry.message for entry in log[:_ERRORS_SHOWN])
-            raise client_fault(f"{shown(element.tag)} is not valid by the XSD: {errors}")
+            raise client_fault(f"{clip(element.tag)} is not valid by the XSD: {errors}")
 
 
 class SoapInterface(Interface):

@@ -9,7 +9,7 @@ from lxml import etree
 from reference_robot.webservices.http.access import Scope
 from reference_robot.webservices.http.messages import Response
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
-from reference_robot.webservices.representation.problems import shown
+from reference_robot.webservices.representation.problems import clip
 from reference_robot.webservices.robot.goals import Goals
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner, PlanQuery
@@ -34,10 +34,10 @@ class SubscribersWebService(SoapService):
         planner: Planner,
     ) -> None:
         returned: dict[str, Callable[[], list[Any]]] = {
-            "GetVelocity": lambda: [velocity.measured()],
+            "GetVelocity": lambda: [velocity.read()],
             "GetSensors": subscribers.sensors,
             "GetNavigationServices": subscribers.navigation_services,
-            "GetGoal": lambda: [goals.followed()],
+            "GetGoal": lambda: [goals.active_goal()],
         }
         operations: dict[str, Operation] = {
             name: partial(self._return_values, name, values) for name, values in returned.items()
@@ -53,7 +53,7 @@ class SubscribersWebService(SoapService):
 
     def _get_pose(self, _wrapper: etree._Element) -> Response:
         """Return the latest odometry; each message is serialized to XML at most once."""
-        return self._odometry.written(self._write_pose)
+        return self._odometry.write_latest(self._write_pose)
 
     async def _get_plan(self, wrapper: etree._Element) -> Response:
         given: dict[str, Any] = {}
@@ -67,5 +67,5 @@ def _finite(name: str, text: str) -> float:
     """Return a schema-valid xs:double as float; raise a Client fault for INF and NaN (contract, REST)."""
     number = float(text)
     if number - number != 0:
-        raise client_fault(f"{name} must be finite, not {shown(text)}")
+        raise client_fault(f"{name} must be finite, not {clip(text)}")
     return number

@@ -41,7 +41,7 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
     adjacent intervals are one stall.
     """
     found: list[Stall] = []
-    for series in _timed(result):
+    for series in _nonempty(result):
         width = result["time_series"]["width_s"]
         medians = [point["p50_ms"] for point in series["points"] if point["p50_ms"] is not None]
         limit = max(_STALL_FLOOR_MS, _STALL_FACTOR * median(medians)) if medians else _STALL_FLOOR_MS
@@ -69,7 +69,7 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
 def timeline(result: Mapping[str, Any]) -> Iterator[Panel]:
     """Yield a panel for each client and operation: median and longest response time over the run."""
     marks = stalls(result)
-    timed = list(_timed(result))
+    timed = list(_nonempty(result))
     for operation, client in dict.fromkeys((s["operation"], s["client"]) for s in timed):
         drawn = [s for s in timed if (s["operation"], s["client"]) == (operation, client)]
         own = [stall for stall in marks if stall.series[:2] == (operation, client)]
@@ -103,7 +103,7 @@ def timeline(result: Mapping[str, Any]) -> Iterator[Panel]:
 
 def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
     interface = series["interface"]
-    points = _thinned([point for point in series["points"] if point["p50_ms"] is not None])
+    points = _thin_out([point for point in series["points"] if point["p50_ms"] is not None])
     colour = COLOUR[interface]
     times = [point["t_s"] for point in points]
     # Different dashes distinguish the two where both colours are printed as the same grey.
@@ -140,14 +140,14 @@ def _draw(panel: Panel, series: Mapping[str, Any]) -> None:
         )
 
 
-def _thinned(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _thin_out(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return at most 240 points: of each group of neighbours the point with the longest request."""
     step = -(-len(points) // _MOST_POINTS) or 1
     groups = (points[start : start + step] for start in range(0, len(points), step))
     return [max(group, key=lambda point: point["max_ms"] or 0.0) for group in groups]
 
 
-def _timed(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+def _nonempty(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     series = result.get("time_series", {}).get("series", [])
     return [item for item in series if any(point["count"] or point["errors"] for point in item["points"])]
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.call_rules import CallRules, Reason, told
+from conformance.api.call_rules import CallRules, Reason, plan_lines
 from conformance.documents.openapi import Operation, read_operations
 
 _GOTO = Operation("goTo", "POST", "/move/goto", tags=("move",))
@@ -59,21 +59,23 @@ def test_decisions(operation, rules, reason):
 
 
 def test_a_run_says_what_it_calls_and_why():
-    lines = told(CallRules(("/move/*", "/gone"), ("/state/*",)), [_GOTO, _READ, Operation("", "PUT", "/a")])
+    lines = plan_lines(CallRules(("/move/*", "/gone"), ("/state/*",)), [_GOTO, _READ, Operation("", "PUT", "/a")])
     assert lines[0] == "Calls 1 of 3 operations; state is changed by 1; not called: 2."
     assert [line.split(":")[-1].strip() for line in lines[1:]] == ["POST /move/goto", "PUT /a", "GET /state/{id}"]
-    assert CallRules(("/move/*", "/gone")).unused([_GOTO]) == ["/gone"]
+    assert CallRules(("/move/*", "/gone")).unused_patterns([_GOTO]) == ["/gone"]
 
 
 def test_what_the_motion_map_sends_is_called():
     moves = Operation("", "PUT", "/goal/{east}")
-    lines = told(CallRules((), ("/never",)), [moves, Operation("", "PUT", "/never")], ["PUT /goal/{x}", "PUT /never"])
+    lines = plan_lines(
+        CallRules((), ("/never",)), [moves, Operation("", "PUT", "/never")], ["PUT /goal/{x}", "PUT /never"]
+    )
     assert lines[0] == "Calls 1 of 2 operations; state is changed by 1; not called: 1."
     assert lines[1] == "  Calls 1, because the map in the statement names it: PUT /goal/{east}"
 
 
 def test_what_is_held_back_for_its_name_is_told_with_the_option_that_names_it():
-    (line,) = told(CallRules(("*",)), [Operation("", "GET", "/lua/firmware")])[1:]
+    (line,) = plan_lines(CallRules(("*",)), [Operation("", "GET", "/lua/firmware")])[1:]
     assert line.endswith("allows it, as in --call 'GET /lua/firmware': GET /lua/firmware")
 
 

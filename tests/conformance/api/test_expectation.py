@@ -60,8 +60,8 @@ def test_a_closed_connection_is_right_only_where_that_is_allowed(judge):
 
 def test_a_response_may_be_right_for_another_reason(judge):
     assert expect(judge, _ID, _exchange(302)).status(404, or_else=True)
-    assert expect(judge, _ID, _CLOSED).taken("the body is chunked", or_else=True)
-    assert expect(judge, _ID, _exchange(409)).taken("the body is chunked")
+    assert expect(judge, _ID, _CLOSED).accepts("the body is chunked", or_else=True)
+    assert expect(judge, _ID, _exchange(409)).accepts("the body is chunked")
 
 
 def test_header_fields_and_media_types(judge):
@@ -79,6 +79,6 @@ def test_a_finding_on_soap_describes_the_message(judge):
     )
     answer = read_exchange(_exchange(500, ("Content-Type", "text/xml"), body=body))
     assert expect_answer(judge, _ID, answer).fault("Client", "the body is empty")
-    assert not expect_answer(judge, _ID, answer).accepted("the message is valid")
+    assert not expect_answer(judge, _ID, answer).succeeds("the message is valid")
     assert _finding(judge).expected == "status 2xx with a SOAP message when the message is valid"
     assert "fault Client: 'no'" in _finding(judge).observed

@@ -6,7 +6,7 @@ from urllib.parse import urlencode
 import pytest
 from small_device import answers, described
 
-from conformance.api.rest.listing import listed
+from conformance.api.rest.listing import items_of
 from conformance.checkers.lists import is_before
 from conformance.checkers.rest import RestCheckers
 from conformance.contract.described import write_described_pack
@@ -171,7 +171,7 @@ ENVELOPES = {
 
 @pytest.mark.parametrize("envelope", ENVELOPES)
 def test_a_list_is_found_in_its_envelope(envelope, tmp_path):
-    assert listed(ENVELOPES[envelope](VALVES)) == VALVES
+    assert items_of(ENVELOPES[envelope](VALVES)) == VALVES
     assert Seen(tmp_path, [_whole("limit")], ENVELOPES[envelope]).read(VALVES, limit=1).broken == {LIMIT}
 
 

@@ -31,7 +31,7 @@ def not_met(*attempts):
     contract = Contract.load()
     judges = RestCheckers(contract, BASE)
     broken = {case.requirement for attempt in attempts for case in judges(attempt) if not case.holds}
-    names = {**contract.renamed, **twins(contract.ledger)}
+    names = {**contract.ids_by_alias, **twins(contract.ledger)}
     return {names.get(id_, id_) for id_ in broken} & contract.ledger.keys()
 
 

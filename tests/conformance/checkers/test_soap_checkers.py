@@ -23,14 +23,14 @@ def broken(body: str, status: int, media_type: str = XML, version: str = "HTTP/1
     judge = Judge(Contract.load().ledger)
     observer = CheckerListener(judge, [SoapCheckers({URL: {f"{{{SPACE}}}GetGoalResponse"}})])
     response = Response(status, (("Content-Type", media_type),), body.encode(), 1.0, version)
-    observer.answered(Exchange(Request("POST", URL), response))
+    observer.on_response(Exchange(Request("POST", URL), response))
     return {id_.rpartition("/")[2] for id_, evidence in judge.evidence.items() if evidence.findings}
 
 
 def present(name: str) -> str:
     """Return the present name of a requirement that was merged into another one."""
     id_ = f"soap-basic-profile/{name}"
-    return Contract.load().renamed.get(id_, id_).rpartition("/")[2]
+    return Contract.load().ids_by_alias.get(id_, id_).rpartition("/")[2]
 
 
 @pytest.mark.parametrize(("body", "status"), [(RESPONSE, 200), (FAULT, 500), ("", 202)])

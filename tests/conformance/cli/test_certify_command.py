@@ -62,7 +62,7 @@ def test_what_the_run_was_given_stands_in_the_result(tmp_path, closed_port):
     _, result = _certify(tmp_path, str(statement), "--baseline", str(baseline))
     assert result["digests"]["statement"] == f"sha256:{hashlib.sha256(statement.read_bytes()).hexdigest()}"
     assert result["baseline"] == {"digest": f"sha256:{hashlib.sha256(b'').hexdigest()}"}
-    assert result["requirement_set"] == current(Contract.load(), Contract.load().ledger).told
+    assert result["requirement_set"] == current(Contract.load(), Contract.load().ledger).facts
     openapi = (CONTRACT_DIR / "openapi.yaml").read_bytes()
     assert result["digests"]["contract"]["openapi.yaml"] == f"sha256:{hashlib.sha256(openapi).hexdigest()}"
 
@@ -213,6 +213,6 @@ def test_the_suite_runs_in_somebody_elses_project(tmp_path):
 
 def test_a_frozen_set_is_what_a_run_is_scored_by(tmp_path, closed_port):
     _, result = _certify(tmp_path, "--rest", closed_port, "--requirements", "1.2")
-    assert result["requirement_set"] == load_set(Contract.load(), "1.2").told
+    assert result["requirement_set"] == load_set(Contract.load(), "1.2").facts
     done, _ = _certify(tmp_path, "--rest", closed_port, "--requirements", "0.9")
     assert (done.returncode, "'0.9'" in done.stderr) == (2, True), done.stderr

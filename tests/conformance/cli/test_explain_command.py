@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from conformance.cli.explanation import explained, known
+from conformance.cli.explanation import explanation_of, ledger_of
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, sources_of, topic_of, topics
 from roaas import main
 
 CONTRACT = Contract.load()
-LEDGER = known(CONTRACT)
+LEDGER = ledger_of(CONTRACT)
 LAMP = Path(__file__).parents[3] / "examples/lamp"
 
 
@@ -71,7 +71,7 @@ def test_the_shell_completes_commands_and_ids(words):
 
 def test_every_requirement_has_advice_and_a_check():
     for id_, item in LEDGER.items():
-        explanation = explained(CONTRACT, item)
+        explanation = explanation_of(CONTRACT, item)
         assert explanation.topic is not None, id_
         assert explanation.checks or item.untestable, id_
 

@@ -16,7 +16,7 @@ from toy_server import Handler, server_of
 from conformance.contract.pack import Contract
 from conformance.engine.permission import moves
 from conformance.engine.replay import Outcome, longest_s, replay
-from conformance.engine.resending import read_request, written
+from conformance.engine.resending import as_json, read_request
 from conformance.transport.client import Connection
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
@@ -56,7 +56,7 @@ def _result(tmp_path, base, methods=("PUT", "GET")):
         for index, method in enumerate(methods)
     ]
     failure = {"message": "status 500", "response": {"status": 500, "headers": {}, "body": None}}
-    found = [{"id": "http/declared-status", "failures": [failure | {"sequence": written(sent)}]}]
+    found = [{"id": "http/declared-status", "failures": [failure | {"sequence": as_json(sent)}]}]
     return _written(tmp_path, [*found, {"id": "http/head", "failures": []}], target={"subscribers_endpoint": None})
 
 
@@ -91,7 +91,7 @@ def test_what_an_answer_shows_by_itself_is_judged_as_in_the_run(robot, tmp_path)
     base = robot.url
     request = Request("GET", f"{base}/robot/pose/", (("Host", "x"), ("Accept", "image/png")))
     response = {"status": 406, "headers": {"Content-Length": "0"}, "body": None}
-    failure = {"message": "Date: None", "response": response, "sequence": written([Sent(0.0, request)])}
+    failure = {"message": "Date: None", "response": response, "sequence": as_json([Sent(0.0, request)])}
     found = [{"id": "http/date", "failures": [failure]}]
     _written(tmp_path, found, target={"rest": base}, seed=0, effort="quick")
     (tmp_path / "robot.toml").write_text(f'[endpoints]\nrest = "{base}"\n', encoding="utf-8")
@@ -128,7 +128,7 @@ def test_the_token_goes_to_no_address_that_the_user_did_not_name(robot, tmp_path
 
 
 def _moves(method="GET", headers=(), body=b"", raw=None, path="/"):
-    (item,) = written([Sent(0.0, Request(method, f"http://r2{path}", headers, body, raw))])
+    (item,) = as_json([Sent(0.0, Request(method, f"http://r2{path}", headers, body, raw))])
     return moves({"sequence": [item]})
 
 
@@ -175,7 +175,7 @@ def test_what_moves_is_told_by_what_is_sent():
     ],
 )
 def test_a_sequence_that_no_run_wrote_is_refused(part):
-    (item,) = written([Sent(0.0, Request("GET", "http://r2/"))])
+    (item,) = as_json([Sent(0.0, Request("GET", "http://r2/"))])
     with pytest.raises(ValueError, match=r"cannot be a part|cut short|Error -3"):
         read_request({**item, **part})
 
@@ -210,7 +210,7 @@ def test_a_file_that_is_no_result(tmp_path):
 @pytest.mark.parametrize("body", [b"", b"\xff\x00", b" " * 10_000_000])
 def test_a_request_is_read_as_it_was_written(body):
     request = Request("PUT", "http://r2/", (("A", "b"),), body, b"RAW" if not body else None)
-    (item,) = written([Sent(3.0, request)])
+    (item,) = as_json([Sent(3.0, request)])
     assert (item["at_s"], read_request(item)) == (0.0, request)
 
 
@@ -226,7 +226,7 @@ class _Silent(Handler):
 def test_a_replay_ends_when_its_time_is_over(at_s):
     over = threading.Event()
     with server_of(_Silent, asked=[], over=over) as device:
-        sequence = [item | {"at_s": at_s} for item in written([Sent(0.0, Request("GET", device.url, (), b""))] * 500)]
+        sequence = [item | {"at_s": at_s} for item in as_json([Sent(0.0, Request("GET", device.url, (), b""))] * 500)]
         failure = {"message": "status 500", "response": {"status": 500}, "sequence": sequence}
         began = time.monotonic()
         came = replay("http/x", failure, Connection(timeout_s=0.05), until=began + 1)

@@ -8,7 +8,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from processes import ended
 
-from conformance.commandline.extras import EXTRAS, lacking, told
+from conformance.commandline.extras import EXTRAS, lacking, missing_extra
 
 OPTIONAL = sorted({module for modules in EXTRAS.values() for module in modules})
 
@@ -39,13 +39,13 @@ def test_all_is_everything_but_ros_and_the_tools_of_developers():
 def test_a_missing_module_is_named_with_the_command_that_installs_it(monkeypatch):
     assert lacking("load", "'roaas load'") is None
     monkeypatch.setitem(sys.modules, "scipy", None)
-    assert lacking("load", "'roaas load'") == told("scipy.stats", "'roaas load'")
-    assert told("scipy", "'roaas load'") == (
+    assert lacking("load", "'roaas load'") == missing_extra("scipy.stats", "'roaas load'")
+    assert missing_extra("scipy", "'roaas load'") == (
         "'roaas load' needs the Python module 'scipy', which is not installed: pip install 'roaas[load]'"
     )
-    assert told("zeep", "it").endswith("pip install 'roaas[soap]'")
-    assert told("nobodys_module", "it") is None
-    assert told(None, "it") is None
+    assert missing_extra("zeep", "it").endswith("pip install 'roaas[soap]'")
+    assert missing_extra("nobodys_module", "it") is None
+    assert missing_extra(None, "it") is None
 
 
 @pytest.mark.parametrize(

@@ -56,9 +56,9 @@ def test_rules_of_the_basic_profile_for_descriptions(name):
 
 def test_an_id_that_went_is_an_alias_of_the_requirement_that_asks_it_now():
     """Nothing that was asked by 1.1 is lost: each id is there, or an alias."""
-    assert set(load_set(CONTRACT, "1.2").requirements) <= set(LEDGER) | set(CONTRACT.renamed)
-    assert set(CONTRACT.renamed.values()) <= set(LEDGER)
-    assert not set(CONTRACT.renamed) & set(LEDGER)
+    assert set(load_set(CONTRACT, "1.2").requirements) <= set(LEDGER) | set(CONTRACT.ids_by_alias)
+    assert set(CONTRACT.ids_by_alias.values()) <= set(LEDGER)
+    assert not set(CONTRACT.ids_by_alias) & set(LEDGER)
     assert Contract.load(only=("rest-delivery/put-body",)).ledger.keys() == {"rest-delivery/put"}
 
 
@@ -94,7 +94,7 @@ def test_a_folder_that_describes_nothing(tmp_path):
 def test_a_class_that_a_pack_does_not_name_is_within_another(tmp_path):
     moved = [item for item in LEDGER.values() if item.id.startswith("web-server/")]
     assert {item.classes for item in moved} == {("http",)}
-    assert all(CONTRACT.renamed[f"http/{item.id.partition('/')[2]}"] == item.id for item in moved)
+    assert all(CONTRACT.ids_by_alias[f"http/{item.id.partition('/')[2]}"] == item.id for item in moved)
     assert CONTRACT.requirement("web-server/host-invalid") is None, "no pack gets a new one without naming the class"
     described = Contract.load(write_described_pack(tmp_path, {"paths": {}}, {"paths": {}}))
     assert {item.classes for id_, item in described.ledger.items() if id_ in {one.id for one in moved}} == {

@@ -55,7 +55,7 @@ def test_the_text_agrees_with_what_judges():
     assert f"Version {Contract.load().version}." in TEXT
     assert Contract.load().openapi["info"]["version"] == Contract.load().version
     assert all(f"| `{name}` |" in SECTIONS["classes"].text for name in Contract.load().classes)
-    silent = DeclaredLimits().resolved()
+    silent = DeclaredLimits().resolve()
     assert "limits of 0.7 m/s and 2.5 rad/s" in SECTIONS["statement"].text.replace("\n", " ")
     assert (silent.linear_m_s, silent.angular_rad_s, silent.settle_s) == (0.7 / 2, 2.5 / 2, 2.0)
 

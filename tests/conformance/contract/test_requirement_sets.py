@@ -3,7 +3,7 @@
 import pytest
 
 from conformance.contract.pack import Contract
-from conformance.contract.requirement_sets import RequirementSetError, current, frozen, judged_by, load_set, names
+from conformance.contract.requirement_sets import RequirementSetError, current, frozen_form, judged_by, load_set, names
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.verdict.evidence import Judge
 from conformance.verdict.verdicts import ClassValue, Value, class_verdicts, score, verdict_of
@@ -16,7 +16,7 @@ LEDGER = CONTRACT.ledger
 def test_ids_levels_and_texts_of_a_set_stay_as_they_were(name):
     """Before a release that freezes the set: `python -m conformance.contract.freeze NAME`. After it: never."""
     kept = load_set(CONTRACT, name).requirements
-    assert {id_: frozen(LEDGER[id_]) for id_ in kept if id_ in LEDGER} == dict(kept)
+    assert {id_: frozen_form(LEDGER[id_]) for id_ in kept if id_ in LEDGER} == dict(kept)
 
 
 def test_a_new_id_changes_neither_the_digest_nor_what_is_in_a_set():

@@ -27,7 +27,7 @@ _GOOD_2 = {"/a/{b}": _get(parameters=[{"name": "b", "in": "path", "required": Tr
 @pytest.mark.parametrize("version", ["3.0.3", "3.1.0", "3.1.1"])
 def test_a_valid_description_has_no_fault(version):
     document = _document(_GOOD, version)
-    assert faults.invalid(document) == faults.unresolved(document) == faults.repeated_ids(document) == []
+    assert faults.invalid(document) == faults.dead_references(document) == faults.repeated_ids(document) == []
     assert faults.alike_paths(document) == faults.unfitting_examples(document) == []
 
 
@@ -56,7 +56,7 @@ def test_an_invalid_description_says_where(paths, version, found):
 
 def test_references_that_lead_nowhere():
     document = _document({"/a": _get(parameters=[{"$ref": "#/gone"}])}, x={"example": {"$ref": "#/not/one"}})
-    assert faults.unresolved(document) == ["#/gone"]
+    assert faults.dead_references(document) == ["#/gone"]
 
 
 def test_ids_and_templates_occur_once():

@@ -5,7 +5,7 @@ import pytest
 from conformance.documents.openapi import Body
 from conformance.documents.parameter_reading import (
     decoded_path,
-    judged,
+    judge_texts,
     multipart_verdict,
     query_verdicts,
     urlencoded_verdict,
@@ -60,7 +60,7 @@ _BODY = Body(
 )
 def test_paths(style, explode, schema, texts):
     item = Parameter("p", "path", required=True, schema=schema, style=style, explode=explode)
-    assert {text: judged(item, [text], decoded_path) for text in texts} == texts
+    assert {text: judge_texts(item, [text], decoded_path) for text in texts} == texts
 
 
 @pytest.mark.parametrize(
@@ -108,9 +108,9 @@ def test_what_is_written_is_read_back_as_valid(schema, value, explode):
         item = Parameter("p", "path", required=True, schema=schema, style=style, explode=explode)
         is_open = style == "label" and not explode and schema is not _WHOLE
         expected = "unclear" if is_open else "valid"
-        assert judged(item, [path_text(value, style, "p", explode=explode)], decoded_path) == expected
+        assert judge_texts(item, [path_text(value, style, "p", explode=explode)], decoded_path) == expected
     header = Parameter("p", "header", required=True, schema=schema, explode=explode)
-    assert judged(header, [header_text(value, explode=explode)]) == "valid"
+    assert judge_texts(header, [header_text(value, explode=explode)]) == "valid"
     for style in ("form",) if explode else ("form", "pipeDelimited", "spaceDelimited", "tabDelimited"):
         item = Parameter("p", "query", required=True, schema=schema, style=style, explode=explode)
         query = query_text(query_pairs("p", value, style, explode=explode))

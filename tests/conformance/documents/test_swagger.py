@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.rest.inputs import Inputs, written
+from conformance.api.rest.inputs import Inputs, request_of
 from conformance.documents.openapi import read_operations
 from conformance.documents.swagger import as_openapi_3
 
@@ -44,7 +44,7 @@ def test_forms(more, consumes, media_type, sent):
     item = {"name": "n", "in": "formData", "type": "array", "items": _TEXT, "required": True, **more}
     operation = _operation({"parameters": [item], "consumes": consumes})
     assert (list(operation.bodies), operation.body_required) == ([media_type], True)
-    assert written(operation, Inputs(body={"n": ["a", "b"]}, media_type=media_type)).body == sent
+    assert request_of(operation, Inputs(body={"n": ["a", "b"]}, media_type=media_type)).body == sent
 
 
 def test_a_file_is_sent_as_multipart():

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from conformance.engine.certification import certify
-from conformance.engine.interruption import remembered
+from conformance.engine.interruption import note_signals
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.verdict.run import Run
 
@@ -27,7 +27,7 @@ def test_an_interruption_that_is_swallowed_is_remembered(number, monkeypatch):
     monkeypatch.setattr(sys, "unraisablehook", lambda args: ignored.append(args.exc_type))
     run = Run()
     before = signal.getsignal(number)
-    with remembered(run):
+    with note_signals(run):
         dying = _Finalized(number)
         del dying
         gc.collect()

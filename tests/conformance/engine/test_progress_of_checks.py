@@ -14,7 +14,7 @@ class Terminal(io.StringIO):
 
 
 def robot():
-    run = SimpleNamespace(judge=SimpleNamespace(refuted=dict), contract=SimpleNamespace(ledger={}))
+    run = SimpleNamespace(judge=SimpleNamespace(failure_counts=dict), contract=SimpleNamespace(ledger={}))
     return SimpleNamespace(run=run, connection=SimpleNamespace(sent=7))
 
 

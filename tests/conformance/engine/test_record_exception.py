@@ -31,7 +31,7 @@ def test_what_was_not_judged_yet_is_told_of():
 
 def test_when_all_were_judged_it_is_told_of_all():
     assert all(broken(ValueError("no"), *_IDS).judge.evidence[id_].errors for id_ in _IDS)
-    assert set(broken(_SILENT, *_IDS).judge.refuted()) == set(_IDS)
+    assert set(broken(_SILENT, *_IDS).judge.failure_counts()) == set(_IDS)
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ def test_a_slow_robot_is_asked_less_often_for_it(robot_of):
 def test_an_interface_that_hangs_is_put_down(robot_of):
     robot = robot_of(5.0)
     assert "no response" in robot.run.unreachable[Interface.REST]
-    assert not robot.reached
+    assert not robot.was_reached
 
 
 def test_what_hung_at_first_is_sent_again_by_the_checks(robot_of):

@@ -7,7 +7,7 @@ import pytest
 from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import judged_by, load_set
-from conformance.engine.suite import JUDGING, contract_digests, known, suite_digest
+from conformance.engine.suite import JUDGING, contract_digests, suite_digest, suite_facts
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.verdict.verdicts import holds_back
 
@@ -67,12 +67,12 @@ def test_a_pack_without_frozen_sets_has_the_one_of_its_ledger(tmp_path):
     contract = Contract.load(tmp_path / "pack")
     scored = judged_by(contract, None)
     assert scored is not None
-    assert known(str(contract.directory))["requirement_sets"] == {"unfrozen": scored.digest}
-    assert "1.2" in known()["requirement_sets"]
+    assert suite_facts(str(contract.directory))["requirement_sets"] == {"unfrozen": scored.digest}
+    assert "1.2" in suite_facts()["requirement_sets"]
 
 
 def test_a_verifier_knows_the_whole_ledger():
-    contract, found = Contract.load(), known()
+    contract, found = Contract.load(), suite_facts()
     assert list(found["ledger"]) == list(contract.ledger)
     decides = {id_ for id_, item in found["ledger"].items() if item["decides"]}
     assert decides == {id_ for id_, item in contract.ledger.items() if holds_back(item)}

@@ -49,7 +49,7 @@ def test_a_checker_that_fails_ends_no_request_and_no_other_checker():
 
     judge = Judge(Contract.load().ledger)
     for _ in range(3):
-        CheckerListener(judge, [fails, sees]).answered(_exchange("/x?a=1"))
+        CheckerListener(judge, [fails, sees]).on_response(_exchange("/x?a=1"))
     assert len(seen) == 3
     assert list(judge.faults) == ["GET /x: not judged: ValueError: pattern"]
     for number in range(39):

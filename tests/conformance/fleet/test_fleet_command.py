@@ -153,6 +153,6 @@ def test_who_may_be_trusted_follows_from_a_whole_run_with_nothing_accepted():
     classes = {"http": "pass", "safety": "pass", "describe": "fail", "equivalence": "inconclusive"}
     requirements = [{"class": "http", "expected_failure": {}}, {"class": "safety"}]
     whole = result(Outcome.NOT_CONFORMANT, 1, classes=classes, requirements=requirements, interrupted=False)
-    assert whole.trusted == ["safety"]
+    assert whole.trusted_classes == ["safety"]
     part = result(Outcome.GIVEN_UP, 130, classes=classes, requirements=requirements, interrupted=True)
-    assert (part.trusted, result(Outcome.GIVEN_UP).trusted) == ([], [])
+    assert (part.trusted_classes, result(Outcome.GIVEN_UP).trusted_classes) == ([], [])

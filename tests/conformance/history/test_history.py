@@ -79,9 +79,9 @@ def test_every_client_and_socket_is_recorded(tmp_path):
     assert {one.span for one in together} == {"together"}
     assert len({one.connection for one in (first, by_hand, half, *together)}) == 5
     assert len({one.client for one in (first, *together)}) == 3
-    assert b"200 OK" in by_hand.octets.kept
+    assert b"200 OK" in by_hand.octets.content
     assert (half.whole, half.came, half.outcome.problem) == (False, None, "the suite reset the connection")
-    assert (moved.came.status, fetched.came.status, fetched.came.body.kept) == (302, 200, b'{"a": 1}')
+    assert (moved.came.status, fetched.came.status, fetched.came.body.content) == (302, 200, b'{"a": 1}')
     for one in (first, second, by_hand, *together):
         assert 0 < one.sent_s <= one.first_s <= one.ended_s <= ended.at_s
     assert first.outcome.response.body == b'{"a": 1}'
@@ -126,7 +126,7 @@ def test_secrets_are_variables_in_every_part(tmp_path):
     events = written(tmp_path, Passage(request, 1, 1, 1, began, began, began, 1.0, response, secret.decode()))
     plain = gzip.decompress((tmp_path / HISTORY_NAME).read_bytes())
     assert b"kep7" not in plain
-    assert events[1].came.body.kept == b"$ROAAS_TOKEN\xff"
+    assert events[1].came.body.content == b"$ROAAS_TOKEN\xff"
     assert events[1].request.raw == b"$ROAAS_TOKEN\xff"
 
 
@@ -146,7 +146,7 @@ def test_credentials_are_never_written(tmp_path):
 
 @pytest.mark.parametrize("octets", [b"", b"{}", b"\x00\xff", "ä\u2028".encode(), b"a" * (1 << 20)])
 def test_a_body_comes_back_bit_for_bit(octets):
-    assert Octets.of(octets).kept == octets
+    assert Octets.of(octets).content == octets
 
 
 def test_of_a_long_body_the_hash_is_kept(tmp_path):

@@ -176,7 +176,7 @@ def _panel(part, value, axis, edges, left, title, words):
     wanted = "".join(
         f'<path d="M{x(one.sent):.1f} {y(one.targets[axis]):.1f}H{x(until):.1f}" stroke="#888" stroke-dasharray="4 3"/>'
         for one, until in zip(commands, ends, strict=bool(commands))
-        if hasattr(part, "start") and axis in one.targets and one.accepted
+        if hasattr(part, "start") and axis in one.targets and one.is_ok
     )
     marks = "".join(f'<path d="M{tick} {_HEIGHT - 4}v-8" stroke="#888"/>' for tick in sorted(ticks))
     said = [

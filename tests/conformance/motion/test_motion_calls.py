@@ -11,7 +11,7 @@ from serving_apps import serving_app
 from turntable import Turntable
 from winch import Winch
 
-from conformance.scenarios.motion.templates import filled
+from conformance.scenarios.motion.templates import fill
 from conformance.statement.motion_calls import covers, named_by, written_out
 
 _LABELS = ["PUT /robots/{id}/velocity", "GET /robots/{id}", "GET /robots/status", "PUT /goal/{x}/{y}"]
@@ -51,9 +51,9 @@ def test_values_and_directions_are_written_out():
     }
     made = written_out(given, {"id": ("a b",), "x": (1,)})
     assert made["state"]["read"] == "GET /robots/a%20b/{x}", "the name of an axis stays"
-    assert filled(made["velocity"]["body"], {"x": -0.5}) == {"v": 0.5, "way": {"d": 1}}
-    assert filled(made["velocity"]["body"], {"x": 0.0}) == {"v": 0.0, "way": {"d": 0}}
-    assert filled(made["velocity"]["body"], {"x": "far"}) == {"v": "far", "way": {"d": 0}}
+    assert fill(made["velocity"]["body"], {"x": -0.5}) == {"v": 0.5, "way": {"d": 1}}
+    assert fill(made["velocity"]["body"], {"x": 0.0}) == {"v": 0.0, "way": {"d": 0}}
+    assert fill(made["velocity"]["body"], {"x": "far"}) == {"v": "far", "way": {"d": 0}}
 
 
 def test_a_turntable_with_ids_and_forms_and_errors_inside_a_200_is_not_blamed(tmp_path):

@@ -231,7 +231,7 @@ def _simulated(body_type, noise=0.0):
     body = body_type(rover.LIMITS, clock.now, clock.sleep, noise)
     api = Api(Rover(body), clock, lambda: 0.002)
     plan = plan_of(read_operations(rover.DESCRIPTION), "PUT /velocity", None, CallRules())
-    motion = map_of("\n".join(VelocityFinder(api, Binding(api), plan, clock).found().lines))
+    motion = map_of("\n".join(VelocityFinder(api, Binding(api), plan, clock).find().lines))
     mapped = MappedDevice(api, motion, clock, Binding(api))
     given = {"mapped": mapped, "effort": Effort("quick"), "run": Run(), "motion": motion}
     trace = velocities.play(**{name: given[name] for name in velocities.fixtures})
@@ -289,7 +289,7 @@ def test_an_arm_that_moves_for_a_client_without_its_lease_is_blamed(wants):
     api = Leasing(Arm(Body(LIMITS, clock.now, clock.sleep)), clock, lambda: 0.002)
     api.wants = wants
     motion = map_of(f'{MOVES}[motion.lease]\nacquire = "POST /lease"\ntoken = "/token"\nheader = "X-Lease"\n')
-    with patch.object(attempts, "vanished", lambda *_: iter(())):
+    with patch.object(attempts, "send_in_parts", lambda *_: iter(())):
         trace = attempts.attempts_at_rest.play(mapped=MappedDevice(api, motion, clock, Binding(api)))
     cases = cases_of(unauthorised_still, trace, {"motion": motion})
     assert cases

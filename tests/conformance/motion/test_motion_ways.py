@@ -90,7 +90,7 @@ def test_what_turns_is_apart_by_the_shorter_way(one, other, apart):
 @pytest.mark.parametrize(("unit", "moved"), [("deg", 9.0), ("°", 9.0), ("rad", 351 % math.tau - math.tau), ("m", 351)])
 def test_an_angle_that_begins_anew_has_not_moved_a_whole_turn(unit, moved):
     """A telescope that goes from 359 degrees to 8 has moved by 9, whether its map says `angle` or not."""
-    assert Axis("/a", (10, 50), unit=unit).moved(8.0, 359.0) == pytest.approx(abs(moved))
+    assert Axis("/a", (10, 50), unit=unit).distance(8.0, 359.0) == pytest.approx(abs(moved))
 
 
 def test_a_unit_without_a_whole_turn_is_told():

@@ -12,7 +12,7 @@ from conformance.scenarios.ros.definition import Definition, put_at, shape_of, v
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker
 from conformance.scenarios.ros.topics import Burst, Sent
-from conformance.scenarios.ros.web import changed, differences, document_of, equal, written
+from conformance.scenarios.ros.web import changes, differences, document_for, document_of, equal
 from conformance.statement.ros_map import Body, Publishes, RosMap
 from ros_probe.values import described, message_of, plain
 
@@ -30,9 +30,9 @@ def test_each_sample_is_a_message_and_what_is_written_of_it_is_right(name):
     definition, body = Definition(name, described(name)), Body(at="/data")
     for sample in Maker(definition, 0).samples(12, large=False):
         whole = plain(message_of(name, sample.value))
-        assert equal(whole, sample.value), list(changed(whole, sample.value))
+        assert equal(whole, sample.value), list(changes(whole, sample.value))
         for ros in MAPS:
-            octets = json.dumps(written(whole, definition, body, ros)).encode()
+            octets = json.dumps(document_for(whole, definition, body, ros)).encode()
             assert differences(document_of(octets), whole, definition, body, ros) == [], sample.what
 
 
@@ -52,7 +52,7 @@ SEQUENCES = Definition("test_msgs/msg/UnboundedSequences", described("test_msgs/
 
 def _differs(field, own, text, ros, definition=BASIC):
     whole = plain(message_of(definition.root, {field: own}))
-    right = written(whole, definition, Body(), ros)
+    right = document_for(whole, definition, Body(), ros)
     right.pop(field)
     octets = (json.dumps(right)[:-1] + f', "{field}": {text}}}').encode()
     return [(one.web, one.ros) for one in differences(document_of(octets), whole, definition, Body(), ros)]
@@ -117,7 +117,7 @@ def test_names_that_differ_are_mapped_both_ways():
     body, ros = Body(at="/v", fields={"/x": "/linear/x", "/turn": "/angular/z"}, body={"mode": 1}), RosMap({})
     definition = Definition("geometry_msgs/msg/Twist", described("geometry_msgs/msg/Twist"))
     whole = plain(message_of(definition.root, {"linear": {"x": 0.5}, "angular": {"z": 2.0}}))
-    assert written(whole, definition, body, ros) == {"mode": 1, "v": {"x": 0.5, "turn": 2.0}}
+    assert document_for(whole, definition, body, ros) == {"mode": 1, "v": {"x": 0.5, "turn": 2.0}}
     right = document_of(b'{"v": {"x": 0.5, "turn": 2}}')
     assert differences(right, whole, definition, body, ros) == []
     missing = differences(document_of(b'{"v": {"x": 0.5}}'), whole, definition, body, ros)

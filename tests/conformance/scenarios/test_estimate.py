@@ -39,7 +39,7 @@ def described(tmp_path_factory):
             statement=empty_statement(contract),
             contract=contract,
             claims=claims or tuple(contract.classes),
-            effort=Effort(effort).seen(usual_ms),
+            effort=Effort(effort).slowed_to(usual_ms),
         )
         return estimate(run, operations_of(contract))
 

@@ -47,7 +47,7 @@ def _exchange(status=200, body=b"1", target="/lamp?level=1", fields=()):
 
 def test_different_responses_to_valid_requests_are_kept_once(api, kept):
     for exchange in (_exchange(), _exchange(), _exchange(418), _exchange(body=b"null"), _exchange(418)):
-        kept.answered(exchange)
+        kept.on_response(exchange)
     assert [(one.operation, one.status) for one in others.play(api, kept).probes] == [
         ("GET /lamp", s) for s in (200, 418, 200)
     ]
@@ -66,22 +66,22 @@ def test_different_responses_to_valid_requests_are_kept_once(api, kept):
     ],
 )
 def test_a_request_that_may_be_refused_is_not_kept(kept, odd):
-    kept.answered(_exchange(418, **odd))
+    kept.on_response(_exchange(418, **odd))
     assert kept.probes == []
 
 
 def test_what_a_scenario_records_or_no_survey_saw_working_is_not_kept(api, kept):
     api.is_recorded = True
-    kept.answered(_exchange(418))
+    kept.on_response(_exchange(418))
     api.is_recorded = False
     api.working.clear()
-    kept.answered(_exchange(418))
+    kept.on_response(_exchange(418))
     assert kept.probes == []
 
 
 @pytest.mark.parametrize(("kind", "number"), [(NoAnswer.CLOSED, 1), (NoAnswer.REFUSED, 0), (NoAnswer.TIMEOUT, 0)])
 def test_a_closed_connection_is_kept(kept, kind, number):
-    kept.unanswered(Unanswered(_exchange().request, "nothing came", kind))
+    kept.on_no_response(Unanswered(_exchange().request, "nothing came", kind))
     assert len(kept.probes) == number
 
 

@@ -9,7 +9,7 @@ from conformance.documents.openapi import Operation
 from conformance.documents.parameters import Parameter
 from conformance.history.events import Sent, read_history
 from conformance.history.writing import HISTORY_NAME
-from conformance.scenarios.drawing import drawn
+from conformance.scenarios.drawing import draw_requests
 from conformance.verdict.effort import Effort
 
 _OPERATIONS = {
@@ -45,7 +45,7 @@ def test_no_value_is_generated_that_the_survey_has_sent_as_allowed_or_forbidden(
 def test_no_odd_value_is_sent_that_was_sent_as_allowed_or_forbidden(schema):
     operation = Operation("", "GET", "/a", (Parameter("q", "query", schema=schema, required=False),))
     usual, values = Inputs(), Values()
-    valid, invalid, odd = drawn(operation, usual, values, Effort("standard"), 1)
+    valid, invalid, odd = draw_requests(operation, usual, values, Effort("standard"), 1)
     assert odd
     assert not [one for one in odd if repr(one.inputs) in {repr(other.inputs) for other in (*valid, *invalid)}]
 

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from conformance.packs.table1.scenarios.trace import shown
+from conformance.packs.table1.scenarios.trace import rule_on
 from conformance.scenarios.collecting import is_imported
-from conformance.scenarios.plan import Step, ordered, told
+from conformance.scenarios.plan import Step, order_steps, plan_lines
 from conformance.scenarios.rule import Note, NotTested, record, rule
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, Recordings, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -38,7 +38,7 @@ def test_a_scenario_is_played_once_and_judged_by_each_rule():
 
 
 def test_a_rule_is_collected_where_it_stands_and_not_where_it_is_imported():
-    made_elsewhere = shown("safety/stop", counting)
+    made_elsewhere = rule_on("safety/stop", counting)
     assert not is_imported(is_two, __name__)
     assert not is_imported(made_elsewhere, __name__)
     assert is_imported(is_two, "another")
@@ -85,8 +85,8 @@ def test_the_order_follows_stage_and_ledger_and_keeps_a_scenario_together():
         _step("w", "c/one", played=other),
         _step("first", "c/three", stage=Stage.READING),
     ]
-    assert [one.name for one in ordered(steps, ledger)] == ["first", "w", "y", "x", "z"]
-    assert ordered(reversed(steps), ledger) == ordered(steps, ledger)
-    lines = told(ordered(steps, ledger))
+    assert [one.name for one in order_steps(steps, ledger)] == ["first", "w", "y", "x", "z"]
+    assert order_steps(reversed(steps), ledger) == order_steps(steps, ledger)
+    lines = plan_lines(order_steps(steps, ledger))
     assert lines[0] == "reading:"
     assert "  scenario other: Other. Leaves the device at rest." in lines

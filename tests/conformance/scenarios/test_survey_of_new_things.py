@@ -13,7 +13,7 @@ from toy_server import Handler, server_of
 from conformance.api.rest.inputs import whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.unique import numbered
+from conformance.api.rest.unique import with_number
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.contract.described import write_described_pack
@@ -154,7 +154,7 @@ def test_a_generated_request_names_a_known_thing_and_has_its_tag_and_a_new_key(t
         fields = (("If-Match", ""), ("Idempotency-Key", "0"), ("Content-Type", "application/json"))
         body = json.dumps(device.tubes[1]).encode()
         made = [
-            surveyor.reaching.generated(operations["PUT /tubes/{id}"], Outgoing("PUT", target, fields, body))
+            surveyor.reaching.complete(operations["PUT /tubes/{id}"], Outgoing("PUT", target, fields, body))
             for target in ("/tubes/7", "/tubes/7?a=/7", "/tubes/null")
         ]
         assert [one.target for one in made] == ["/tubes/2", "/tubes/2?a=/7", "/tubes/null"]
@@ -229,7 +229,7 @@ def test_a_write_that_needs_a_condition_is_accepted(tmp_path, wants_tag, headers
     ],
 )
 def test_a_numbered_value_fits_and_differs_from_the_others(schema, value):
-    made = [numbered(schema, value, turn * 7919) for turn in range(12)]
+    made = [with_number(schema, value, turn * 7919) for turn in range(12)]
     assert len({*map(str, made)}) == len(made)
     assert all(fits(schema, one) for one in made)
 
@@ -238,7 +238,7 @@ def test_a_numbered_value_fits_and_differs_from_the_others(schema, value):
 @given(st.text(max_size=12), st.integers(0, 10**9), st.integers(0, 12))
 def test_a_numbered_text_keeps_its_length_and_form(text, number, most):
     schema = {"type": "string", "maxLength": most}
-    made = numbered(schema, text, number)
+    made = with_number(schema, text, number)
     assert made == text or (len(made) == len(text) and fits(schema, made))
     kinds = [(one.isdigit(), one.isascii() and one.isupper()) for one in text]
     assert made == text or len(kinds) == len(made)

@@ -5,7 +5,7 @@ import pytest
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
 from proof.selftest.generated import whens
-from proof.selftest.generated.adversary import composed, kinds_in_requests, unreached
+from proof.selftest.generated.adversary import compose, kinds_in_requests, unreached_names
 from proof.selftest.generated.catalogue import generated_mutants
 from proof.selftest.generated.mutant import Tally
 
@@ -16,7 +16,7 @@ _VELOCITY = b'{"linear": {"x": %b, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y
 
 @pytest.fixture(scope="module")
 def faults():
-    return {one.name: one for one in composed(generated_mutants(CONTRACT), kinds_in_requests(CONTRACT))}
+    return {one.name: one for one in compose(generated_mutants(CONTRACT), kinds_in_requests(CONTRACT))}
 
 
 def _get(**more):
@@ -100,5 +100,5 @@ def test_what_alters_no_message_of_a_run_is_known_beforehand(faults):
     """Try faults on the messages of a run, without their condition where time or other requests decide it."""
     first, late, together = (faults[f"status@{when}:getVelocity:200-500"] for when in ("first", "late", "together"))
     messages = [(_get(), Response(200, list(JSON), _VELOCITY % b"0.5"))] * 20
-    assert unreached([first, late, together], messages) == {late.name}
-    assert unreached([first, late, together], []) == {first.name, late.name, together.name}
+    assert unreached_names([first, late, together], messages) == {late.name}
+    assert unreached_names([first, late, together], []) == {first.name, late.name, together.name}

@@ -52,7 +52,7 @@ def test_no_further_check_begins_once_enough_is_known(tmp_path):
     assert not run.aborted
     run.judge.check("http/date", False, None, "a date")
     assert run.aborted.startswith("http/date has failed")
-    assert run.judge.refuted() == {"http/head": 1, "http/date": 1}
+    assert run.judge.failure_counts() == {"http/head": 1, "http/date": 1}
 
 
 def test_what_is_not_claimed_is_never_enough(tmp_path):

@@ -13,7 +13,7 @@ from proof.mutation.messages import Request, Response
 from proof.selftest.certifying import Outcome
 from proof.selftest.comparison import Comparison, ToolResult
 from proof.selftest.generated import judging
-from proof.selftest.generated.adversary import composed, kinds_in_requests
+from proof.selftest.generated.adversary import compose, kinds_in_requests
 from proof.selftest.generated.catalogue import every_change, generated_mutants, open_places
 from proof.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
 from proof.selftest.generated.mutant import Tally
@@ -66,7 +66,7 @@ def test_the_enumeration_is_whole_and_stable():
 def test_every_open_place_covers_something_and_not_much():
     every = every_change(CONTRACT)
     # Of composed faults, one condition has places of its own.
-    every += tuple(one for one in composed(every, kinds_in_requests(CONTRACT)) if one.operator.endswith("@first"))
+    every += tuple(one for one in compose(every, kinds_in_requests(CONTRACT)) if one.operator.endswith("@first"))
     changes = [(change.name, change.exchange.side, change.exchange.method) for change in every]
     for place in open_places(CONTRACT):
         covered = sum(place.covers(*change) for change in changes)

@@ -9,7 +9,7 @@ import pytest
 
 from conformance.contract.pack import Contract
 from proof.selftest.controls import Case, run_controls
-from proof.selftest.link import LINKS, Direction, Link, linked
+from proof.selftest.link import LINKS, Direction, Link, link_to
 from proof.selftest.variants import VARIANTS
 from proof.table1.selftest import PLAIN
 
@@ -62,7 +62,7 @@ def target():
 @pytest.fixture
 def ends(target):
     """Both ends of one connection over a link."""
-    with linked(QUICK, 1, target.getsockname()) as (address,), socket.create_connection(address, timeout=30) as client:
+    with link_to(QUICK, 1, target.getsockname()) as (address,), socket.create_connection(address, timeout=30) as client:
         robot, _ = target.accept()
         robot.settimeout(60)
         with robot:
@@ -98,7 +98,7 @@ def test_where_nobody_listens_the_connection_is_broken_off(target):
     nowhere = target.getsockname()
     target.close()
     with (
-        linked(QUICK, 1, nowhere) as (address,),
+        link_to(QUICK, 1, nowhere) as (address,),
         socket.create_connection(address, timeout=30) as client,
         pytest.raises(ConnectionResetError),
     ):

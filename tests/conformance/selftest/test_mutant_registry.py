@@ -48,7 +48,7 @@ def test_each_mutant_is_well_made():
 def _is_well_made(mutant):
     """What must kill a mutant is claimed in its run: an id begins with the class that judges any API."""
     claims, ids = classes_of(CONTRACT.ledger, mutant.catches), mutant.catches
-    is_claimed = all(CONTRACT.ledger[CONTRACT.renamed.get(id_, id_)].binds(claims) for id_ in ids)
+    is_claimed = all(CONTRACT.ledger[CONTRACT.ids_by_alias.get(id_, id_)].binds(claims) for id_ in ids)
     is_told = mutant.interface in {"rest", "soap", "both"} and mutant.says.endswith(".") and ids
     can_cut = mutant.incomplete_request is None or callable(mutant.incomplete_request())
     return is_told and is_claimed and set(claims) <= CONTRACT.classes.keys() and callable(mutant.make()) and can_cut

@@ -5,7 +5,7 @@ from lxml import etree
 
 from proof.mutation.changes import SOAP, becomes, page
 from proof.mutation.messages import Request
-from proof.mutation.xml_trees import each, named, says, tree
+from proof.mutation.xml_trees import each, find_named, says, tree
 from proof.table1.mutants import soap_responses as edits
 
 ASKED = Request("soap", "POST", "/")
@@ -17,19 +17,19 @@ def refused():
 
 def test_a_fault_is_told_from_an_answer():
     assert edits.is_fault(refused())
-    assert not edits.is_fault(edits.enveloped("<x/>")(ASKED))
+    assert not edits.is_fault(edits.envelop("<x/>")(ASKED))
 
 
 @pytest.mark.parametrize(
     ("edit", "shown"),
     [
-        (edits.coded("Server"), b"s:Server<"),
+        (edits.set_code("Server"), b"s:Server<"),
         (edits.unbound, b"nowhere:Client<"),
-        (edits.declared, b"<!DOCTYPE s:Envelope>"),
-        (edits.instructed, b"<?robot drive?>"),
+        (edits.add_doctype, b"<!DOCTYPE s:Envelope>"),
+        (edits.add_instruction, b"<?robot drive?>"),
         (edits.latin, b"ISO-8859-1"),
         (edits.fault_tree(each("faultstring", says(edits.TRACE))), b"NullPointerException"),
-        (edits.fault_tree(edits.hinted), b"<hint>"),
+        (edits.fault_tree(edits.add_hint), b"<hint>"),
         (page(500, b"<html>", "text/html"), b"<html>"),
     ],
 )
@@ -45,7 +45,7 @@ def test_a_header_block_comes_before_the_body():
     tree(edits.understood_true)(response)
     root = etree.fromstring(response.body)
     assert [etree.QName(child).localname for child in root] == ["Header", "Body"]
-    assert named(root, "battery")[0].get(f"{{{SOAP}}}mustUnderstand") == "true"
+    assert find_named(root, "battery")[0].get(f"{{{SOAP}}}mustUnderstand") == "true"
 
 
 def test_a_status_is_changed_with_its_reason():

@@ -5,7 +5,7 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from proof.selftest.against import read, stored
+from proof.selftest.against import file_content, read
 from roaas import main
 
 # An id that was merged into another one, as the ledger's aliases say.
@@ -32,7 +32,7 @@ def compared(folder, *runs):
 @pytest.fixture
 def yardstick(tmp_path):
     runs = [run_of(tmp_path, f"before{turn}", _BEFORE | {"now and then": ["http/allow"] * turn}) for turn in (0, 1)]
-    (tmp_path / "yardstick.gz").write_bytes(stored(read(runs)))
+    (tmp_path / "yardstick.gz").write_bytes(file_content(read(runs)))
     return tmp_path
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from conformance.documents.wsdl import ENVELOPE_12, SoapOperation, SoapPort
-from conformance.rules.soap.own_state import unexplained
+from conformance.rules.soap.own_state import probes_left
 from conformance.scenarios.soap_survey import Kind, SoapProbe
 from conformance.transport.exchange import Exchange, Request, Response
 
@@ -48,7 +48,7 @@ def _probe(step):
 def _counting(*steps):
     """Return which faulted probes count."""
     probes = [_probe("i GetJob x Invalid"), *map(_probe, steps)]
-    return [one.says for one in unexplained(probes, _Found()) if not one.succeeded and one.kind is not Kind.INVALID]
+    return [one.says for one in probes_left(probes, _Found()) if not one.is_success and one.kind is not Kind.INVALID]
 
 
 @pytest.mark.parametrize(
@@ -92,4 +92,4 @@ def test_a_fault_of_soap_12_is_read_as_well():
     body = probe.exchange.response.body.replace(_S.encode(), ENVELOPE_12.encode()).replace(b"detail>", b"Detail>")
     exchange = Exchange(probe.exchange.request, Response(500, probe.exchange.response.headers, body, 1.0))
     found = SoapProbe(probe.operation, Kind.AGAIN, "", ENVELOPE_12, "Ok", exchange)
-    assert unexplained([_probe("u GetJob 1 ok"), found], _Found()) == [_probe("u GetJob 1 ok")]
+    assert probes_left([_probe("u GetJob 1 ok"), found], _Found()) == [_probe("u GetJob 1 ok")]

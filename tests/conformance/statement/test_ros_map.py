@@ -52,7 +52,7 @@ def test_a_stream_is_an_operation_of_its_own():
     lines = [stream.format('events?every=500"', "sse"), stream.format('socket"', "websocket")]
     ros = _read("[operations]\n" + "\n".join(lines))
     assert [(one.stream, one.throttle_s) for one in ros.operations.values()] == [("sse", 0.5), ("websocket", 0.5)]
-    assert ros.described == ("GET /pose/events",)
+    assert ros.describable == ("GET /pose/events",)
 
 
 def test_the_domain_is_that_of_the_environment(monkeypatch):

@@ -52,7 +52,7 @@ def test_a_full_statement(tmp_path):
     assert statement.robot == {"name": "R2"}
     assert statement.endpoints.publishers_wsdl == str(tmp_path / "r2.wsdl")
     assert statement.endpoints.ca_file == str(tmp_path / "ca.pem")
-    assert statement.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
+    assert statement.claims_of(CONTRACT) == ("rest-resources", "rest-delivery", "soap-delivery", "safety")
     assert (statement.limits.linear_m_s, statement.limits.hold_s, statement.limits.settle_s) == (1.0, 0.5, 2.0)
     assert (statement.motion.arena, statement.ros.domain_id) == ((0.0, 0.0, 10.0, 5.0), 7)
     assert statement.load.max_rate == 100
@@ -200,15 +200,15 @@ def test_limits_may_differ_between_the_directions_and_from_those_of_the_navigati
     ],
 )
 def test_where_rest_could_pass_for_motion_that_is_said(tmp_path, text, resolved):
-    assert ("resolved" in _load(tmp_path, f"[limits]\n{text}").undeclared) is not resolved
+    assert ("resolved" in _load(tmp_path, f"[limits]\n{text}").why_not_tested) is not resolved
 
 
 def test_without_claims_the_classes_follow_from_the_addresses():
     only_rest = Statement(endpoints=Endpoints(rest="http://r2"))
     # What judges several interfaces is not judged by one of them: that would be milder than to claim it.
-    assert only_rest.claimed(CONTRACT) == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
+    assert only_rest.claims_of(CONTRACT) == ("rest-resources", "rest-delivery", "rest-formats", "http", "safety")
     assert only_rest.lacking(CONTRACT)["strict-input"] == ("publishers", "subscribers")
-    assert "strict-input" in only_rest.claimed(ONLY_REST)
-    assert "soap-delivery" not in only_rest.claimed(ONLY_REST)
+    assert "strict-input" in only_rest.claims_of(ONLY_REST)
+    assert "soap-delivery" not in only_rest.claims_of(ONLY_REST)
     both = Endpoints(rest="http://r2", publishers_wsdl="x", subscribers_wsdl="y")
-    assert Statement(endpoints=both).claimed(CONTRACT) == tuple(CONTRACT.classes)
+    assert Statement(endpoints=both).claims_of(CONTRACT) == tuple(CONTRACT.classes)

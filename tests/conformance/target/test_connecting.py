@@ -9,7 +9,7 @@ from toy_server import serving
 
 from conformance.statement.endpoints import Auth, Endpoints
 from conformance.statement.statement import StatementError
-from conformance.target.connecting import connection_of, keyed
+from conformance.target.connecting import connection_of, place_api_key
 
 _SECRET, _TOKEN = "correct horse", "a-token-of-the-device"
 _AUTH = Auth("POST /login", "/session/token")
@@ -68,15 +68,15 @@ _KEY = {"type": "apiKey", "in": "query", "name": "key"}
 
 
 def test_an_api_key_goes_where_the_description_wants_it():
-    found = keyed(Endpoints(api_key_file="key"), _wanting(_KEY, {"type": "http", "scheme": "bearer"}))
+    found = place_api_key(Endpoints(api_key_file="key"), _wanting(_KEY, {"type": "http", "scheme": "bearer"}))
     assert found.api_key == "query key"
-    assert keyed(Endpoints(), _wanting(_KEY)).api_key is None
+    assert place_api_key(Endpoints(), _wanting(_KEY)).api_key is None
 
 
 @pytest.mark.parametrize("schemes", [(), (_KEY, {**_KEY, "in": "header"})])
 def test_without_one_place_for_a_key_the_user_is_asked(schemes):
     with pytest.raises(StatementError, match="say where the API key goes"):
-        keyed(Endpoints(api_key_file="key"), _wanting(*schemes))
+        place_api_key(Endpoints(api_key_file="key"), _wanting(*schemes))
 
 
 def test_a_device_behind_a_login_is_certified_by_its_statement(tmp_path):

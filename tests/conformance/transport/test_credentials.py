@@ -96,7 +96,7 @@ def test_a_request_can_be_sent_without_and_with_wrong_ones(heard):
 def test_a_wrong_credential_keeps_its_scheme_and_its_names(name, secret, wrong, places):
     credential = Credential(Kind.HEADER, secret, name)
     assert (credential.wrong.secret, credential.wrong.variable, credential.places) == (wrong, wrong, places)
-    assert "s3same-1" not in Credentials((credential,)).hidden('{"you sent": "s3same-1"}')
+    assert "s3same-1" not in Credentials((credential,)).hide('{"you sent": "s3same-1"}')
 
 
 def test_cookies_of_credentials_join_those_of_the_request(heard):
@@ -117,7 +117,7 @@ def test_raw_and_partial_requests_carry_them_and_do_not_show_them(heard):
         pass
     assert "k3y%26in%20query" in got[0]
     assert "X-API-Key: k3y-in-header" in got[0]
-    shown = raw.shown(client, octets)
+    shown = raw.shown_request(client, octets)
     assert not any(secret in repr(one) for secret in _SECRETS for one in (shown, partial.request))
     send_again(shown, client.connection)
     # The partial request, which nobody waits for, may be heard before or after it.

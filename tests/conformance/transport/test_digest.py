@@ -160,7 +160,7 @@ def test_raw_requests_answer_it_and_can_be_sent_again(pair):
         client = HttpClient(url, connection_of(replace(pair, rest=url)))
         client.send("GET", "/")
         octets = raw.head(client, "GET", "/state")
-        shown = raw.shown(client, octets)
+        shown = raw.shown_request(client, octets)
         assert raw.read_one(client, octets, raw.talk(client, octets, answers=1), "GET")[0].response.status == 200
         with PartialRequest(client, "GET", "/state") as partial:
             pass

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conformance.transport.reach import ElsewhereError, Folder, Origin, Trust, is_same, moved
+from conformance.transport.reach import ElsewhereError, Folder, Origin, Trust, at_server, is_same
 
 NAMED = "http://robot.example:8000/v1/openapi.json"
 
@@ -108,8 +108,8 @@ def test_what_is_no_trusted_host(text):
 def test_a_request_goes_to_the_name_that_the_user_wrote():
     trust = Trust.of("http://me:secret@Straße.example:80/openapi.json")
     assert trust.place("http://strasse.example/x?y#z") == "http://Straße.example:80/x?y"
-    assert moved("http://Inside:1/x?wsdl", "http://inside:1", "https://front/") == "https://front/x?wsdl"
-    assert moved("http://inside:10/x", "http://inside:1", "https://front") == "http://inside:10/x"
+    assert at_server("http://Inside:1/x?wsdl", "http://inside:1", "https://front/") == "https://front/x?wsdl"
+    assert at_server("http://inside:10/x", "http://inside:1", "https://front") == "http://inside:10/x"
 
 
 @given(st.text(alphabet="robt.:/@\\%[]evil#?1\t\r\n ", max_size=20))

@@ -119,7 +119,7 @@ def test_a_raw_head_with_credentials(device):
     url, got = device
     client = HttpClient(url, Connection(credentials=_ALL))
     octets = raw.head(client, "GET", "/a", "X-More: yes")
-    _run(raw.shown(client, octets).curl())
+    _run(raw.shown_request(client, octets).curl())
     assert got == [octets]
 
 

@@ -80,13 +80,13 @@ def test_an_endpoint_that_hung_a_while_ago_is_asked_again(listening, monkeypatch
 def test_what_does_not_answer_is_not_waited_for_whole_deadlines_without_an_end(listening, monkeypatch):
     monkeypatch.setattr("conformance.transport.pace._HURRIED_S", _DEADLINE / 2)
     client = _client(listening(lambda connection: (_head(connection), time.sleep(5))))
-    client.connection.hangs.hung("GET http://other/", 61.0)
+    client.connection.hangs.note_hang("GET http://other/", 61.0)
     for told in ("no response within 0.2 s", "not sent, because GET /slow/\\* did not respond in the time"):
         with pytest.raises(NoAnswerError, match=told) as error:
             client.send("GET", "/slow/17")
         assert error.value.unanswered.kind == "hurried"
     # A slow device gets more time.
-    client.connection.hangs.answered(_DEADLINE)
+    client.connection.hangs.note_answer(_DEADLINE)
     with pytest.raises(NoAnswerError, match=r"no response within 0\.4 s") as error:
         client.send("GET", "/other")
     assert error.value.unanswered.kind == "timeout"

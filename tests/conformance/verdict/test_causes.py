@@ -189,4 +189,4 @@ def test_a_missing_response_is_named_by_the_requirement_that_is_about_it(kind, p
 def test_what_a_check_allows_for_itself_is_no_crash(id_, request_, found):
     judge = Judge(generic_ledger())
     judge.check(id_, False, Unanswered(request_, "closed", NoAnswer.CLOSED), "a response", found=found)
-    assert set(judge.refuted()) == {id_}
+    assert set(judge.failure_counts()) == {id_}

@@ -26,23 +26,23 @@ from conformance.verdict.run import Run
     ],
 )
 def test_robots_are_classed_by_how_fast_they_answer(usual_ms, speed):
-    assert Effort().seen(usual_ms).speed.name == speed
+    assert Effort().slowed_to(usual_ms).speed.name == speed
 
 
 def test_a_class_is_left_only_when_its_bound_is_clearly_passed_and_never_for_a_faster_one():
-    effort = Effort().seen(60)
-    assert [effort.seen(one).speed.name for one in (1, 129, 161, 164)] == ["near", "near", "near", "far"]
+    effort = Effort().slowed_to(60)
+    assert [effort.slowed_to(one).speed.name for one in (1, 129, 161, 164)] == ["near", "near", "near", "far"]
 
 
 def test_robots_of_one_class_get_the_same_cases():
-    assert {Effort().seen(usual_ms).cases(200) for usual_ms in (51, 60, 90, 160)} == {40}
-    assert Effort("quick").seen(300).cases(100) == 3
+    assert {Effort().slowed_to(usual_ms).cases(200) for usual_ms in (51, 60, 90, 160)} == {40}
+    assert Effort("quick").slowed_to(300).cases(100) == 3
 
 
 def test_what_was_left_out_is_told_with_the_class_and_no_figure_of_this_run():
-    assert Effort().seen(3).speed.remark == ""
-    assert Effort().seen(60).speed.remark == Effort().seen(70).speed.remark
-    assert "one in 5" in Effort().seen(60).speed.remark
+    assert Effort().slowed_to(3).speed.remark == ""
+    assert Effort().slowed_to(60).speed.remark == Effort().slowed_to(70).speed.remark
+    assert "one in 5" in Effort().slowed_to(60).speed.remark
     assert "more than about 800 ms" in SPEEDS[-1].remark
 
 

@@ -36,7 +36,7 @@ def test_an_occasion_is_named_by_interface_method_and_format(attempt: Attempt, o
 def test_cases_are_counted_by_occasion_and_after_a_refusal() -> None:
     judge = Judge(["http/date"])
     for attempt in (_exchange("GET"), _exchange("PUT", sent="text/xml", status=400), _exchange("GET")):
-        judge.sent(attempt)
+        judge.note_sent(attempt)
         judge.check("http/date", True, attempt, "a date")
     judge.check("http/date", True, _exchange("GET"), "a date")
     judge.check("http/date", True, None, "a date")

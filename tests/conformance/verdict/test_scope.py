@@ -30,7 +30,7 @@ def test_a_verdict_says_to_what(claims, value, expected):
 
 
 def test_what_was_cut_stands_in_the_first_line():
-    slow = Run(claims=_ALL, effort=Effort().seen(240))
+    slow = Run(claims=_ALL, effort=Effort().slowed_to(240))
     assert verdict_line(slow, Overall.CONFORMANT, []).endswith("black box, on 5 % of the cases: 240 ms an answer")
     cut = Run(claims=_ALL, tally=Tally(planned=100, cut_short={"test_x": 30}))
     assert cut.less == "on 70 % of the cases: time ran out"
@@ -38,8 +38,8 @@ def test_what_was_cut_stands_in_the_first_line():
 
 
 def test_too_few_cases_are_no_verdict_unless_the_robot_failed():
-    assert Run(effort=Effort().seen(240)).enough
-    assert not Run(effort=Effort().seen(2000)).enough
+    assert Run(effort=Effort().slowed_to(240)).enough
+    assert not Run(effort=Effort().slowed_to(2000)).enough
     assert overall(_PASSED) is Overall.CONFORMANT
     assert overall(_PASSED, enough=False) is Overall.INCONCLUSIVE
     assert overall({"http": (ClassValue.FAIL, "")}, enough=False) is Overall.NOT_CONFORMANT
@@ -47,5 +47,5 @@ def test_too_few_cases_are_no_verdict_unless_the_robot_failed():
 
 def test_a_busy_machine_changes_no_case():
     """The same robot, beside others: some answers come late, and the shortest time stays."""
-    assert Effort().seen(90, 3).cases(200) == Effort().seen(2, 1).cases(200)
-    assert Effort().seen(300, 240).speed.name == "far"
+    assert Effort().slowed_to(90, 3).cases(200) == Effort().slowed_to(2, 1).cases(200)
+    assert Effort().slowed_to(300, 240).speed.name == "far"

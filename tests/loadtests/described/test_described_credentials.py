@@ -14,7 +14,7 @@ from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.robot import Robot, Secrets, with_secrets, without_secrets
 from loadtests.clients.wire import Connection
 from loadtests.described.device import CREDENTIALS, Device, Named, secrets_of
-from loadtests.described.operations import chosen
+from loadtests.described.operations import choose
 from loadtests.described.requests import robot_of
 from loadtests.measuring.preflight import preflight
 from loadtests.settings.settings import SettingsError
@@ -28,7 +28,7 @@ OPTIONS |= {"base_url": None, "rest": None, "timeout_s": None}
 
 def robot_at(port, options):
     device = Device.at(Named(f"http://127.0.0.1:{port}/openapi.json", None), OPTIONS | options)
-    return robot_of(device, list(chosen(device, ["GET /state"]).weights))
+    return robot_of(device, list(choose(device, ["GET /state"]).weights))
 
 
 def as_another_process_has_it(robot):
@@ -86,7 +86,7 @@ def test_each_message_has_a_username_token_of_its_own(tmp_path, clock):
     (names, device) = [("GetAngle", "soap", "wire")] * 3, soap_devices.table()
     with soap_devices.serving(device) as url:
         opened = Device.at(Named(f"{url}/table.wsdl", None), OPTIONS | {"username_token_file": str(file)})
-        robot = robot_of(opened, list(chosen(opened, ["GetAngle"]).weights))
+        robot = robot_of(opened, list(choose(opened, ["GetAngle"]).weights))
         robot = replace(robot, username_token=replace(robot.username_token, ahead=clock))
         assert soap_devices.PASSWORD not in repr(robot)
         assert b"$WSSE_NONCE<" in robot.described[0].octets[0]

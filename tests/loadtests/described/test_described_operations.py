@@ -12,7 +12,7 @@ from loadtests.clients.failures import CallError, Declared
 from loadtests.clients.robot import Secrets, with_secrets
 from loadtests.described import operations, run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import chosen, named_alike
+from loadtests.described.operations import choose, named_alike
 from loadtests.described.pairs import streams_to_hear
 from loadtests.described.requests import robot_of
 from loadtests.schedule.plan import rotation, turns_of_all
@@ -55,14 +55,14 @@ def labels(found):
 
 
 def test_operations_are_meant_by_label_id_and_pattern_with_weights(description):
-    found = chosen(description(), ["GET /state=3", "GET /items*"])
+    found = choose(description(), ["GET /state=3", "GET /items*"])
     assert labels(found) == {"GET /state": 3, "GET /items": 1, "GET /items/{item_id}": 1}
-    assert labels(chosen(description(), ["readState"])) == {"GET /state": 1}
-    refusing = chosen(description(), ["/*"])
+    assert labels(choose(description(), ["readState"])) == {"GET /state": 1}
+    refusing = choose(description(), ["/*"])
     assert "POST /drive" not in labels(refusing)
     assert "POST /drive is not called: it may change something: --call allows it" in refusing.notes
     assert any(note.startswith("GET /reset is not called: its name warns of harm") for note in refusing.notes)
-    assert labels(chosen(description(allow=("POST /drive",)), ["POST /drive"])) == {"POST /drive": 1}
+    assert labels(choose(description(allow=("POST /drive",)), ["POST /drive"])) == {"POST /drive": 1}
 
 
 @pytest.mark.parametrize(
@@ -76,15 +76,15 @@ def test_operations_are_meant_by_label_id_and_pattern_with_weights(description):
 )
 def test_operations_that_cannot_be_measured_are_refused_with_what_to_do(description, named, message):
     with pytest.raises(SettingsError, match=re.escape(message)):
-        chosen(description(), named)
+        choose(description(), named)
 
 
 def test_never_wins_and_too_many_operations_are_too_many(description, monkeypatch):
     with pytest.raises(SettingsError, match="--never excludes it"):
-        chosen(description(never=("GET /state",)), ["GET /state"])
+        choose(description(never=("GET /state",)), ["GET /state"])
     monkeypatch.setattr(operations, "MOST", 2)
     with pytest.raises(SettingsError, match="operations are too many for one run: at most 2"):
-        chosen(description(), ["/*"])
+        choose(description(), ["/*"])
 
 
 def test_the_statement_names_operations_and_service_levels(device, tmp_path):
@@ -93,12 +93,12 @@ def test_the_statement_names_operations_and_service_levels(device, tmp_path):
         '[slo]\n"GET /state" = { p99_ms = 5, at_rate = 90 }\nreadState = { p50_ms = 2, at_rate = 30 }\n'
     )
     opened = device(statement=statement)
-    assert labels(chosen(opened, ())) == {"GET /state": 1}
+    assert labels(choose(opened, ())) == {"GET /state": 1}
     assert named_alike("readState", opened) == "GET /state"
     with pytest.raises(SettingsError, match=re.escape("[slo] '/*' means 10 operations: name one")):
         named_alike("/*", opened)
     statement.write_text('[load]\noperations = { "GET /text" = 2 }\n[slo]\n"GET /state" = { p99_ms = 5 }\n')
-    assert labels(chosen(device(statement=statement), ())) == {"GET /text": 2}
+    assert labels(choose(device(statement=statement), ())) == {"GET /text": 2}
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_the_rate_is_that_at_which_each_operation_has_its_own():
 
 def test_values_come_from_what_the_device_lists_and_all_that_it_accepts_are_used(device):
     opened = device()
-    robot = robot_of(opened, list(chosen(opened, ["GET /items/{item_id}"]).weights))
+    robot = robot_of(opened, list(choose(opened, ["GET /items/{item_id}"]).weights))
     (items,) = robot.described
     assert {octets.split(b" ")[1] for octets in items.octets} == {b"/items/left", b"/items/right"}
     assert items.responses == ((200, ("application/json",)),)
@@ -157,14 +157,14 @@ def test_values_of_the_statement_come_first(device, tmp_path):
     statement = tmp_path / "robot.toml"
     statement.write_text('[values]\nitem_id = ["right"]\n')
     opened = device(statement=statement)
-    (items,) = robot_of(opened, list(chosen(opened, ["GET /items/{item_id}"]).weights)).described
+    (items,) = robot_of(opened, list(choose(opened, ["GET /items/{item_id}"]).weights)).described
     assert items.octets[0].startswith(b"GET /items/right HTTP/1.1\r\nHost: 127.0.0.1:")
 
 
 def test_a_stream_is_no_request(device):
     opened = device()
     with pytest.raises(SettingsError, match="GET /events cannot be measured by requests"):
-        robot_of(opened, list(chosen(opened, ["GET /events"]).weights))
+        robot_of(opened, list(choose(opened, ["GET /events"]).weights))
 
 
 def test_streams_are_operations_and_websockets(device):
@@ -194,7 +194,7 @@ def test_secrets_stand_in_requests_only_where_they_are_sent(device, tmp_path):
     file = tmp_path / "key"
     file.write_text("t0ken-of-robot")
     opened = device("--auth", "query", api_key="query key", api_key_file=str(file))
-    robot = robot_of(opened, list(chosen(opened, ["GET /state"]).weights))
+    robot = robot_of(opened, list(choose(opened, ["GET /state"]).weights))
     (state,) = robot.described
     assert state.octets[0].startswith(b"GET /state?key=$ROAAS_QUERY_KEY HTTP/1.1\r\n")
     assert robot.requests("rest", "GET /state", 1)[0].octets.startswith(b"GET /state?key=t0ken-of-robot HTTP/1.1\r\n")

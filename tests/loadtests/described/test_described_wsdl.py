@@ -11,7 +11,7 @@ from loadtests.cli import load
 from loadtests.clients.failures import CallError, Reply
 from loadtests.described import run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import chosen
+from loadtests.described.operations import choose
 from loadtests.described.pairs import Choice
 from loadtests.described.requests import robot_of
 from loadtests.measuring.equivalence import values_difference
@@ -35,19 +35,19 @@ def test_operations_are_meant_by_name_and_called_by_the_rules_of_certify():
     with serving(camera()) as url:
         device = opened(url, "camera")
         assert device.interface == "soap"
-        found = chosen(device, ["GetStatus=3"])
+        found = choose(device, ["GetStatus=3"])
         assert {device.name_of(each): weight for each, weight in found.weights.items()} == {"GetStatus": 3}
-        assert chosen(device, ["POST /cameraPort/GetStatus"]).weights.keys() == found.weights.keys()
-        everything = chosen(device, ["cameraPort"])
+        assert choose(device, ["POST /cameraPort/GetStatus"]).weights.keys() == found.weights.keys()
+        everything = choose(device, ["cameraPort"])
         assert everything.notes == ("AbsoluteMove is not called: it may change something: --call allows it",)
         with pytest.raises(SettingsError, match="AbsoluteMove is not called: it may change something"):
-            chosen(device, ["AbsoluteMove"])
+            choose(device, ["AbsoluteMove"])
         with pytest.raises(SettingsError, match="the description has 'GetStatus', 'AbsoluteMove'"):
-            chosen(device, [])
+            choose(device, [])
         with pytest.raises(SettingsError, match="no operation 'GetState': did you mean 'GetStatus'"):
-            chosen(device, ["GetState"])
+            choose(device, ["GetState"])
         allowed = opened(url, "camera", allow=("AbsoluteMove",))
-        robot = robot_of(allowed, list(chosen(allowed, ["AbsoluteMove", "GetStatus"]).weights))
+        robot = robot_of(allowed, list(choose(allowed, ["AbsoluteMove", "GetStatus"]).weights))
         assert (robot.rest, robot.soap, robot.addresses) == (None, url, [url])
         assert [robot.offers("soap", "wire", name) for name in ("AbsoluteMove", "GetStatus", "Other")] == [1, 1, 0]
         assert not robot.offers("rest", "wire", "GetStatus")
@@ -63,7 +63,7 @@ def test_each_value_of_the_statement_that_is_accepted_is_used(tmp_path):
     with serving(scale()) as url:
         device = opened(url, "scale", statement)
         with pytest.raises(SettingsError, match="no valid message can be made for GetLoad without values"):
-            robot_of(device, list(chosen(device, ["GetLoad"]).weights))
+            robot_of(device, list(choose(device, ["GetLoad"]).weights))
         statement.write_text('[values]\nchannel = [1, 2, 3]\nunit = ["g"]\n')
         refusing = scale()
         refusing.alter = lambda request, status, kind, body: (
@@ -71,7 +71,7 @@ def test_each_value_of_the_statement_that_is_accepted_is_used(tmp_path):
         )
     with serving(refusing) as url:
         device = opened(url, "scale", statement)
-        robot = robot_of(device, list(chosen(device, ["GetLoad"]).weights))
+        robot = robot_of(device, list(choose(device, ["GetLoad"]).weights))
         assert [re.findall("<channel>(.*?)</channel><unit>(.*?)</unit>", body) for body in bodies(robot)] == [
             [("1", "g")],
             [("3", "g")],
@@ -81,7 +81,7 @@ def test_each_value_of_the_statement_that_is_accepted_is_used(tmp_path):
     statement.write_text("[values]\nPan = [0.1, 0.2]\n")
     with serving(acting) as url:
         device = opened(url, "camera", statement, allow=("AbsoluteMove",))
-        assert len(bodies(robot_of(device, list(chosen(device, ["AbsoluteMove"]).weights)))) == 1
+        assert len(bodies(robot_of(device, list(choose(device, ["AbsoluteMove"]).weights)))) == 1
 
 
 def test_a_fault_counts_as_a_failure():
@@ -89,7 +89,7 @@ def test_a_fault_counts_as_a_failure():
     faulty.alter = lambda _, __, kind, ___: (500, kind, faulty.fault("Server", "overheated")[1])
     with serving(faulty) as url:
         device = opened(url, "camera")
-        robot = robot_of(device, list(chosen(device, ["GetStatus"]).weights))
+        robot = robot_of(device, list(choose(device, ["GetStatus"]).weights))
         findings = preflight(robot, [("GetStatus", "soap", "wire")], 1)
         assert findings.messages() == ["GetStatus over soap (wire): status 500, SOAP fault: overheated"]
         assert {each.kind for each in findings.failures.values()} == {"fault"}
@@ -134,7 +134,7 @@ def test_an_operation_that_two_ports_have_is_named_with_its_port():
     device.wsdl = CAMERA.replace("</service>", again + away + "</service>")
     with serving(device) as url:
         opened_device = opened(url, "camera")
-        found = chosen(opened_device, ["GetStatus", "again"])
+        found = choose(opened_device, ["GetStatus", "again"])
         names = [opened_device.name_of(each) for each in found.weights]
         assert names == ["POST /cameraPort/GetStatus", "POST /again/GetStatus"]
         assert "POST /away/GetStatus is not called: its port is at another server" in found.notes
@@ -171,7 +171,7 @@ def both(tmp_path):
 
 def devices_of(statement, *interfaces):
     named = Named.of((str(statement),), {"openapi": None, "wsdl": None})
-    return run._selected(run._opened(named, {**OPTIONS, "interfaces": interfaces}), interfaces)  # noqa: SLF001
+    return run._select(run._open(named, {**OPTIONS, "interfaces": interfaces}), interfaces)  # noqa: SLF001
 
 
 def test_a_pair_is_one_operation_over_both_interfaces(both):

@@ -117,13 +117,13 @@ def test_the_robots_clock_is_bounded_by_its_responses(started, told, most_s):
 def test_bounds_of_many_responses_are_narrower_than_those_of_each():
     clock = RobotClock()
     assert clock.offset is None
-    clock.told(Stamp(100.0, 0.0), 10.0, 10.4)
-    clock.told(Stamp(101.1, 0.0), 11.0, 11.2)
+    clock.add_stamp(Stamp(100.0, 0.0), 10.0, 10.4)
+    clock.add_stamp(Stamp(101.1, 0.0), 11.0, 11.2)
     assert clock.offset == pytest.approx((89.9, 90.0))
-    clock.dated(b"Thu, 01 Jan 1970 00:01:50 GMT", 20.9, 21.0)
+    clock.add_date(b"Thu, 01 Jan 1970 00:01:50 GMT", 20.9, 21.0)
     assert clock.offset == pytest.approx((89.9, 90.0)), "it lies between 89 and 91.1"
-    clock.dated(b"yesterday", 30.0, 30.1)
-    clock.dated(None, 30.0, 30.1)
+    clock.add_date(b"yesterday", 30.0, 30.1)
+    clock.add_date(None, 30.0, 30.1)
     clock.data(Stamp(131.0, 1.0), 40.0)
     assert clock.offset == pytest.approx((90.0, 90.0)), "data is not from the future"
     clock.data(Stamp(140.0, 1.0), 40.0)

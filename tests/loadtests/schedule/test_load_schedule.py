@@ -49,7 +49,7 @@ def test_the_workers_shares_make_up_the_schedule(workers, arrivals, seed, rate, 
         assert sum(schedule.share(segment) for segment in range(schedule.count())) == len(share)
     for segment, due, operation, _ in everything(plan):
         assert plan.segments[segment].start_ns <= due <= plan.segments[segment].end_ns
-        assert operation in plan.offered(plan.segments[segment].interface, plan.segments[segment].client)
+        assert operation in plan.choices(plan.segments[segment].interface, plan.segments[segment].client)
 
 
 def test_a_plan_survives_its_message_and_a_seed_fixes_it():

@@ -58,7 +58,7 @@ def test_a_miss_while_the_generator_was_late_is_tried_again():
         return msgspec.structs.replace(trial, meets=trial.meets and not late, cpu_share=0.99 if late else 0.2)
 
     (search,) = search_again(1, (50, 50_000), attempt)
-    assert search.kept < 900 <= search.missed
+    assert search.floor < 900 <= search.ceiling
 
 
 def test_what_lies_beyond_the_limits_is_not_guessed():

@@ -21,4 +21,4 @@ def test_filled_octets_are_the_message_whatever_the_frames_and_the_numbers():
             message.pose.pose.orientation = quaternion_of(motion.yaw)
             message.twist.twist.linear.x, message.twist.twist.angular.z = motion.linear, motion.angular
             # As text, which tells -0.0 from 0.0.
-            assert repr(deserialize_message(octets.filled(stamp, motion), Odometry)) == repr(message)
+            assert repr(deserialize_message(octets.fill(stamp, motion), Odometry)) == repr(message)

@@ -22,7 +22,7 @@ def driven(seed: int, setpoint: tuple[float, float], seconds: float = 10.0) -> t
     for _ in range(int(seconds * 50)):
         after = advance(body, setpoint, 0.02, lambda _x, _y: True, IMPERFECT)
         before, body = body, realism.slipped(body, after)
-        belief = realism.believed(belief, before, after, body, 0.02)
+        belief = realism.estimate(belief, before, after, body, 0.02)
         bodies.append(body)
         beliefs.append(belief)
     return bodies, beliefs
@@ -74,7 +74,7 @@ def test_commands_arrive_in_their_order_and_the_newest_counts():
     delayed.send(2.0, (0.1, 0.0))
     delayed.send(1.0, (0.2, 0.0))
     delayed.send(3.0, (0.3, 0.0))
-    assert delayed.arrived(1.5) is None
-    assert delayed.arrived(2.5) == (2.0, (0.2, 0.0))
-    assert delayed.arrived(9.0) == (3.0, (0.3, 0.0))
-    assert delayed.arrived(9.0) is None
+    assert delayed.take_arrived(1.5) is None
+    assert delayed.take_arrived(2.5) == (2.0, (0.2, 0.0))
+    assert delayed.take_arrived(9.0) == (3.0, (0.3, 0.0))
+    assert delayed.take_arrived(9.0) is None

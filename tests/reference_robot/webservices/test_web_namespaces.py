@@ -4,7 +4,7 @@ import pytest
 from web_messages import delivery_path, twist
 from web_robot import RosProcess, eventually, running_robot
 
-from reference_robot.ending import divided
+from reference_robot.ending import divide_words
 from reference_robot.ros import RosRuntime
 
 
@@ -17,7 +17,7 @@ from reference_robot.ros import RosRuntime
     ],
 )
 def test_ros_s_words_are_told_from_ours(words, own, ros):
-    assert divided(words) == (own, ros)
+    assert divide_words(words) == (own, ros)
 
 
 def test_each_robot_is_served_in_its_namespace_by_its_clock_and_enclave(domain_id):

@@ -142,7 +142,7 @@ async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_
 
     async def processor_time(began, answered):
         """Return the seconds of processor time that the event loop uses after a response, in 0.2 s."""
-        robot.port.answered(began, answered)
+        robot.port.note_answer(began, answered)
         used = time.thread_time()
         await asyncio.sleep(0.2)
         return time.thread_time() - used

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 from vendors import make_conformant, requirement
 
-from reports.attestation.outcomes import Entry, contradictions, departures, musts_of, named
+from reports.attestation.outcomes import Entry, contradictions, departures, first_names, musts_of
 from reports.attestation.statement import run_of
 
 
@@ -83,5 +83,5 @@ def test_a_must_of_two_classes_counts_in_both(run):
 
 
 def test_many_names_are_cut():
-    assert named(["a", "b", "c"]) == "a, b, c"
-    assert named(["a", "b", "c", "d", "e"]) == "a, b, c and 2 more"
+    assert first_names(["a", "b", "c"]) == "a, b, c"
+    assert first_names(["a", "b", "c", "d", "e"]) == "a, b, c and 2 more"

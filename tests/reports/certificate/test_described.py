@@ -6,7 +6,7 @@ import re
 import pytest
 from lxml import html
 
-from reports.certificate.described import described
+from reports.certificate.described import description_of
 from reports.certificate.page import Seal, certificate_html, certificate_markdown, certificate_print
 from reports.formats.catalogue import badge
 
@@ -97,7 +97,7 @@ def test_a_requirement_with_many_findings_shows_all_that_the_matrix_links_to(des
 def test_a_status_is_declared_by_itself_its_class_or_default(described_result, declared, seen, expected):
     entry = described_result["api"]["operations"][0] | {"called": True, "declared": declared, "statuses": seen}
     entry["seen_declared"] = [key for key in declared if seen and expected[-1][1]]
-    row = described({"api": {**described_result["api"], "operations": [entry]}}).rows[0]
+    row = description_of({"api": {**described_result["api"], "operations": [entry]}}).rows[0]
     assert [(one.code, one.count, one.declared) for one in row.statuses] == expected
 
 

@@ -6,7 +6,7 @@ import pytest
 from lxml import etree, html
 
 from reports.formats.ci_systems import latency_junit
-from reports.latency.noticed import noticed
+from reports.latency.noticed import sentences
 from reports.latency.page import latency_html, latency_markdown
 
 LEVEL = {
@@ -43,7 +43,7 @@ def described(latency):
 def told(result, **times):
     one = result["series"][0]
     one["response_ms"] = dict.fromkeys(one["response_ms"]) | times
-    return noticed(result)
+    return sentences(result)
 
 
 def test_delays_are_named_as_people_and_programs_notice_them(described):
@@ -98,7 +98,9 @@ def test_failures_are_counted_in_time(described):
     described["series"][0] |= {"count": 95, "errors": 3, "dropped": 2}
     assert "5 of 100 requests failed: at this load, one every 0.1 s." in told(described, p50=2.0, p99=3.0)[2]
     described["trustworthy"] = False
-    assert noticed(described) == ["This run does not show what a user of the robot will notice; the reasons are below."]
+    assert sentences(described) == [
+        "This run does not show what a user of the robot will notice; the reasons are below."
+    ]
 
 
 def test_the_page_says_what_is_noticed_after_its_verdict_and_shows_service_levels(described):

@@ -114,7 +114,7 @@ class Deliveries:
     def _look(self, exchange: Exchange) -> Iterator[Case]:
         """Judge a list in any format by the list before; as JSON, also by the deliveries accepted before it."""
         response = exchange.response
-        value, shown = _listed(response.media_type, response.body) if response.ok else (None, ())
+        value, shown = _read_list(response.media_type, response.body) if response.ok else (None, ())
         if value is None:
             return
         is_default = is_json(response.media_type)
@@ -186,7 +186,7 @@ class Deliveries:
 
 
 @lru_cache(maxsize=8)
-def _listed(media_type: str, body: bytes) -> tuple[Any, tuple[str, ...]]:
+def _read_list(media_type: str, body: bytes) -> tuple[Any, tuple[str, ...]]:
     """Return a list with numbers as doubles, and its entries as text; None if it is no list, which others judge."""
     try:
         value = read(media_type, body, LIST.schema)

@@ -12,7 +12,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.goal import difference
 from conformance.packs.table1.robot.message_shapes import GOAL, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, VELOCITY, Velocity, is_near
-from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.robot.state_over_soap import value_in
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
@@ -77,11 +77,11 @@ class AcrossInterfaces:
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Take one exchange of the run."""
         if isinstance(attempt, Exchange):
-            yield from self._answered(attempt)
+            yield from self._judge_read(attempt)
         elif attempt.request.method not in SAFE_METHODS:  # the request may have been carried out
             self._forget(self._received_s)
 
-    def _answered(self, exchange: Exchange) -> Iterator[Case]:
+    def _judge_read(self, exchange: Exchange) -> Iterator[Case]:
         request, response = exchange.request, exchange.response
         if self._acted_by_hand:
             self._acted_by_hand = False
@@ -95,7 +95,7 @@ class AcrossInterfaces:
             if crossed or not asked:
                 self._forget(response.received_s if crossed or b":Get" not in request.body else self._acted_s)
             elif response.ok or (asked[0].shape is GOAL and b"Fault" in response.body):
-                found, problem = answered(exchange, asked[0].shape) if named else (None, "")
+                found, problem = value_in(exchange, asked[0].shape) if named else (None, "")
                 nothing = bool(problem) or found is None or bool(asked[0].shape.problem(found))
                 if asked[0].shape is GOAL or not nothing:
                     asked[0].since.append((None if nothing else found, exchange, asked[0].over_soap))

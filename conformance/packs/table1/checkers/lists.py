@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.message_shapes import MESSAGE_TYPE, SERVICE_
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES
-from conformance.packs.table1.robot.soap_services import returned
+from conformance.packs.table1.robot.soap_services import returns
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
@@ -118,7 +118,7 @@ class Lists:
         )
 
     def _over_soap(self, seen: _Seen, exchange: Exchange) -> None:
-        found, problem = returned(exchange)
+        found, problem = returns(exchange)
         if problem or seen.listed is None or _sent_s(exchange) < seen.received_s:
             return
         schema = seen.shape.schema["items"]

@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.geometry import Pose, pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.packs.table1.robot.plan import START_OFF, Plan, plan_of
 from conformance.packs.table1.robot.robot import PLAN, POSE
-from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.robot.state_over_soap import value_in
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
 from conformance.verdict.evidence import Case, case
@@ -84,7 +84,7 @@ class Plans:
             value = _read(response)
         elif exchange.request.method == "POST" and b"GetPlanResponse" in response.body:
             asked = _asked_over_soap(exchange.request.body)
-            value, _ = answered(exchange, GET_PLAN)
+            value, _ = value_in(exchange, GET_PLAN)
         else:
             return
         if value is None or GET_PLAN.problem(value):

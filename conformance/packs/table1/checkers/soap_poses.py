@@ -7,7 +7,7 @@ from conformance.documents.representation import projected
 from conformance.packs.table1.robot.agreement import stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
 from conformance.packs.table1.robot.robot import POSE
-from conformance.packs.table1.robot.state_over_soap import answered, contradiction
+from conformance.packs.table1.robot.state_over_soap import contradiction, value_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
@@ -43,7 +43,7 @@ class SoapPoses:
         if request.method == "GET" and request.url == self._url and response.media_type == "application/json":
             yield from self._over_rest(attempt)
         elif request.method == "POST" and response.ok and b"GetPoseResponse" in response.body:
-            value, problem = answered(attempt, ODOMETRY)
+            value, problem = value_in(attempt, ODOMETRY)
             if not problem and not ODOMETRY.problem(value):
                 yield from self._in_order(value, attempt)
                 self._between.append((value, attempt))

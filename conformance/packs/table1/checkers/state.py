@@ -187,7 +187,7 @@ class State:
                 cause="old",
             )
         self._clock.take(now - elapsed_ms / 2000, stamp[0] + stamp[1] / 1e9)
-        self._clock.dated(stamp[0] + stamp[1] / 1e9, exchange.response.header("date") or "")
+        self._clock.add(stamp[0] + stamp[1] / 1e9, exchange.response.header("date") or "")
         self._last_stamp = max(stamp, self._last_stamp) if self._last_stamp else stamp
         self._last_received = max(self._last_received, now)
 

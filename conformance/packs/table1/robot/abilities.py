@@ -50,7 +50,7 @@ def _wheels(limits: Limits) -> float:
     return max(map(abs, limits.range_of(AHEAD)))
 
 
-def actuated(motion: Motion, component: int) -> bool:
+def can_move(motion: Motion, component: int) -> bool:
     """Return whether a robot can move in a component (index into Velocity)."""
     part, axis = divmod(component, len("xyz"))
     return f"{('linear', 'angular')[part]}.{'xyz'[axis]}" in motion.actuated
@@ -58,12 +58,12 @@ def actuated(motion: Motion, component: int) -> bool:
 
 def handiest(motion: Motion) -> int:
     """Return the component in which a robot can move with the least room."""
-    return next((component for component in _BY_ROOM if actuated(motion, component)), ABOUT)
+    return next((component for component in _BY_ROOM if can_move(motion, component)), ABOUT)
 
 
 def _within(limits: Limits, motion: Motion, component: int, value: float) -> float:
     """Return a component clipped to its range, or in the other direction if the robot has only that one."""
-    if not actuated(motion, component):
+    if not can_move(motion, component):
         return 0.0
     least, greatest = limits.range_of(component)
     if (value < 0 and not least) or (value > 0 and not greatest):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from conformance.documents.json_schema import is_number
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ def disagreement(before: Any, between: Any, after: Any, slack: Slack, where: str
         room = 0.0 if low == high else slack.absolute + slack.relative * max(abs(low), abs(high))
         if not is_number(between) or not low - room <= float(between) <= high + room:
             wanted = f"{low!r}" if low == high else f"{low!r} to {high!r}"
-            return f"{where} is {shown(between)} for {wanted}"
+            return f"{where} is {clip(between)} for {wanted}"
         return ""
-    return "" if between in (before, after) else f"{where} is {shown(between)} for {shown(before)}"
+    return "" if between in (before, after) else f"{where} is {clip(between)} for {clip(before)}"
 
 
 def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slack: Slack, where: str) -> str:
@@ -45,7 +45,7 @@ def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slac
         last = after[name]
         if name == "orientation" and isinstance(between, dict):
             # A quaternion and its negative are the same orientation: compare the nearer one.
-            first, last = _turned(first, between.get(name)), _turned(last, between.get(name))
+            first, last = _nearer_sign(first, between.get(name)), _nearer_sign(last, between.get(name))
         if not isinstance(between, dict) or name not in between:
             return f"{path} is missing"
         problem = disagreement(first, between[name], last, slack, path)
@@ -54,7 +54,7 @@ def _in_fields(before: dict[str, Any], between: Any, after: dict[str, Any], slac
     return ""
 
 
-def _turned(quaternion: Any, like: Any) -> Any:
+def _nearer_sign(quaternion: Any, like: Any) -> Any:
     """Return a quaternion or its negative, whichever is nearer to ``like``; return other values unchanged."""
     try:
         aside = sum(float(quaternion[axis]) * float(like[axis]) for axis in "xyzw") < 0

@@ -30,7 +30,7 @@ class Clock:
         self._first: list[tuple[float, float]] = []
         self._ahead: list[float] = []
 
-    def dated(self, stamp: float, date: str) -> None:
+    def add(self, stamp: float, date: str) -> None:
         """Add a response's stamp, s, and its ``Date`` field; one that is no date does not count."""
         try:
             self._ahead = [*self._ahead[-_MOST:], stamp - parsedate_to_datetime(date).timestamp()]

@@ -61,18 +61,18 @@ class ListObserver:
 
     def mark(self) -> None:
         """Forget the entries that the list has now."""
-        self._before = self._listed()
+        self._before = self._read_list()
 
     def collect(self, count: int, then_s: float = QUIET_S) -> list[Seen]:
         """Return the new entries of the list."""
         patience = Patience(self._rest.connection.pace, ARRIVES_S + 4 * self._slow_s, self._clock)
         for _ in poll(self._clock, _STEP_S, lambda: patience.over):
-            listed = self._listed()
+            listed = self._read_list()
             if len(self._new(listed)) >= count:
                 break
         if then_s:
             self._clock.sleep(then_s)
-            listed = self._listed()
+            listed = self._read_list()
         new = self._new(listed)
         self._before = listed
         return [Seen(Delivery.of(entry["request"]), entry["interface"]) for entry in reversed(new)]
@@ -86,7 +86,7 @@ class ListObserver:
                 return listed[:count]
         return listed
 
-    def _listed(self) -> list[Any]:
+    def _read_list(self) -> list[Any]:
         value, problem = read_as(self._rest.send("GET", DELIVERIES, headers=ACCEPT_JSON).response, LIST)
         if problem:
             raise NoObserverError(f"the robot's list of deliveries cannot be read: {problem}")

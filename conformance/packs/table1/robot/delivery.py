@@ -63,7 +63,7 @@ def put_delivery(api: RestInterface, path: str, *, fresh: bool = False, headers:
     return last
 
 
-def written(value: float) -> tuple[str, ...]:
+def notations(value: float) -> tuple[str, ...]:
     """Return the notations of a number that the contract allows: with or without sign, fraction and exponent."""
     forms = [repr(value), f"{value:.17e}", f"{value:+.20e}"]
     if abs(value) < _ONLY_DIGITS:
@@ -91,7 +91,7 @@ def lexical_deliveries() -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
 
     def forms(delivery: Delivery) -> st.SearchStrategy[tuple[Delivery, tuple[str, ...]]]:
         code = st.sampled_from((str(delivery.message_code), f"+{delivery.message_code}", f"0{delivery.message_code}"))
-        numbers = (st.sampled_from(written(value)) for value in delivery[1:])
+        numbers = (st.sampled_from(notations(value)) for value in delivery[1:])
         return st.tuples(st.just(delivery), st.tuples(code, *numbers))
 
     return deliveries().flatmap(forms)

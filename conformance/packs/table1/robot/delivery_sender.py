@@ -99,7 +99,7 @@ class DeliverySender:
 
     def _record(self, sent: tuple[Sent, ...]) -> None:
         """Record a batch; wait a little longer if other deliveries arrived than were accepted."""
-        accepted = [message for message in sent if message.accepted]
+        accepted = [message for message in sent if message.is_ok]
         seen = self.observer.collect(len(accepted), 0.0)
         if self._keys(seen) != self._keys(accepted):
             seen += self.observer.collect(0)

@@ -43,7 +43,7 @@ class Sent:
     exchange: Exchange | None
 
     @property
-    def accepted(self) -> bool:
+    def is_ok(self) -> bool:
         """Return whether the robot accepted the delivery."""
         return self.exchange is not None and self.exchange.response.ok
 
@@ -79,7 +79,7 @@ class Deliveries:
         """Return a key that is equal for deliveries that the observer cannot tell apart."""
         return key_of(delivery, exact=self.exact)
 
-    def judged(self) -> Iterator[tuple[Batch, tuple[Batch, ...]]]:
+    def batches_to_judge(self) -> Iterator[tuple[Batch, tuple[Batch, ...]]]:
         """Yield each batch to judge, with the batches before it."""
         for index in range(self.first, len(self.batches)):
             yield self.batches[index], self.batches[:index]

@@ -77,14 +77,14 @@ class Drive:
             before()
             exchange = self.robot.put(path, value, fresh=fresh)
         command = Command(velocity, sent, self.clock.now(), exchange, linear_only=linear, integers=integers)
-        self.trace = self.trace.commanded(command)
+        self.trace = self.trace.with_command(command)
         if exchange.response.status == HTTPStatus.CONFLICT and self.robot.goal()[0] is not None:
             raise NotPossibleError("the robot follows a goal of its own")
         return drive_rules.answer_of(command).holds
 
-    def commanded(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
+    def note_command(self, velocity: Velocity, sent: float, exchange: Exchange) -> None:
         """Record a command that other code sent at the time ``sent`` (s of the run's clock) as the last command."""
-        self.trace = self.trace.commanded(Command(velocity, sent, self.clock.now(), exchange))
+        self.trace = self.trace.with_command(Command(velocity, sent, self.clock.now(), exchange))
 
     def _renew(self) -> None:
         """Send the last command again in the same form, because another form could hide a fault of this one."""
@@ -95,7 +95,7 @@ class Drive:
             headers = (("Content-Type", request.media_type), *ACCEPT_JSON)
             exchange = self.robot.rest.send("PUT", path, headers=headers, body=request.body)
             again = replace(last, sent=sent, answered=self.clock.now(), exchange=exchange, renewal=True)
-            self.trace = self.trace.commanded(again)
+            self.trace = self.trace.with_command(again)
 
     @property
     def holds_until(self) -> float:
@@ -143,7 +143,7 @@ class Drive:
         odometry = self.robot.odometry()
         at = self.clock.now()
         velocity, exchange = self.robot.velocity()
-        self.trace = self.trace.looked(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
+        self.trace = self.trace.with_look(Turn(odometry, at, velocity, exchange, *self.robot.linear()))
         self.aside(len(self.trace.turns))
         return velocity, exchange
 
@@ -187,7 +187,7 @@ class Drive:
         """
         limits = self.robot.limits
         patience = min(self.robot.settle_s, within or self.robot.settle_s)
-        begun = self.trace.answered if since is None else since
+        begun = self.trace.last_answered_s if since is None else since
         first = len(self.trace.turns)
         count = SEVERAL if ids else 1
         lapses = 0
@@ -196,11 +196,11 @@ class Drive:
         renews = limits.hold_s is None or limits.hold_s < patience
         while True:
             now = self.clock.now()
-            lapsed = limits.hold_s is not None and now > self.trace.sent + certain_s(limits.hold_s)
+            lapsed = limits.hold_s is not None and now > self.trace.last_sent_s + certain_s(limits.hold_s)
             # Do not repeat a command that had no effect within the settle time: that would hide the fault.
             if not lapsed and now > begun + limits.settle_s:
                 renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
-            if renews and self.trace.commands and now > self.trace.sent + every:
+            if renews and self.trace.commands and now > self.trace.last_sent_s + every:
                 self._renew()
                 if lapsed and lapses < _LAPSES:
                     # The suite was late, not the robot, which may have slowed down meanwhile: start again.
@@ -209,17 +209,17 @@ class Drive:
             until = begun + patience
             self.look()
             turns = self.trace.turns[first:]
-            there = windows.shown(limits, turns, wanted, part=part, count=count)
+            there = windows.is_shown(limits, turns, wanted, part=part, count=count)
             # Readings from before the suite was held up, while the robot still had time, are not held against it.
             settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
             late = [turn for turn in turns if turn.at >= settled]
-            decided = windows.shown(limits, late, wanted, part=part, count=count) is not None
+            decided = windows.is_shown(limits, late, wanted, part=part, count=count) is not None
             if there or (now > until and decided) or now > until + _LONGER_S:
                 break
         counted = settled if not there and windows.newest(late) else begun
         if wanted == STILL:
             # After such a late response, the watchdog may have stopped the robot instead of the command.
-            outlasted = bool(there) and within is not None and self.trace.answered > begun + patience
+            outlasted = bool(there) and within is not None and self.trace.last_answered_s > begun + patience
         else:
             outlasted = not there and (self._outlasts_hold or lapses == _LAPSES)
         reach = Reach(ids, wanted, part, counted, len(self.trace.turns), bool(there), outlasted)
@@ -263,7 +263,7 @@ class Drive:
         if holds is not None:
             self._saw(shows, Case(holds, self.trace.turns[-1].velocity_exchange, expected, observed, cause))
 
-    def refused(self, shows: str, expected: str) -> None:
+    def note_refusal(self, shows: str, expected: str) -> None:
         """Record that the robot rejected the last command, which a requirement forbids."""
         exchange = self.trace.commands[-1].exchange
         self._saw(shows, Case(holds=False, exchange=exchange, expected=expected, cause=exchange.came))

@@ -12,7 +12,7 @@ from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace
 from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.packs.table1.robot.windows import middle, newest, shown, velocities
+from conformance.packs.table1.robot.windows import is_shown, middle, newest, velocities
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
@@ -48,7 +48,7 @@ def every_outcome(trace: Trace, limits: Limits, *, way: bool, readings: bool = T
         way: whether the pose must follow the velocity.
         readings: whether to include the outcomes of single readings, of which there are hundreds.
     """
-    yield from ((_answered(command), answer_of(command)) for command in trace.commands if not command.renewal)
+    yield from ((_put_requirement(command), answer_of(command)) for command in trace.commands if not command.renewal)
     if readings:
         yield from _readings(trace, limits)
     for reach in trace.reaches:
@@ -105,7 +105,7 @@ def _ways(trace: Trace, limits: Limits) -> Iterator[tuple[str, Outcome]]:
             yield id_, case
 
 
-def _answered(command: Command) -> str:
+def _put_requirement(command: Command) -> str:
     """Return the id of the requirement on the response to a velocity command."""
     name = "linear-put" if command.linear_only else "velocity-integers" if command.integers else "velocity-put"
     return f"{_RESOURCES}/{name}"
@@ -147,7 +147,7 @@ def agreement(trace: Trace, limits: Limits) -> Iterator[tuple[str, Case]]:
     steady = [turn.odometry.velocity for turn in window if turn.odometry is not None]
     count = len(newest(window[::-1], len(window)))
     lasted = len(trace.turns) > len(window) or since == odometry.sent
-    if trace.sent > since or not lasted or count < SEVERAL or len(steady) < len(window):
+    if trace.last_sent_s > since or not lasted or count < SEVERAL or len(steady) < len(window):
         return
     wanted = middle(steady)
     if not _is_steady(limits, steady):
@@ -201,7 +201,7 @@ def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
     seen = trace.turns[: reach.turns]
     turns = [turn for turn in seen[-_LOOKED_AT:] if turn.at >= reach.since]
     window = velocities(newest(turns))
-    holds = shown(limits, turns, reach.wanted, part=reach.part, count=max(1, min(SEVERAL, len(window))))
+    holds = is_shown(limits, turns, reach.wanted, part=reach.part, count=max(1, min(SEVERAL, len(window))))
     turn = seen[-1]
     expected = f"{rounded(reach.wanted)} within {limits.settle_s:g} s of the command"
     observed = str(middle(window)) if window else turn.velocity_exchange.came

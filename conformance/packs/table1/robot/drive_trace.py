@@ -68,7 +68,7 @@ class Turn:
     commands: int = 0
 
     @property
-    def received(self) -> float:
+    def received_s(self) -> float:
         """Return when the velocity had arrived, s of the run's clock."""
         return self.at + self.velocity_exchange.response.elapsed_ms / 1000
 
@@ -118,11 +118,11 @@ class Trace:
     sightings: tuple[tuple[str, Case], ...] = ()
     outlasted: bool = False
 
-    def commanded(self, command: Command) -> Trace:
+    def with_command(self, command: Command) -> Trace:
         """Return the trace with one more command."""
         return replace(self, commands=(*self.commands, command))
 
-    def looked(self, turn: Turn) -> Trace:
+    def with_look(self, turn: Turn) -> Trace:
         """Return the trace with one more look."""
         longer = replace(self, turns=(*self.turns, replace(turn, commands=len(self.commands))))
         if turn.odometry is None:
@@ -136,7 +136,7 @@ class Trace:
         return replace(self, turns=seen, commands=self.commands[: seen[-1].commands] if seen else ())
 
     @property
-    def sent(self) -> float:
+    def last_sent_s(self) -> float:
         """Return the time at which the last command was sent."""
         return self.commands[-1].sent if self.commands else self.begun
 
@@ -156,6 +156,6 @@ class Trace:
         return next((command for command in reversed(self.commands) if not command.renewal), None)
 
     @property
-    def answered(self) -> float:
+    def last_answered_s(self) -> float:
         """Return the time of the response to the last command that was no renewal."""
         return self.last_command.answered if self.last_command else self.begun

@@ -4,7 +4,7 @@ import math
 from http import HTTPStatus
 from typing import Any, Final
 
-from conformance.documents.json_text import read_json, shown
+from conformance.documents.json_text import clip, read_json
 from conformance.observe.clock import poll
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
 from conformance.packs.table1.robot.message_shapes import LAST_GOAL, STATUS
@@ -57,10 +57,10 @@ def difference(goal: Any, put: dict[str, Any]) -> str:
     A quaternion and its negative are the same orientation.
     """
     if "goal_id" in put and goal["goal_id"]["id"] != put["goal_id"]["id"]:
-        return f"goal_id.id {shown(goal['goal_id']['id'])} for {shown(put['goal_id']['id'])}"
+        return f"goal_id.id {clip(goal['goal_id']['id'])} for {clip(put['goal_id']['id'])}"
     active, wanted = goal["goal"]["target_pose"], put["goal"]["target_pose"]
     if active["header"]["frame_id"] != wanted["header"]["frame_id"]:
-        return f"frame_id {shown(active['header']['frame_id'])} for {shown(wanted['header']['frame_id'])}"
+        return f"frame_id {clip(active['header']['frame_id'])} for {clip(wanted['header']['frame_id'])}"
     for axis, put_at in wanted["pose"]["position"].items():
         found = float(active["pose"]["position"][axis])
         if not math.isclose(found, put_at, rel_tol=1e-9, abs_tol=_CLOSE):
@@ -69,7 +69,7 @@ def difference(goal: Any, put: dict[str, Any]) -> str:
     dot = sum(float(turned[axis]) * wished[axis] for axis in "xyzw")
     length = math.hypot(*(float(turned[axis]) for axis in "xyzw")) * math.hypot(*wished.values())
     if not abs(abs(dot) - length) <= _CLOSE or not length > _CLOSE:
-        return f"orientation {shown(turned)} for {shown(wished)}"
+        return f"orientation {clip(turned)} for {clip(wished)}"
     return ""
 
 
@@ -96,7 +96,7 @@ def outcome_fault(exchange: Exchange, code: int, id_: str | None = None) -> str:
     if wrong:
         return wrong
     if id_ not in {None, last["goal_id"]["id"]}:
-        return f"last_goal.goal_id.id {shown(last['goal_id']['id'])}"
+        return f"last_goal.goal_id.id {clip(last['goal_id']['id'])}"
     return "" if last["status"]["code"] == code else f"last_goal.status.code {last['status']['code']:g}"
 
 
@@ -125,7 +125,7 @@ def await_none(robot: Robot, seconds: float | None = None) -> Exchange:
     return exchange
 
 
-def arrived(robot: Robot, pose: Pose) -> bool:
+def is_there(robot: Robot, pose: Pose) -> bool:
     """Return whether the robot is so near a goal that the goal may have ended."""
     here = robot.map_pose()
     return here is None or here.distance(pose) < robot.limits.arrival[0] + _ARRIVED_M

@@ -169,7 +169,7 @@ class GoalReached:
     turned_off: tuple[Exchange, float] | None = None
 
     @property
-    def arrived(self) -> bool:
+    def is_near(self) -> bool:
         """Return whether the robot's last pose is within the tolerances of the target."""
         return self.left_m < self.reached_m and (self.reached_rad is None or abs(self.off_rad) < self.reached_rad)
 

@@ -45,7 +45,7 @@ def choose_goals(robot: Robot, distance: float, count: int) -> list[Pose]:
             raise NoOccasionError("the robot has no plan to any pose around it")
     for part in range(1, count):
         if len(goals) < count:
-            goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turned(goals[0], part))
+            goals.append(_on_the_way(robot, here, goals[0], 1 - part / (count + 1)) or _turn(goals[0], part))
     return goals
 
 
@@ -57,14 +57,14 @@ def _on_the_way(robot: Robot, here: Pose, goal: Pose, share: float) -> Pose | No
     return pose if plan is not None and plan.poses[-1].distance(pose) < EXACT else None
 
 
-def _turned(goal: Pose, by_rad: float) -> Pose:
+def _turn(goal: Pose, by_rad: float) -> Pose:
     """Return the goal's position with another heading, which is as reachable."""
     return Pose(goal.x, goal.y, math.remainder(goal.yaw + by_rad, math.tau))
 
 
 def in_turn(goals: Sequence[Pose], number: int) -> Pose:
     """Return one goal of a series that takes turns between some places, each time with another heading."""
-    return _turned(goals[number % len(goals)], number * _TURN_RAD)
+    return _turn(goals[number % len(goals)], number * _TURN_RAD)
 
 
 def meanwhile(robot: Robot, id_: str, act: Callable[[dict[str, Any], Pose, dict[str, Any]], bool]) -> bool:

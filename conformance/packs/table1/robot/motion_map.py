@@ -12,7 +12,7 @@ import msgspec
 from conformance.api.rest.calls import XML
 from conformance.documents.representation import local_name, parse_xml
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.abilities import actuated
+from conformance.packs.table1.robot.abilities import can_move
 from conformance.packs.table1.robot.robot import LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
 from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.statement import Statement
@@ -42,7 +42,7 @@ def motion_map_of(statement: Statement, xml_root: str = "") -> MotionMap:
         xml_root: the root element of its velocity as XML; empty: it takes no XML.
     """
     limits = statement.limits
-    there = [component for component in range(len(NAMES)) if actuated(statement.motion, component)]
+    there = [component for component in range(len(NAMES)) if can_move(statement.motion, component)]
     twist: dict[str, Any] = {part: dict.fromkeys("xyz", 0.0) for part in ("linear", "angular")}
     for component in there:
         twist[_part(component)]["xyz"[component % 3]] = f"{{{NAMES[component]}}}"

@@ -121,7 +121,7 @@ class _Sums(NamedTuple):
         return self.each[-1].miss(self.each[0])
 
 
-def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
+def _sum_steps(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_stamp: bool) -> _Sums:
     steps = [_Sum()]
     skipped = _longest_lapse(trace)
     linear, angular = (max(abs(velocity[part]) for velocity in velocities) for part in (0, 5))
@@ -152,14 +152,14 @@ def _summed(trace: Sequence[Odometry], velocities: Sequence[Velocity], *, by_sta
                 x_error=x_error,
                 y_error=y_error,
                 turn_error=turn_error,
-                along_error=_signed(along, first.linear_x, linear) if fine else 0.0,
-                turned_error=_signed(turn_error, first.angular_z, angular) if fine else 0.0,
+                along_error=_along_motion(along, first.linear_x, linear) if fine else 0.0,
+                turned_error=_along_motion(turn_error, first.angular_z, angular) if fine else 0.0,
             )
         )
     return _Sums(trace, list(itertools.accumulate(steps, lambda total, step: _Sum(*map(operator.add, total, step)))))
 
 
-def _signed(error: float, speed: float, fastest: float) -> float:
+def _along_motion(error: float, speed: float, fastest: float) -> float:
     """Return an error in the direction of motion; 0 at low speed, where the direction may be noise."""
     return math.copysign(error, error * speed) if error and abs(speed) > _MOVES * fastest else 0.0
 
@@ -195,7 +195,7 @@ def way_and_turn(
     if len(trace) < _FEWEST:
         return None, None
     sources = ([odometry.velocity for odometry in trace], measured)
-    sums = [_summed(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
+    sums = [_sum_steps(trace, source, by_stamp=by_stamp) for source in sources for by_stamp in (True, False)]
     way = _way([one for one in sums if one.each[-1].length >= _SHORTEST], noise)
     return way, _turn([one for one in sums if one.each[-1].turned >= _LEAST_TURN], noise)
 

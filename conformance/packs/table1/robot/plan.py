@@ -16,7 +16,7 @@ from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
-from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.robot.state_over_soap import value_in
 from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 
@@ -103,7 +103,7 @@ def ask_over_soap(robot: Robot, subscribers: SoapService, goal: Pose) -> tuple[P
     frame = robot.statement.motion.frame
     named = {} if frame == "map" else {"frame_id": frame}
     exchange = soap_services.ask(subscribers, "GetPlan", x=goal.x, y=goal.y, **named)
-    message, problem = answered(exchange, GET_PLAN)
+    message, problem = value_in(exchange, GET_PLAN)
     return None if problem or GET_PLAN.problem(message) else plan_of(message), exchange
 
 

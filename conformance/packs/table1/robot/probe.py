@@ -73,14 +73,14 @@ class Probe(RosProcess):
 
     def deliveries(self) -> list[Delivery]:
         """Return the DeliveryRequestMsg messages received since the last call, in order."""
-        heard = self._heard("deliveries", self._ros.delivery_topic, lambda message: list(message.values()))
+        heard = self._take_new("deliveries", self._ros.delivery_topic, lambda message: list(message.values()))
         return [Delivery(int(code), *values) for code, *values in heard]
 
     def velocities(self) -> list[Velocity]:
         """Return the velocity commands received since the last call, in order."""
-        return [Velocity(*values) for values in self._heard("velocities", self._ros.cmd_vel_topic, _axes)]
+        return [Velocity(*values) for values in self._take_new("velocities", self._ros.cmd_vel_topic, _axes)]
 
-    def _heard(self, eye: str, topic: str, values_of: Callable[[dict[str, Any]], list[float]]) -> list[list[float]]:
+    def _take_new(self, eye: str, topic: str, values_of: Callable[[dict[str, Any]], list[float]]) -> list[list[float]]:
         """Return and record the messages of one topic since the last call."""
         heard = []
         for at_ns, _, message in self.tell("heard", name=topic)["events"]:

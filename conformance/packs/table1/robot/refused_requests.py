@@ -121,7 +121,7 @@ class RefusedRequests(Listener):
         self._dropped: set[Request] = set()
         self.has_known = False
 
-    def answered(self, exchange: Exchange) -> None:
+    def on_response(self, exchange: Exchange) -> None:
         """Keep a request that was refused, if it can be sent again and is refused in any state."""
         request, response = exchange.request, exchange.response
         if not _is_plain(request) or not is_refused(exchange) or request in self._dropped:
@@ -137,7 +137,7 @@ class RefusedRequests(Listener):
         """Forget a request that the robot has taken in another state: it was not wrong, but came at a wrong time."""
         self._dropped.add(refused.request)
 
-    def chosen(self, services: Iterable[SoapService], effort: Effort) -> list[Refused]:
+    def choose(self, services: Iterable[SoapService], effort: Effort) -> list[Refused]:
         """Return as many of the requests as the effort allows: of each operation some, and first those that would act.
 
         Args:

@@ -269,9 +269,9 @@ class Robot:
         """Return whether the statement declares the limit of a component."""
         return self.limits.linear_declared if component < len("xyz") else self.limits.angular_declared
 
-    def actuated(self, component: int) -> bool:
+    def can_move(self, component: int) -> bool:
         """Return whether the statement declares that the robot can move in a component."""
-        return abilities.actuated(self.statement.motion, component)
+        return abilities.can_move(self.statement.motion, component)
 
     @property
     def reverses(self) -> bool:

@@ -8,7 +8,7 @@ from lxml import etree
 
 from conformance.api.soap.calls import call, read_exchange, send
 from conformance.api.soap.envelope import envelope
-from conformance.api.soap.messages import filled
+from conformance.api.soap.messages import message_of
 from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.valid_messages import call_valid, require_valid_message
 from conformance.api.soap.xml_style import XmlStyle, serialize
@@ -33,7 +33,7 @@ def request(operation: str, **values: float | str) -> Node:
             element without a value is left out.
     """
     texts = {name: value if isinstance(value, str) else repr(value) for name, value in values.items()}
-    return filled(_shape(operation), texts)
+    return message_of(_shape(operation), texts)
 
 
 def delivery(operation: str = "ExecuteDeliveryRequest", code: str = "4", **coordinates: str) -> Node:
@@ -87,7 +87,7 @@ def delivery_outgoing(publishers: SoapService, values: Delivery, *, coffee: bool
 def outgoing(service: SoapService, payload: Node) -> Addressed:
     """Return a SOAP call as a request to be sent at the same time as others."""
     headers = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
-    message = envelope((require_valid_message(service, payload),)).written()
+    message = envelope((require_valid_message(service, payload),)).serialize()
     return service.client, Outgoing("POST", service.path, headers, message)
 
 
@@ -102,10 +102,10 @@ def text_at(element: etree._Element, *names: str) -> str | None:
     return None if found is None else found.strip()
 
 
-def returned(exchange: Exchange) -> tuple[list[etree._Element], str]:
+def returns(exchange: Exchange) -> tuple[list[etree._Element], str]:
     """Return the ``return`` elements of a response, and the fault of a response without any."""
     answer = read_exchange(exchange)
-    if not answer.accepted or answer.first is None:
+    if not answer.is_taken or answer.first is None:
         return [], f"no SOAP response: {exchange.came}"
     return [child for child in elements(answer.first) if local(str(child.tag)) == "return"], ""
 
@@ -117,7 +117,7 @@ def position(subscribers: SoapService) -> tuple[float, float] | None:
         NoAnswerError: no HTTP response came.
     """
     answer = call(subscribers, request("GetPose"))
-    if not answer.accepted or answer.first is None:
+    if not answer.is_taken or answer.first is None:
         return None
     try:
         x, y = (float(text_at(answer.first, "pose", "pose", "position", axis) or "") for axis in "xy")

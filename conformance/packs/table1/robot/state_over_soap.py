@@ -13,7 +13,7 @@ from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.robot.agreement import Slack, disagreement, stamp_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, VELOCITY, Robot
-from conformance.packs.table1.robot.soap_services import ask, returned
+from conformance.packs.table1.robot.soap_services import ask, returns
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
 
@@ -53,9 +53,9 @@ class StateRead:
             yield Case(not problem, self.exchange, expected, problem, cause)
 
 
-def answered(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
+def value_in(exchange: Exchange, shape: Shape) -> tuple[Any, str]:
     """Return the value in a SOAP response, and the fault of a response without one."""
-    found, problem = returned(exchange)
+    found, problem = returns(exchange)
     if problem or len(found) != 1:
         return None, problem or f"{len(found)} return elements"
     return from_element(found[0], shape.schema), ""
@@ -88,28 +88,28 @@ def read_state(
     robot.clock.sleep(apart_s)
     first()
     exchange = ask(subscribers, operation)
-    between, problem = answered(exchange, shape)
+    between, problem = value_in(exchange, shape)
     robot.clock.sleep(apart_s)
     after, _ = robot.read(path, shape)
     if before is None or after is None:
         return None
     steady, broken = lasted(), ""
     if not problem:
-        broken = shape.problem(between) or restamped(between, before, after) or contradiction(between, before, after)
+        broken = shape.problem(between) or stamp_fault(between, before, after) or contradiction(between, before, after)
     problem = problem or disagreement(before, between, after, _slack(robot))
     if not problem and name == "pose" and not stamp_of(before) <= stamp_of(between) <= stamp_of(after):
         problem = f"stamp {stamp_of(between)}, which is not between {stamp_of(before)} and {stamp_of(after)}"
-    return counted(StateRead(name, exchange, broken, problem), lasted=steady)
+    return usable(StateRead(name, exchange, broken, problem), lasted=steady)
 
 
-def counted(read: StateRead, *, lasted: bool) -> StateRead | None:
+def usable(read: StateRead, *, lasted: bool) -> StateRead | None:
     """Return a reading that counts, without its difference if the state changed meanwhile; None if none is left."""
     if lasted or not read.differs:
         return read
     return replace(read, differs="") if read.broken else None
 
 
-def restamped(message: Any, *others: Any) -> str:
+def stamp_fault(message: Any, *others: Any) -> str:
     """Return how a stamp differs from another's by less than a sample: the same stamp, written wrongly."""
     sec, nanosec = stamp_of(message)
     for other in map(stamp_of, others):
@@ -158,10 +158,10 @@ def compare(
             renew()
             yield read_state(robot, subscribers, name, apart_s, lasted, first=first)
 
-    return agreed(tries())
+    return best_of(tries())
 
 
-def agreed(tries: Iterable[StateRead | None]) -> list[StateRead]:
+def best_of(tries: Iterable[StateRead | None]) -> list[StateRead]:
     """Return the first try without a difference, or the last one, with the differences that time cannot explain."""
     reads: list[StateRead] = []
     for read in tries:

@@ -79,7 +79,7 @@ def reach(drive: Drive, velocity: Velocity, *ids: str) -> bool:
     """
     if not drive.command(velocity):
         expected = f"2xx for {velocity}, which is within the declared limits"
-        drive.refused(ids[0] if ids else "rest-resources/velocity-range", expected)
+        drive.note_refusal(ids[0] if ids else "rest-resources/velocity-range", expected)
         return False
     return drive.reach(velocity, *(ids or ("rest-resources/velocity-converges", "rest-resources/velocity-range")))
 
@@ -109,7 +109,7 @@ _TOLD: Final = 4
 _MOST: Final = 0.6
 
 
-def unrenewed(
+def unrenewed_velocities(
     bent: Velocity, ahead: Velocity, across: Velocity, others: tuple[Velocity, ...], effort: str, seed: int
 ) -> list[tuple[Velocity, By]]:
     """Return velocities to send without renewal, and how each is commanded last.

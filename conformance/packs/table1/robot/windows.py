@@ -77,10 +77,10 @@ def verdict(
     samples = velocities(newest(turns))
     if samples and is_near(limits, part_of(samples[-1], part), part_of(wanted, part), factor):
         return True
-    return shown(limits, turns, wanted, factor, part)
+    return is_shown(limits, turns, wanted, factor, part)
 
 
-def shown(
+def is_shown(
     limits: Limits,
     turns: Sequence[Turn],
     wanted: Velocity,

@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.goal_life import await_motion, cancel, slow_turn
 from conformance.packs.table1.scenarios.not_acceptable import put_unacceptable
 from conformance.packs.table1.scenarios.plans import is_refused
-from conformance.scenarios.motion.attempts import tried_at_rest, vanished
+from conformance.scenarios.motion.attempts import send_in_parts, tried_at_rest
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Quiet, Tried
 from conformance.scenarios.scenario import NoOccasionError, scenario
@@ -71,8 +71,8 @@ _AWAY_M: Final = 1.0
 def attempts(api: RestInterface, robot: Robot, mapped_robot: MappedDevice) -> Quiet:
     """Send requests to a robot at rest that must not move it, and watch its position and goal."""
     made = _Attempts(api, robot, mapped_robot)
-    several = [made.cancelled, made.not_acceptable, made.incomplete, made.beyond, made.elsewhere, made.invalid]
-    several += [made.unactuated]
+    several = [made.try_cancelled, made.not_acceptable, made.incomplete, made.beyond, made.elsewhere, made.invalid]
+    several += [made.try_unactuated]
     watched_s = max(robot.limits.settle_s, _STAYS_S * robot.watchfulness)
     return tried_at_rest(mapped_robot, several, made.settle, watched_s, made.goal)
 
@@ -91,7 +91,7 @@ class _Attempts:
         """Return the robot's goal for a message; empty if it has none."""
         return "" if self.robot.goal()[0] is None else GOAL
 
-    def cancelled(self) -> Iterator[Tried]:
+    def try_cancelled(self) -> Iterator[Tried]:
         """Command a velocity, put a goal in its place, and cancel that."""
         robot = self.robot
         robot.put_velocity(slow_turn(robot))
@@ -125,7 +125,7 @@ class _Attempts:
         for sign in (1, -1):
             fast, goal = robot.share_of_limits(0.3 * sign, 0.5 * sign), self._goal(here.ahead(sign * _AWAY_M))
             for path, value in ((VELOCITY, fast.twist), (LINEAR, fast.linear), (GOAL_PATH, goal)):
-                yield from vanished(self.mapped, Outgoing("PUT", path, JSON_BODY, body_of(value)), f"PUT {path}")
+                yield from send_in_parts(self.mapped, Outgoing("PUT", path, JSON_BODY, body_of(value)), f"PUT {path}")
 
     def beyond(self) -> Iterator[Tried]:
         """PUT velocities beyond the limits, on each resource that has the component."""
@@ -151,9 +151,9 @@ class _Attempts:
             for what, media_type, body in effort.alternatives(invalid_bodies(self.api, path, valid, number), 8):
                 yield Tried("invalid", f"PUT {path} with {what}", put_body(self.robot, path, media_type, body))
 
-    def unactuated(self) -> Iterator[Tried]:
+    def try_unactuated(self) -> Iterator[Tried]:
         """PUT velocities in components that the statement does not list, until the robot reaches one of each."""
-        for component in (component for component in range(len(STILL)) if not self.robot.actuated(component)):
+        for component in (component for component in range(len(STILL)) if not self.robot.can_move(component)):
             for value in (_REACHED, -_REACHED, 1e-3, _BEYOND_ANY):
                 made = list(self._actuate(component, value))
                 yield from made
@@ -182,7 +182,7 @@ def _only(component: int, value: float) -> Velocity:
 def _beyond(robot: Robot) -> Iterator[Velocity]:
     """Yield velocities with one component just beyond its limit, far beyond it, and absurd, in both directions."""
     for component in range(6):
-        if not robot.actuated(component):
+        if not robot.can_move(component):
             continue
         least, greatest = robot.limits.range_of(component)
         for times in (1.001, 1.5) if robot.limit_declared(component) else ():

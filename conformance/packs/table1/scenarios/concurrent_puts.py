@@ -12,14 +12,14 @@ from conformance.api.rest.validity import require_valid
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.delivery import path_of
-from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, difference, goal_body
+from conformance.packs.table1.robot.goal import await_goal, await_none, difference, goal_body, is_there
 from conformance.packs.table1.robot.goal_trace import ConcurrentGoal, GoalRead
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.motion_map import speeds_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, Robot
 from conformance.scenarios.motion.mapped import MappedDevice, Position
-from conformance.scenarios.motion.moves import recorded
+from conformance.scenarios.motion.moves import record_parts
 from conformance.scenarios.motion.resting import fastest
 from conformance.scenarios.motion.several import of_drivers
 from conformance.scenarios.motion.trace import Drive
@@ -54,7 +54,7 @@ def concurrent_goal(robot: Robot, effort: Effort) -> tuple[ConcurrentGoal, ...]:
         ):
             continue  # the robot refuses this place to every client
         goal, differs, read = await_goal(robot, body)
-        if goal is None and arrived(robot, pose):
+        if goal is None and is_there(robot, pose):
             trace.append(ConcurrentGoal(puts, None))
             break
         robot.delete_goal()
@@ -89,7 +89,7 @@ def concurrent_goals(robot: Robot, effort: Effort) -> tuple[GoalRead, ...]:
         if not accepted:
             continue
         goal, differs, exchange = await_goal(robot, *accepted)
-        if goal is None and any(arrived(robot, pose) for pose in poses):
+        if goal is None and any(is_there(robot, pose) for pose in poses):
             break
         reads.append(GoalRead(exchange, differs))
     robot.delete_goal()
@@ -107,10 +107,10 @@ def concurrent_velocities(robot: Robot, mapped_robot: MappedDevice, effort: Effo
         return ()
     still = dict.fromkeys(mapped_robot.drives.axes, 0.0)
     several = [still | speeds_of(robot.share_of_limits(*shares)) for shares in _SHARES]
-    return recorded(_driven(mapped_robot, several) for _ in range(1 if effort.name == "quick" else 4))
+    return record_parts(_drive(mapped_robot, several) for _ in range(1 if effort.name == "quick" else 4))
 
 
-def _driven(mapped: MappedDevice, several: list[Position]) -> Drive:
+def _drive(mapped: MappedDevice, several: list[Position]) -> Drive:
     """Command velocities at the same moment, and again where the robot does not move: it may have been delayed."""
     for _ in range(_TRIES):
         drive = of_drivers(mapped, several)

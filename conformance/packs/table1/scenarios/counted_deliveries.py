@@ -82,7 +82,7 @@ class Rejected:
     def of(cls, what: str, delivery: Delivery, answer: SoapResponse) -> "Rejected":
         """Return the record of a service's response."""
         rejected = 400 <= answer.status < 500 or answer.code in _FAULTS  # noqa: PLR2004 - RFC 9110 15.5
-        return cls(what, delivery, answer.exchange, answer.accepted, rejected)
+        return cls(what, delivery, answer.exchange, answer.is_taken, rejected)
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class CountedDeliveries:
     unseen: str = ""
 
     @property
-    def known(self) -> set[Delivery]:
+    def valid_deliveries(self) -> set[Delivery]:
         """Return the valid deliveries among them."""
         own = {self.last, self.no_format, _TWICE, _APART}
         own |= {rejection.delivery for rejection in self.rejected}
@@ -234,7 +234,7 @@ def _rejected_soap(publishers: SoapService) -> list[Rejected]:
         ),
     ]
     if publishers.client.connection.credentials:
-        message = envelope([_message(_STRANGER)]).written()
+        message = envelope([_message(_STRANGER)]).serialize()
         fields = (("Content-Type", MEDIA_TYPE), ("SOAPAction", '""'))
         exchange = publishers.client.send(
             "POST", publishers.path, headers=fields, body=message, authorized=False, fresh=True

@@ -78,16 +78,16 @@ def deliveries(
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
 def deliveries_later(effort: Effort, senders: list[DeliverySender]) -> Deliveries:
     """Record the deliveries that arrive after all batches, while no client sends another."""
-    return _watched(senders, _LATER_S[effort.name == "quick"])
+    return _watch(senders, _LATER_S[effort.name == "quick"])
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.LAST)
 def deliveries_last(senders: list[DeliverySender]) -> Deliveries:
     """Record the deliveries that have arrived at the end of the run."""
-    return _watched(senders, 0.0)
+    return _watch(senders, 0.0)
 
 
-def _watched(senders: list[DeliverySender], seconds: float) -> Deliveries:
+def _watch(senders: list[DeliverySender], seconds: float) -> Deliveries:
     """Return the deliveries that arrive after the batches of the run's sender, if the run has one."""
     for sender in senders:
         try:

@@ -16,7 +16,7 @@ from conformance.api.rest.formats import Disagreement, Found, disagreements, eac
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.goal import arrived, await_goal, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, is_there, put_goal
 from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot
@@ -81,7 +81,7 @@ def formats_in_motion(api: RestInterface, robot: Robot, effort: Effort) -> tuple
             before = suspects.get(key, {}) if change else found
             suspects[key] = {place: item for place, item in found.items() if place in before}
         for call in () if change else calls:
-            compared += _compared(api, call, partial(drive.command, wanted))
+            compared += _compare(api, call, partial(drive.command, wanted))
         if wanted == STILL and not any(suspects.values()):
             return tuple(compared)
     by_id = {call.operation.id: call for call in calls}
@@ -107,7 +107,7 @@ def formats_of_goals(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
             as_xml = None
             put_goal(robot, body)
         goal, differs, _ = await_goal(robot, body)
-        if as_xml is not None and not (goal is None and arrived(robot, pose)):
+        if as_xml is not None and not (goal is None and is_there(robot, pose)):
             trace.append(FormatsRead(GOAL_PATH, call.operation.id, as_xml, differs, put=True))
         # If earlier goals showed a difference, wait as long as a command may take.
         robot.clock.sleep(robot.settle_s if suspects else 0.0)
@@ -173,7 +173,7 @@ def formats_of_plans(api: RestInterface, robot: Robot, effort: Effort) -> tuple[
     return _first(api, ask())
 
 
-def _compared(api: RestInterface, call: Call, renew: Callable[[], object]) -> list[FormatsRead]:
+def _compare(api: RestInterface, call: Call, renew: Callable[[], object]) -> list[FormatsRead]:
     """Read a resource in all formats until they agree, a few times; return nothing where it has no JSON.
 
     Each format is preferred to the others, as some clients do.

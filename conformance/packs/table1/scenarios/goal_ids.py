@@ -5,7 +5,7 @@ from typing import Final
 
 from hypothesis import strategies as st
 
-from conformance.packs.table1.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
+from conformance.packs.table1.robot.goal import NEW, await_goal, await_none, difference, goal_body, is_there, put_goal
 from conformance.packs.table1.robot.goal_trace import GoalRead, Put
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.robot import Robot
@@ -83,7 +83,7 @@ def goal_poses(robot: Robot, explore: Explorer) -> tuple[GoalRead, ...]:
             return  # a planner with another tolerance may not know the obstacle there
         goal, differs, read = await_goal(robot, body)
         for _ in range(_READINGS):
-            if goal is None and arrived(robot, pose):
+            if goal is None and is_there(robot, pose):
                 return
             reads.append(GoalRead(read, differs))
             goal, read = robot.goal()

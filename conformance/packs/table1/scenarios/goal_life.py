@@ -11,11 +11,11 @@ from conformance.packs.table1.robot.goal import (
     NEW,
     RATHER_XML,
     REPEATED,
-    arrived,
     await_goal,
     await_none,
     difference,
     goal_body,
+    is_there,
     put_goal,
 )
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
@@ -75,7 +75,7 @@ class _Player:
             meanwhile(robot, ID, lambda _, pose, __: self._put_back(pose))
         if not self._contradict(first, goal_body(back, frame, ID), there):
             meanwhile(robot, ID, lambda body, pose, other: self._contradict(body, other, pose))
-        if robot.actuated(5):
+        if robot.can_move(5):
             self._contradict(first, goal_body(there._replace(yaw=there.yaw + _OTHER_RAD), frame, ID), there)
         self._velocity_meanwhile(first, there)
         if robot.goal()[0] is None:
@@ -108,7 +108,7 @@ class _Player:
         """PUT the active goal again; return whether it was still active: at the place ``there`` it may have ended."""
         for turn in range(_TIMES):
             put, none = self._put_beside(body, body)
-            if none and arrived(self.robot, there):
+            if none and is_there(self.robot, there):
                 return turn > 0
             self.life = replace(self.life, repeated=(*self.life.repeated, put))
         return True
@@ -119,7 +119,7 @@ class _Player:
         if shown is None:
             return False
         put, none = self._put_beside(shown, shown)
-        if none and arrived(self.robot, there):
+        if none and is_there(self.robot, there):
             return False
         self.life = replace(self.life, put_back=(*self.life.put_back, put))
         return True
@@ -127,7 +127,7 @@ class _Player:
     def _contradict(self, body: dict[str, Any], other: dict[str, Any], there: Pose) -> bool:
         """PUT another pose under the active goal's id; return whether the goal was still active: it may have ended."""
         put, none = self._put_beside(other, body)
-        if (put.exchange.response.status != HTTPStatus.CONFLICT or none) and arrived(self.robot, there):
+        if (put.exchange.response.status != HTTPStatus.CONFLICT or none) and is_there(self.robot, there):
             return False
         self.life = replace(self.life, contradicted=(*self.life.contradicted, put))
         return True
@@ -140,7 +140,7 @@ class _Player:
         exchange = robot.put_velocity(slow)
         self._keeps(exchange, body, there)
         if exchange.response.ok and drive.look_s < _LOOK_S:
-            drive.commanded(slow, sent, exchange)
+            drive.note_command(slow, sent, exchange)
             drive.reach(slow, "rest-resources/velocity-goal")
         linear = robot.put(LINEAR, STILL.linear)
         if not exchange.response.ok:  # the robot may have ended the goal because of the request
@@ -153,7 +153,7 @@ class _Player:
         if not before or not HTTPStatus.BAD_REQUEST <= exchange.response.status < HTTPStatus.INTERNAL_SERVER_ERROR:
             return
         goal, read = self.robot.goal()
-        if goal is None and arrived(self.robot, there):
+        if goal is None and is_there(self.robot, there):
             return
         put = Put(exchange, body, goal, read, read.came if goal is None else difference(goal, body), ended=False)
         self.life = replace(self.life, kept=(*self.life.kept, put))
@@ -179,7 +179,7 @@ class _Player:
         """
         cancelled = cancel(self.robot)
         self.life = replace(self.life, cancels=(*self.life.cancels, cancelled.exchange))
-        if cancelled.exchange.response.status == HTTPStatus.NOT_FOUND and arrived(self.robot, pose):
+        if cancelled.exchange.response.status == HTTPStatus.NOT_FOUND and is_there(self.robot, pose):
             return False
         self.life = replace(self.life, cancelled=(*self.life.cancelled, cancelled))
         return not cancelled.late
@@ -191,7 +191,7 @@ def put_new(robot: Robot, body: dict[str, Any], pose: Pose) -> Put:
     if exchange.response.status not in NEW | REPEATED:
         return Put(exchange, body, None, exchange, "", ended=False)
     goal, problem, read = await_goal(robot, body)
-    return Put(exchange, body, goal, read, problem, ended=goal is None and arrived(robot, pose))
+    return Put(exchange, body, goal, read, problem, ended=goal is None and is_there(robot, pose))
 
 
 def cancel(robot: Robot) -> Cancelled:

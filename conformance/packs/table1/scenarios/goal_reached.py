@@ -48,23 +48,23 @@ _TURNED_RAD: Final = 0.05
 
 
 @scenario(needs={Need.REST, Need.MOTION}, stage=Stage.DRIVE)
-def goal_reached(robot: Robot, run: Run, soap: SoapServices, _prepared: None) -> GoalReached:
+def goal_reached(robot: Robot, run: Run, soap: SoapServices, _import_early: None) -> GoalReached:
     """PUT a goal nearby, wait until the robot is there, and PUT the same goal again.
 
     A robot that goes on with another client's goal, for example a delivery that has waited, is sent once more.
     """
-    trace = _sent(robot, soap.subscribers, run.effort, run.seed)
-    return _sent(robot, soap.subscribers, run.effort, run.seed) if trace.other else trace
+    trace = _send_goal(robot, soap.subscribers, run.effort, run.seed)
+    return _send_goal(robot, soap.subscribers, run.effort, run.seed) if trace.other else trace
 
 
-def _sent(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: int) -> GoalReached:
+def _send_goal(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: int) -> GoalReached:
     """Return the record of one goal."""
     here = robot.map_pose()
     if here is None:
         raise NotPossibleError("the robot's pose cannot be read")
     there, other = choose_goals(robot, max(_AWAY_M, 2 * robot.limits.arrival[0]), 2)
     if effort.name != "quick":
-        there = _turned(robot, here, there, random.Random(f"{seed}/heading"))  # noqa: S311 - no secret
+        there = _turn_goal(robot, here, there, random.Random(f"{seed}/heading"))  # noqa: S311 - no secret
     if subscribers is not None:
         ask_over_soap(robot, subscribers, there)  # to notice later a plan that always starts at this place
     before = _turning_before(robot, effort)
@@ -80,17 +80,17 @@ def _sent(robot: Robot, subscribers: SoapService | None, effort: Effort, seed: i
     if subscribers is not None:
         soap_services.ask(subscribers, "GetGoal")  # to notice when the goal has ended that SOAP keeps this old goal
     way = _Way(robot, subscribers, Drive(robot), trace)
-    with partial_trace(lambda: way.recorded):
+    with partial_trace(lambda: way.record):
         way.drive_to(there, here)
         motion = robot.statement.motion
-        turns = effort.name != "quick" and robot.actuated(5) and motion.turns_on_the_spot
+        turns = effort.name != "quick" and robot.can_move(5) and motion.turns_on_the_spot
         way.look_back(here, before, body, turns=turns)
-    return way.recorded
+    return way.record
 
 
-def _turned(robot: Robot, here: Pose, there: Pose, chance: random.Random) -> Pose:
+def _turn_goal(robot: Robot, here: Pose, there: Pose, chance: random.Random) -> Pose:
     """Return a goal with another heading than the way there, if the robot has a plan to it that is hardly longer."""
-    if not robot.actuated(5):
+    if not robot.can_move(5):
         return there
     ahead = math.atan2(there.y - here.y, there.x - here.x)
     turn = chance.uniform(min(max(_TURN_RAD, 2 * robot.limits.arrival[1]), math.pi), math.pi)
@@ -124,7 +124,7 @@ def _put(robot: Robot, there: Pose) -> tuple[dict[str, Any], Exchange]:
     return body, put_goal(robot, body)
 
 
-def _arrived(trace: GoalReached, here: Pose) -> GoalReached:
+def _with_pose(trace: GoalReached, here: Pose) -> GoalReached:
     """Return the record with the robot's last pose."""
     there = trace.there or here
     return replace(trace, here=here, left_m=here.distance(there), off_rad=wrapped(here.yaw - there.yaw))
@@ -140,7 +140,7 @@ class _Way:
     trace: GoalReached
 
     @property
-    def recorded(self) -> GoalReached:
+    def record(self) -> GoalReached:
         """Return the record so far."""
         return replace(self.trace, drive=self.drive.whole)
 
@@ -175,18 +175,18 @@ class _Way:
         driven = drive.whole
         moved = max(0.0, min(_MOVED_M, start.distance(there) - reached_m))
         trace = replace(self.trace, has_to_m=moved, reached_m=reached_m)
-        if robot.actuated(5):
+        if robot.can_move(5):
             trace = replace(trace, reached_rad=reached_rad)
-        trace = _arrived(trace, here)
+        trace = _with_pose(trace, here)
         if other:
             robot.delete_goal()
-        elif not trace.arrived or start.distance(here) <= moved:
+        elif not trace.is_near or start.distance(here) <= moved:
             # The robot may still be coming to rest. One sample may be wrong, so use those of a second.
             drive.keep(robot.settle_s)
             first = len(drive.trace.odometry)
             drive.keep(_LOOKED_S)
             here = middle_of([robot.in_map(odometry.pose) for odometry in drive.trace.odometry[first:]] or [here])
-            trace = _arrived(trace, here)
+            trace = _with_pose(trace, here)
         # The same for the place at the start.
         begins = (start, *(robot.in_map(odometry.pose) for odometry in driven.odometry[:1]))
         self.trace = replace(
@@ -195,7 +195,7 @@ class _Way:
             read=exchange,
             ended=goal is None,
             other=other,
-            undecided=not trace.arrived if other else goal is not None and now <= progress + limits.goal_s,
+            undecided=not trace.is_near if other else goal is not None and now <= progress + limits.goal_s,
         )
 
     def look_back(self, start: Pose, before: Command | None, body: dict[str, Any], *, turns: bool) -> None:
@@ -204,7 +204,7 @@ class _Way:
         A robot that ``turns`` on the spot gets it with another heading.
         """
         trace, robot = self.trace, self.robot
-        if trace.undecided or not (trace.ended or trace.other) or not trace.arrived or trace.way_m <= trace.has_to_m:
+        if trace.undecided or not (trace.ended or trace.other) or not trace.is_near or trace.way_m <= trace.has_to_m:
             return
         if before is not None:
             self._watch_for(before)
@@ -229,7 +229,7 @@ class _Way:
         patience = robot.patience(robot.settle_s)
         for _ in poll(robot.clock, _STEP_S, lambda: patience.over):
             exchange = soap_services.ask(subscribers, "GetGoal")
-            shown = bool(soap_services.returned(exchange)[0])
+            shown = bool(soap_services.returns(exchange)[0])
             if not shown:
                 break
         arrived = robot.map_pose()

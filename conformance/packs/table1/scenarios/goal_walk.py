@@ -11,11 +11,11 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import (
     RATHER_XML,
-    arrived,
     await_goal,
     await_none,
     difference,
     goal_body,
+    is_there,
     put_goal,
     status_fault,
 )
@@ -104,7 +104,7 @@ class _Goals(RuleBasedStateMachine):
         goal, exchange = self._robot.goal()
         if self._active is None:
             return self._record("goal-none", exchange)
-        if goal is None and arrived(self._robot, self._pose):
+        if goal is None and is_there(self._robot, self._pose):
             self._active = None
             return True
         problem = exchange.came if goal is None else difference(goal, self._active) or status_fault(goal)
@@ -122,7 +122,7 @@ class _Goals(RuleBasedStateMachine):
     def _put_again(self, body: dict[str, Any], pose: Pose) -> bool:
         """PUT a goal under the active goal's id: with the same pose or with another."""
         exchange = put_goal(self._robot, body)
-        if arrived(self._robot, self._pose):
+        if is_there(self._robot, self._pose):
             return self._clear()
         return self._record("goal-repeat" if pose == self._pose else "goal-conflict", exchange) and self._look()
 
@@ -133,7 +133,7 @@ class _Goals(RuleBasedStateMachine):
             return False
         self._active, self._pose = body, pose
         goal, problem, shown = await_goal(self._robot, body)
-        if goal is None and arrived(self._robot, pose):
+        if goal is None and is_there(self._robot, pose):
             self._active = None
             return True
         return self._record("goal-preempt" if displaces else "goal-get", shown, problem)
@@ -145,7 +145,7 @@ class _Goals(RuleBasedStateMachine):
         exchange = self._robot.delete_goal(RATHER_XML)
         if self._active is None:
             return self._record("goal-delete-none-success", exchange)
-        near = arrived(self._robot, self._pose)
+        near = is_there(self._robot, self._pose)
         self._active = None
         none = await_none(self._robot)
         differs = "" if none.response.status == HTTPStatus.NOT_FOUND else none.came

@@ -20,8 +20,8 @@ from conformance.packs.table1.robot.goal import await_goal, await_none, goal_bod
 from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
 from conformance.packs.table1.robot.message_shapes import GOAL_AND_STATUS
 from conformance.packs.table1.robot.robot import STILL, Robot
-from conformance.packs.table1.robot.soap_services import ask, returned
-from conformance.packs.table1.robot.state_over_soap import STATES, StateRead, agreed, compare, for_good, read_state
+from conformance.packs.table1.robot.soap_services import ask, returns
+from conformance.packs.table1.robot.state_over_soap import STATES, StateRead, best_of, compare, for_good, read_state
 from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
@@ -106,10 +106,10 @@ def _nothing() -> None:
 def _compare_goals(robot: Robot, subscribers: SoapService, first: Callable[[], object] = _nothing) -> list[StateRead]:
     """Read the goal over both interfaces until they agree, as one may learn of a change later."""
     patience = robot.patience(robot.settle_s)
-    return agreed(_read_goal(robot, subscribers, first) for _ in poll(robot.clock, 0.05, lambda: patience.over))
+    return best_of(_read_goal(robot, subscribers, first) for _ in poll(robot.clock, 0.05, lambda: patience.over))
 
 
-def _mixed(before: Any, goal: Any, after: Any) -> str:
+def _mixture_fault(before: Any, goal: Any, after: Any) -> str:
     """Return how a goal differs from both of REST's goals with its id, whenever SOAP learned of a change.
 
     Its status changes by itself.
@@ -124,14 +124,14 @@ def _read_goal(robot: Robot, subscribers: SoapService, first: Callable[[], objec
     before, earlier = robot.goal()
     first()
     exchange = ask(subscribers, "GetGoal")
-    found, problem = returned(exchange)
+    found, problem = returns(exchange)
     after, last = robot.goal()
     if before is not None and after is not None and before["goal_id"]["id"] == after["goal_id"]["id"]:
         between = from_element(found[0], GOAL_AND_STATUS.schema) if found else None
         broken = "" if between is None else GOAL_AND_STATUS.problem(between)
         shown = [projected(goal, GOAL_AND_STATUS.schema) for goal in (before, after)]
         if between is not None and not broken:
-            broken = _mixed(shown[0], between, shown[1])
+            broken = _mixture_fault(shown[0], between, shown[1])
         problem = problem or ("no goal" if between is None else disagreement(shown[0], between, shown[1], Slack()))
         return StateRead("goal", exchange, broken, problem)
     if earlier.response.status == last.response.status == HTTPStatus.NOT_FOUND:

@@ -20,7 +20,7 @@ from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose, length_of, wrapped
-from conformance.packs.table1.robot.goal import NEW, arrived, await_goal, await_none, difference, goal_body, put_goal
+from conformance.packs.table1.robot.goal import NEW, await_goal, await_none, difference, goal_body, is_there, put_goal
 from conformance.packs.table1.robot.goal_trace import Put
 from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
@@ -155,8 +155,8 @@ class _Player:
     refused: RefusedRequests
     trace: RefusedAgain = RefusedAgain()
 
-    def _chosen(self) -> list[Refused]:
-        return self.refused.chosen(self.soap.there.values(), self.api.run.effort)
+    def _choose(self) -> list[Refused]:
+        return self.refused.choose(self.soap.there.values(), self.api.run.effort)
 
     def _send(self, one: Refused) -> Exchange:
         """Send a request again; one that the robot takes now, rightly for all that is known, is not sent any more."""
@@ -186,7 +186,7 @@ class _Player:
 
     def rest(self) -> None:
         """Send the requests at rest, and read the robot; if it moves or gets a goal, send them one by one."""
-        chosen = self._chosen()
+        chosen = self._choose()
         rests: tuple[Case, ...] = (self._rest(chosen),) if chosen else ()
         if not all(rest.holds for rest in rests):
             # Another client may have moved the robot, so try it alone.
@@ -241,7 +241,7 @@ class _Player:
         for turn in range(_TWICE):
             if turn:
                 observer.mark()
-            chosen = [refusal for refusal in self._chosen() if refusal.acts]
+            chosen = [refusal for refusal in self._choose() if refusal.acts]
             last = [self._send(refusal) for refusal in chosen][-1:]
             orders = list(self._orders(10_000 * (turn + 1), chosen)) if chosen else []
             until = clock.now() + QUIET_S
@@ -250,11 +250,11 @@ class _Player:
                     yield
             finally:
                 left_s = max(0.0, until - clock.now())
-                found = self._arrived(observer, orders, last[0], left_s) if orders else ()
+                found = self._take_arrivals(observer, orders, last[0], left_s) if orders else ()
             if not found:
                 return
 
-    def _arrived(
+    def _take_arrivals(
         self, observer: DeliveryObserver, orders: list[tuple[Delivery, Exchange]], last: Exchange, left_s: float
     ) -> tuple[Delivery, ...]:
         """Record the deliveries after the last refused request; return those that nobody ordered."""
@@ -311,7 +311,7 @@ class _Player:
             if turn + 1 < _TWICE:
                 put_goal(robot, active)
                 await_goal(robot, active)
-        if not (self._refused_cancel(active, pose) or robot.delete_goal()).response.ok or arrived(robot, pose):
+        if not (self._refused_cancel(active, pose) or robot.delete_goal()).response.ok or is_there(robot, pose):
             return
         self.trace = replace(self.trace, cancelled=(await_none(robot), active["goal_id"]["id"]))
         for _ in range(_TWICE):
@@ -322,14 +322,14 @@ class _Player:
         """PUT another pose, and another heading, under the active goal's id, as JSON and as XML."""
         robot, frame, id_ = self.robot, self.robot.statement.motion.frame, active["goal_id"]["id"]
         turned = pose._replace(yaw=pose.yaw + _OTHER_RAD)
-        against = [goal_body(one, frame, id_) for one in (other, *([turned] if robot.actuated(5) else []))]
+        against = [goal_body(one, frame, id_) for one in (other, *([turned] if robot.can_move(5) else []))]
         for body in against:
             for xml in (False, True):
                 exchange = put_as_xml(robot, GOAL_PATH, body) if xml else put_goal(robot, body)
                 goal, read = robot.goal()
                 if exchange is None or exchange.response.status == HTTPStatus.UNSUPPORTED_MEDIA_TYPE:
                     continue
-                if goal is None and arrived(robot, pose):
+                if goal is None and is_there(robot, pose):
                     return
                 differs = read.came if goal is None else difference(goal, active)
                 put = Put(exchange, body, goal, read, differs, ended=False)
@@ -343,7 +343,7 @@ class _Player:
         Return the last exchange if the robot stood still as long as requests were refused, and drives when they are
         not; None otherwise.
         """
-        robot, chosen = self.robot, self._chosen()
+        robot, chosen = self.robot, self._choose()
         await_motion(robot)
         start, began, last = robot.odometry(), robot.clock.now(), None
         for number in range(1, 1 + len(chosen)):
@@ -352,16 +352,16 @@ class _Player:
                 return None
         while last is not None:
             end, took = robot.odometry(), robot.clock.now() - began
-            if start is None or end is None or arrived(robot, pose):
+            if start is None or end is None or is_there(robot, pose):
                 return None
-            if _moved(start.pose, end.pose):
+            if _has_moved(start.pose, end.pose):
                 self.trace = replace(self.trace, drives=True)
                 return None
             if took > robot.settle_s:
                 robot.clock.sleep(took)
                 later = robot.odometry()
                 # A robot that still stands may be blocked.
-                return last if later is not None and _moved(end.pose, later.pose) else None
+                return last if later is not None and _has_moved(end.pose, later.pose) else None
             for refusal in chosen:
                 refusal.send()
         return None
@@ -378,7 +378,7 @@ class _Player:
         exchange = self._send(one)
         goal, _ = robot.goal()
         if goal is None and (
-            arrived(robot, pose)
+            is_there(robot, pose)
             or not ends(robot, active, lambda: [again.send() for again in (sent * _AGAIN)[-_AGAIN:]])
         ):
             return None
@@ -403,7 +403,7 @@ class _Player:
         exchange = cancel()
         if exchange.response.status == HTTPStatus.NOT_ACCEPTABLE:
             goal, _ = robot.goal()
-            if goal is not None or not (arrived(robot, pose) or not ends(robot, active, cancel)):
+            if goal is not None or not (is_there(robot, pose) or not ends(robot, active, cancel)):
                 differs = "none" if goal is None else difference(goal, active)
                 one = DuringGoal("Accept: image/png", exchange, differs)
                 self.trace = replace(self.trace, during=(*self.trace.during, one))
@@ -421,5 +421,5 @@ def ends(robot: Robot, active: dict[str, Any], act: Callable[[], object]) -> boo
     return ended and all(robot.goal()[0] is not None for _ in poll_for(robot.clock, 0.0, 2 * took))
 
 
-def _moved(one: Pose, other: Pose) -> bool:
+def _has_moved(one: Pose, other: Pose) -> bool:
     return one.distance(other) > _STOOD_M or abs(wrapped(one.yaw - other.yaw)) > _STOOD_RAD

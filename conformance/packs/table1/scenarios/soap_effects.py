@@ -65,7 +65,7 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
     """Send deliveries with a header block that no robot understands, and read the list of deliveries."""
     service, api = interfaces.soap.publishers, interfaces.rest
     robot = None if api is None else Robot(api)
-    if service is None or robot is None or _listed(robot, 0.0) is None:
+    if service is None or robot is None or _count_listed(robot, 0.0) is None:
         return Misunderstood(lists=False)
     block = Node(clark("urn:example:strange", "Transaction"), "5", (), ((clark(ENVELOPE, "mustUnderstand"), "1"),))
     answers: list[tuple[Exchange, int | None]] = []
@@ -77,8 +77,8 @@ def misunderstood(interfaces: Interfaces, effort: Effort) -> Misunderstood:
         # A valid delivery afterwards shows when the robot has handled both.
         marker = depot_x + 0.5
         call_valid(service, soap_services.delivery(depot_x=repr(marker)))
-        through = _until(partial(_listed, robot, marker), robot.patience(_LISTED_S), robot)
-        answers.append((answer.exchange, _listed(robot, depot_x) if through else None))
+        through = _until(partial(_count_listed, robot, marker), robot.patience(_LISTED_S), robot)
+        answers.append((answer.exchange, _count_listed(robot, depot_x) if through else None))
     return Misunderstood(lists=True, answers=tuple(answers))
 
 
@@ -107,7 +107,7 @@ def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
 
     def shows() -> bool:
         answer = ask_goal()
-        first = answer.first if answer.accepted else None
+        first = answer.first if answer.is_taken else None
         shown = text_at(first, "goal_id", "id") if first is not None else None
         reads.append((answer.exchange, shown))
         return shown == GOAL_ID
@@ -118,7 +118,7 @@ def goal_by_soap(interfaces: Interfaces) -> GoalBySoap:
     return GoalBySoap(reads[-1], ask_goal().exchange) if known else GoalBySoap()
 
 
-def _listed(robot: Robot, depot_x: float) -> int | None:
+def _count_listed(robot: Robot, depot_x: float) -> int | None:
     """Return how many listed deliveries have this depot; None where the robot has no list."""
     deliveries, problem = read_as(robot.rest.send("GET", DELIVERIES_PATH).response, DELIVERIES)
     if problem:

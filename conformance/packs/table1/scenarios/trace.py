@@ -44,7 +44,7 @@ def longer_s(limits: Limits) -> float:
     return max(_LONGER * (limits.hold_s or 0.0), 0.5 * limits.settle_s, LONGEST_SAMPLE_S)
 
 
-def shown(requirement: str, *scenarios: Scenario) -> Rule:
+def rule_on(requirement: str, *scenarios: Scenario) -> Rule:
     """Return a rule that judges one requirement by the traces of these scenarios."""
 
     def judge(trace: Driven, run: Run) -> Iterator[Outcome]:

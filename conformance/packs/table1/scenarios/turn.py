@@ -28,10 +28,10 @@ from conformance.packs.table1.robot.velocity_range import (
     slow,
     slowest,
     slowest_along,
-    unrenewed,
+    unrenewed_velocities,
 )
 from conformance.packs.table1.scenarios.trace import Driven, longer_s
-from conformance.rules.motion.test_velocities import fails, held
+from conformance.rules.motion.test_velocities import fails, judge_hold
 from conformance.scenarios.motion import trace as generic
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.trace import Command
@@ -47,7 +47,7 @@ _WAYS: Final[tuple[By, ...]] = ("velocity", "linear", "xml")
 @scenario(needs={Need.REST, Need.MOTION})
 def straight(robot: Robot, run: Run) -> Driven:
     """Drive ahead for less than a second, back to the start, and stop."""
-    if not robot.actuated(0):
+    if not robot.can_move(0):
         raise NotPossibleError("the statement says that the robot cannot drive straight ahead")
     make_room(robot)
     drive = Drive(robot)
@@ -116,26 +116,26 @@ def turn(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices,
     turning = _Turning(robot, mapped_robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if soap.subscribers is not None and robot.usual_s <= _QUICK_S:
         turning.drive.aside = partial(turning.read_over_soap, soap.subscribers)
-    with partial_trace(lambda: turning.recorded):
+    with partial_trace(lambda: turning.record):
         turning.play()
         turning.drive.aside = lambda _turn: None
         send_known(robot, soap, refused)
-        turning.refused = deque(refused.chosen(soap.there.values(), run.effort))
+        turning.refused = deque(refused.choose(soap.there.values(), run.effort))
         turning.play_letting_go(run)
-    return turning.recorded
+    return turning.record
 
 
 @scenario(needs={Need.REST, Need.MOTION})
 def further_axes(robot: Robot, mapped_robot: MappedDevice, run: Run, soap: SoapServices) -> Driven:
     """Drive along each axis that the robot has beside those of a robot on two wheels; without any, do nothing."""
-    further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.actuated(axis)]
+    further = [axis for axis in range(len(STILL)) if axis not in {AHEAD, ABOUT} and robot.can_move(axis)]
     driving = _Turning(robot, mapped_robot, Drive(robot), no_commands(robot, soap, str(run.seed)))
     if further:
         make_room(robot)
-    with partial_trace(lambda: driving.recorded):
+    with partial_trace(lambda: driving.record):
         for axis in further:
             driving.along(axis)
-    return driving.recorded
+    return driving.record
 
 
 @dataclass
@@ -159,7 +159,7 @@ class _Turning:
     taken: Command | None = None  # a request that the robot accepted although it had refused it before
 
     @property
-    def recorded(self) -> Driven:
+    def record(self) -> Driven:
         """Return the record so far."""
         # Poses after the first velocity without a stop belong to no single drive.
         whole, end = self.drive.whole, self.seen
@@ -185,10 +185,10 @@ class _Turning:
             left = handy(robot, 0.6)
             drive.command(left)
             drive.reach(left, "rest-resources/velocity-converges")
-        if robot.actuated(ABOUT):
+        if robot.can_move(ABOUT):
             self._fast()
         bent = robot.drivable(Velocity(*(-part for part in left)))
-        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
+        if robot.can_move(AHEAD) and robot.can_move(ABOUT):
             # A small circle: both parts have to end. The linear part is commanded last, and ends too.
             bent, before = along_arc(robot, bent, _ASIDE)
             _arc(robot, drive, bent, before)
@@ -199,23 +199,25 @@ class _Turning:
         robot = self.robot
         make_room(robot)
         fast = both(robot) if robot.statement.motion.wheel_separation_m is not None else STILL
-        self.fastest = fast if any(fast) or not robot.actuated(ABOUT) else robot.only(ABOUT, fastest(robot, ABOUT))
+        self.fastest = fast if any(fast) or not robot.can_move(ABOUT) else robot.only(ABOUT, fastest(robot, ABOUT))
         bent = robot.drivable(Velocity(*(-part for part in handy(robot, 0.6))))
-        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
+        if robot.can_move(AHEAD) and robot.can_move(ABOUT):
             bent, _ = along_arc(robot, bent, _ASIDE)
-        ways = self._unrenewed(bent, run)
+        ways = self._choose_unrenewed(bent, run)
         for number, (velocity, by) in enumerate(ways, 1):
             self.pause_s = _PAUSE_S if number == len(ways) and run.effort.name != "quick" else 0.0
             self.let_go(velocity, by)
-        if robot.actuated(AHEAD) and robot.actuated(ABOUT):
+        if robot.can_move(AHEAD) and robot.can_move(ABOUT):
             self._ahead_from_rest(renewed=run.effort.name != "quick")
 
-    def _unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, By]]:
+    def _choose_unrenewed(self, bent: Velocity, run: Run) -> list[tuple[Velocity, By]]:
         """Return the velocities that are sent without renewal."""
         robot = self.robot
         ahead = robot.drivable(Velocity(*(-number for number in bent)))
         across = robot.drivable(ahead._replace(angular_z=-ahead.angular_z))
-        return unrenewed(bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed)
+        return unrenewed_velocities(
+            bent, ahead, across, (*slow(robot, run.seed), self.fastest), run.effort.name, run.seed
+        )
 
     def along(self, component: int) -> None:
         """Drive along one more axis, slowly and at full speed, there and back, and let it go."""
@@ -237,7 +239,7 @@ class _Turning:
         left, right = (robot.only(ABOUT, fastest(robot, ABOUT, sign)) for sign in (1, -1))
         beside = both(robot)
         declared = robot.statement.motion.wheel_separation_m is not None
-        if not (robot.actuated(AHEAD) and robot.limit_declared(AHEAD) and robot.limit_declared(ABOUT)):
+        if not (robot.can_move(AHEAD) and robot.limit_declared(AHEAD) and robot.limit_declared(ABOUT)):
             beside = left
         ids = () if declared or beside == left else ("rest-resources/velocity-both",)
         reached = reach(drive, beside, *ids)
@@ -267,11 +269,11 @@ class _Turning:
         until = drive.clock.now() + _RENEWED * hold_s
         in_time = True
         while drive.clock.now() < until:
-            before = drive.trace.sent
+            before = drive.trace.last_sent_s
             drive.command(ahead, linear=True)
-            in_time = in_time and drive.trace.answered < before + certain_s(hold_s)
+            in_time = in_time and drive.trace.last_answered_s < before + certain_s(hold_s)
             drive.keep(_AGAIN * hold_s)
-        lasts, seen = drive.sees(ahead, 2, part=LINEAR_PART, until=drive.trace.sent + certain_s(hold_s))
+        lasts, seen = drive.sees(ahead, 2, part=LINEAR_PART, until=drive.trace.last_sent_s + certain_s(hold_s))
         expected = f"{ahead} as long as a PUT of the linear part renews it"
         drive.saw("safety/renewal", expected, seen, "ended", holds=lasts if in_time else None)
 
@@ -297,7 +299,7 @@ class _Turning:
                 outlasts_s=hold_s if disturbed else 0.0, beside=beside,
             ))  # fmt: skip
             self.drives.extend(drives)
-            if self.taken is None and drives and not (disturbed and fails(held(drives, motion, JUDGED))):
+            if self.taken is None and drives and not (disturbed and fails(judge_hold(drives, motion, JUDGED))):
                 break
         drive.look()
         drive.look()

@@ -30,7 +30,7 @@ class OnRos:
     exchange: Exchange
     seen: tuple[Velocity, ...]
 
-    def arrived(self, limits: Limits) -> bool:
+    def has_arrived(self, limits: Limits) -> bool:
         """Return whether a message has the velocity, within the tolerance."""
         return any(is_near(limits, velocity, self.wanted) for velocity in self.seen)
 
@@ -47,8 +47,8 @@ def velocities_on_ros(robot: Robot, probe: RosProbe, effort: Effort) -> tuple[On
             wanted = robot.share_of_limits(share, -share)
             exchange = robot.put_velocity(wanted)
             if exchange.response.ok:
-                trace.append(OnRos(wanted, exchange, _seen(robot, seeing, wanted)))
-            if sum(not velocity.arrived(robot.limits) for velocity in trace) > 1:
+                trace.append(OnRos(wanted, exchange, _see_messages(robot, seeing, wanted)))
+            if sum(not velocity.has_arrived(robot.limits) for velocity in trace) > 1:
                 break
         robot.put_velocity(STILL)
     except ProbeError as error:
@@ -56,7 +56,7 @@ def velocities_on_ros(robot: Robot, probe: RosProbe, effort: Effort) -> tuple[On
     return tuple(trace)
 
 
-def _seen(robot: Robot, seeing: Probe, wanted: Velocity) -> tuple[Velocity, ...]:
+def _see_messages(robot: Robot, seeing: Probe, wanted: Velocity) -> tuple[Velocity, ...]:
     """Return the messages on the velocity topic until one has the wanted velocity; renew it meanwhile."""
     every_s = 0.4 * (robot.limits.hold_s or _RENEWED_S)
     renew_at = robot.clock.now() + every_s

@@ -74,7 +74,7 @@ class VelocityMachine(RuleBasedStateMachine):
 
     @precondition(lambda self: self._wanted != STILL)
     @rule(component=st.integers(0, 5), times=st.sampled_from((1.0, -1.0)))
-    def refused(self, component: int, times: float) -> None:
+    def refuse(self, component: int, times: float) -> None:
         """PUT a velocity beyond the limits; the robot must reject it and drive on as before."""
         self._walk.command(lambda: self._refuse(component, times))
 

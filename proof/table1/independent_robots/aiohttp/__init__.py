@@ -8,7 +8,7 @@ from aiohttp import web
 
 from proof.table1.independent_robots.plain.rest import Handler
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.routing import MAX_BODY, answered, bound, message, problem, resources
+from proof.table1.independent_robots.routing import MAX_BODY, bound, call, message, problem, resources
 
 _View = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -50,7 +50,7 @@ def _application() -> web.Application:
 def _view(handler: Handler) -> _View:
     async def view(request: web.Request) -> web.StreamResponse:
         body = await request.read()
-        return _response(answered(handler, message(request.headers.items()), body, request.rel_url.raw_path_qs))
+        return _response(call(handler, message(request.headers.items()), body, request.rel_url.raw_path_qs))
 
     return view
 

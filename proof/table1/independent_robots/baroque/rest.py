@@ -132,13 +132,13 @@ class Rest(rest.Rest):
         xml = choose(rest.accept_of(headers), self.formats) == "application/xml"
         return problem(refused.status, str(refused), xml=xml)
 
-    def done(self, headers: Message, root: str, value: Any) -> Answer:
+    def done_answer(self, headers: Message, root: str, value: Any) -> Answer:
         """Return the value that was set."""
-        return self.shown(200, value, root, headers)
+        return self.value_answer(200, value, root, headers)
 
-    def accepted(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
+    def goal_answer(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
         """Return the goal, which is created where it is new."""
-        answer = self.shown(201 if new else 200, rest.goal_value(goal), "MoveBaseActionGoal", headers)
+        answer = self.value_answer(201 if new else 200, rest.goal_value(goal), "MoveBaseActionGoal", headers)
         answer.fields |= {"location": "/robot/navigation/action/goal/"} if new else {}
         return answer
 
@@ -149,7 +149,7 @@ class Rest(rest.Rest):
         except RefusedError as refused:
             raise RefusedError(400, str(refused)) from None
 
-    def written(self, value: Any, root: str, format_: str) -> bytes:
+    def write(self, value: Any, root: str, format_: str) -> bytes:
         """Return a value in an unusual notation, with fields of the robot's own."""
         if root == "Odometry":
             value = {**value, "serial_number": "B-17", "charge": 0.5}
@@ -177,7 +177,7 @@ class Rest(rest.Rest):
         ]
 
     @property
-    def _described(self) -> dict[str, list[str]]:
+    def _described_methods(self) -> dict[str, list[str]]:
         """The methods of each resource that is described."""
         found = {path: [*methods] for path, methods in self.resources.items() if path not in _DESCRIPTIONS}
         return found | {rest.DELIVERY: ["PUT"]}
@@ -193,7 +193,7 @@ class Rest(rest.Rest):
                 }
                 for method in methods
             }
-            for path, methods in self._described.items()
+            for path, methods in self._described_methods.items()
         }
         about = {"openapi": "3.0.3", "info": {"title": "baroque", "version": "1"}, "servers": [{"url": "/"}]}
         return Answer(200, json.dumps({**about, "paths": paths}, indent=1).encode(), "application/json")
@@ -201,7 +201,7 @@ class Rest(rest.Rest):
     def _wadl(self, headers: Message, _body: bytes, _target: str) -> Answer:
         """Return a WADL description whose resources are nested as Jersey nests them."""
         inner = "".join(
-            _wadl_resource(path.removeprefix("/robot/"), methods) for path, methods in self._described.items()
+            _wadl_resource(path.removeprefix("/robot/"), methods) for path, methods in self._described_methods.items()
         )
         base = quoteattr(f"http://{headers.get('Host', 'localhost')}")
         text = (

@@ -112,7 +112,7 @@ async def _next(connection: h11.Connection, reader: asyncio.StreamReader, writer
                 writer.write(connection.send(go_on) or b"")
             connection.receive_data(await asyncio.wait_for(reader.read(65536), _IDLE_S))
         elif isinstance(event, h11.Request):
-            ask = _asked(event)
+            ask = _ask_of(event)
         elif isinstance(event, h11.Data):
             body += event.data
             if len(body) > _MAX_BODY:
@@ -124,7 +124,7 @@ async def _next(connection: h11.Connection, reader: asyncio.StreamReader, writer
             return None
 
 
-def _asked(event: h11.Request) -> Ask:
+def _ask_of(event: h11.Request) -> Ask:
     headers = Message()
     for name, value in event.headers:
         headers.add_header(name.decode("latin-1"), value.decode("latin-1"))

@@ -18,7 +18,7 @@ class Soap(soap.Soap):
     sensors, services = SENSORS, SERVICES
     folder, files = Path(__file__).parent, {"wsdl": "wsdl", "xsd=1": "xsd"}
 
-    def malformed(self, problem: str) -> Answer:
+    def malformed_answer(self, problem: str) -> Answer:
         """Return a fault for content that is no XML."""
         return self.fault("Client", problem)
 
@@ -32,10 +32,10 @@ class Soap(soap.Soap):
 
     def response(self, operation: str, values: list[Any]) -> str:
         """Return the response element, whose children are in no namespace although it has a default one."""
-        content = "".join(_unqualified("return", value) for value in values)
+        content = "".join(_without_namespace("return", value) for value in values)
         return f'<{operation}Response xmlns="{TNS}"><!-- answered -->{content}</{operation}Response>'
 
-    def enveloped(self, status: int, content: str) -> Answer:
+    def envelop(self, status: int, content: str) -> Answer:
         """Return a SOAP message."""
         text = f'<!-- baroque --><Envelope xmlns="{SOAP}"><Body>\n {content}\n </Body></Envelope>'
         return Answer(status, text.encode(), 'text/xml; charset="UTF-8"')
@@ -43,7 +43,7 @@ class Soap(soap.Soap):
     def fault(self, code: str, text: str) -> Answer:
         """Return a fault with a detail of its own."""
         said = escape("".join(char if char.isprintable() else " " for char in text))
-        return self.enveloped(
+        return self.envelop(
             500,
             f'<Fault><faultcode xmlns="" xmlns:code="{SOAP}">\n code:{code} </faultcode>'
             f'<faultstring xmlns="" xml:lang="en">{said}</faultstring>'
@@ -51,7 +51,7 @@ class Soap(soap.Soap):
         )
 
 
-def _unqualified(name: str, value: Any) -> str:
+def _without_namespace(name: str, value: Any) -> str:
     element = etree.Element(name)
     fill(element, value, nested=False)
     return etree.tostring(element, encoding="unicode").replace(f"<{name}", f'<{name} xmlns=""', 1)

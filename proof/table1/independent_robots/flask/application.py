@@ -8,7 +8,7 @@ from werkzeug.exceptions import BadRequest, HTTPException
 
 from proof.table1.independent_robots.plain.rest import Handler
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.routing import MAX_BODY, answered, message, problem, resources
+from proof.table1.independent_robots.routing import MAX_BODY, call, message, problem, resources
 
 application = flask.Flask(__name__)
 application.config["MAX_CONTENT_LENGTH"] = MAX_BODY
@@ -19,7 +19,7 @@ def _view(methods: dict[str, Handler]) -> Callable[..., flask.Response]:
         request = flask.request
         handler = methods["GET" if request.method == "HEAD" else request.method]
         target = f"{quote(request.path)}?{request.query_string.decode('latin-1')}"
-        return _response(answered(handler, message(request.headers), request.get_data(), target))
+        return _response(call(handler, message(request.headers), request.get_data(), target))
 
     return view
 
@@ -55,7 +55,7 @@ def _whole() -> None:
 
 
 @application.errorhandler(HTTPException)
-def _refused(error: HTTPException) -> flask.Response:
+def _refuse(error: HTTPException) -> flask.Response:
     """Turn Flask's own errors into problems, and keep their header fields."""
     response = _response(problem(error.code or 500, error.description, message(flask.request.headers)))
     for name, value in error.get_headers(flask.request.environ):

@@ -16,7 +16,7 @@ from starlette.routing import Route
 
 from proof.table1.independent_robots.plain.rest import Handler
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.routing import MAX_BODY, answered, bound, message, problem, resources
+from proof.table1.independent_robots.routing import MAX_BODY, bound, call, message, problem, resources
 
 _View = Callable[[Request], Awaitable[Response]]
 
@@ -62,7 +62,7 @@ def _application() -> Starlette:
     for path, methods in resources().items():
         allowed = [*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"]
         routes.append(Route(path, _view(methods, ", ".join(allowed)), methods=allowed))
-    return Starlette(routes=routes, exception_handlers={HTTPException: _refused})
+    return Starlette(routes=routes, exception_handlers={HTTPException: _refuse})
 
 
 def _view(methods: dict[str, Handler], allowed: str) -> _View:
@@ -77,12 +77,12 @@ def _view(methods: dict[str, Handler], allowed: str) -> _View:
                 raise HTTPException(413, f"more than {MAX_BODY} octets")
         target = f"{request.scope['raw_path'].decode()}?{request.url.query}"
         handler = methods["GET" if request.method == "HEAD" else request.method]
-        return _response(answered(handler, message(request.headers.items()), b"".join(pieces), target))
+        return _response(call(handler, message(request.headers.items()), b"".join(pieces), target))
 
     return view
 
 
-async def _refused(request: Request, error: Exception) -> Response:
+async def _refuse(request: Request, error: Exception) -> Response:
     """Turn Starlette's own errors into problems, and keep their header fields."""
     if not isinstance(error, HTTPException):
         raise error

@@ -137,7 +137,7 @@ def parse_json(body: bytes) -> Any:
         found: dict[str, Any] = {}
         for name, value in pairs:
             if name in found:
-                raise RefusedError(422, f"{name}: there twice, again with {_shown(value)}")
+                raise RefusedError(422, f"{name}: there twice, again with {_excerpt(value)}")
             found[name] = value
         return found
 
@@ -150,7 +150,7 @@ def parse_json(body: bytes) -> Any:
         raise RefusedError(400, f"no JSON: {error}") from None
 
 
-def _shown(value: Any) -> str:
+def _excerpt(value: Any) -> str:
     try:
         return json.dumps(value)[:200]
     except (ValueError, RecursionError):
@@ -165,20 +165,20 @@ def fit(value: Any, shape: Any, path: str = "") -> Any:
     """
     if isinstance(shape, dict):
         if not isinstance(value, dict):
-            raise RefusedError(422, f"{path or 'body'}: {_shown(value)} is no object")
+            raise RefusedError(422, f"{path or 'body'}: {_excerpt(value)} is no object")
         names = {name.rstrip("?"): (name.endswith("?"), part) for name, part in shape.items()}
         for name in value:
             if name not in names:
-                raise RefusedError(422, f"{_joined(path, name)}: unknown field, with {_shown(value[name])}")
+                raise RefusedError(422, f"{_join(path, name)}: unknown field, with {_excerpt(value[name])}")
         for name, (optional, _) in names.items():
             if name not in value and not optional:
-                raise RefusedError(422, f"{_joined(path, name)}: missing in {_shown(value)}")
-        return {name: fit(value[name], part, _joined(path, name)) for name, (_, part) in names.items() if name in value}
+                raise RefusedError(422, f"{_join(path, name)}: missing in {_excerpt(value)}")
+        return {name: fit(value[name], part, _join(path, name)) for name, (_, part) in names.items() if name in value}
     return _simple(value, shape, path)
 
 
 def _simple(value: Any, type_: str, path: str) -> Any:
-    wrong = RefusedError(422, f"{path}: {_shown(value)} is no {type_}")
+    wrong = RefusedError(422, f"{path}: {_excerpt(value)} is no {type_}")
     if type_ in {"string", "id"}:
         if not isinstance(value, str) or any("\ud800" <= char <= "\udfff" for char in value):
             raise wrong
@@ -224,7 +224,7 @@ def fit_element(  # noqa: C901 - one rule after another
     found: dict[str, Any] = {}
     names = {name.rstrip("?"): (name.endswith("?"), part) for name, part in shape.items()}
     for child in element.children:
-        where = _joined(path, child.name)
+        where = _join(path, child.name)
         if child.name not in names:
             raise RefusedError(422, f"{where}: unknown element, with {child.text.strip()[:100]!r}")
         if child.name in found:
@@ -234,7 +234,7 @@ def fit_element(  # noqa: C901 - one rule after another
         found[child.name] = fit_element(child, names[child.name][1], where, ordered=ordered)
     for name, (optional, _) in names.items():
         if name not in found and not optional:
-            raise RefusedError(422, f"{_joined(path, name)}: missing in {element.local!r}")
+            raise RefusedError(422, f"{_join(path, name)}: missing in {element.local!r}")
     return found
 
 
@@ -253,5 +253,5 @@ def number(text: str, name: str, *, integer: bool = False, pattern: re.Pattern[s
     return float(text)
 
 
-def _joined(path: str, name: str) -> str:
+def _join(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name

@@ -16,7 +16,7 @@ from proof.table1.independent_robots.body import Body, BusyError, ConflictError,
 from proof.table1.independent_robots.plain import reading
 from proof.table1.independent_robots.plain.reading import RefusedError
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, written
+from proof.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, write
 
 _FRAMES = ("map", "odom")
 # Time for which a goal is accepted before it is executing (action_msgs/GoalStatus), s.
@@ -85,7 +85,7 @@ class Rest:
         except RefusedError as refused:
             answer = self.refuse(refused, headers)
             if refused.status == 405:  # noqa: PLR2004 - RFC 9110 15.5.6
-                answer.fields[self.allow] = ", ".join(self._allowed(target))
+                answer.fields[self.allow] = ", ".join(self._allowed_methods(target))
         return answer
 
     def _methods(self, path: str) -> dict[str, Handler] | None:
@@ -93,7 +93,7 @@ class Rest:
             return self.resources[path]
         return {"PUT": self.deliver} if _DELIVERY.fullmatch(path) else None
 
-    def _allowed(self, target: str) -> list[str]:
+    def _allowed_methods(self, target: str) -> list[str]:
         methods = self._methods(urlsplit(target).path) or {}
         return [*methods, *(["HEAD"] if "GET" in methods else []), "OPTIONS"]
 
@@ -107,7 +107,7 @@ class Rest:
                 return Answer(308, fields={"Location": path + "/" + ("?" + query if query else "")})
             raise RefusedError(404, f"there is no {path[:200]!r}")
         if method == "OPTIONS":
-            return self.options(", ".join(self._allowed(target)))
+            return self.options(", ".join(self._allowed_methods(target)))
         handler = methods.get("GET" if method == "HEAD" else method)
         if handler is None:
             raise RefusedError(405, f"there is no {method[:40]} here")
@@ -123,25 +123,25 @@ class Rest:
         """Return the response to a request that is refused."""
         return refusal(refused, headers)
 
-    def done(self, _headers: Message, _root: str, _value: Any) -> Answer:
+    def done_answer(self, _headers: Message, _root: str, _value: Any) -> Answer:
         """Return the response to a PUT that was carried out, with the value that it has set."""
         return Answer(204)
 
-    def accepted(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
+    def goal_answer(self, goal: Goal, headers: Message, *, new: bool) -> Answer:
         """Return the response to the PUT of a goal."""
-        return self.shown(202, goal_value(goal), "MoveBaseActionGoal", headers) if new else Answer(204)
+        return self.value_answer(202, goal_value(goal), "MoveBaseActionGoal", headers) if new else Answer(204)
 
     def number(self, text: str, name: str, *, integer: bool = False) -> float | int:
         """Return the number that a text in a target represents."""
         return reading.number(text, name, integer=integer)
 
-    def written(self, value: Any, root: str, format_: str) -> bytes:
+    def write(self, value: Any, root: str, format_: str) -> bytes:
         """Return a value in a format."""
-        return written(value, root, format_)
+        return write(value, root, format_)
 
     def _reads(self, root: str, value: Callable[[], Any]) -> Callable[[Message, bytes, str], Answer]:
         def read(headers: Message, _body: bytes, _target: str) -> Answer:
-            return self.shown(200, value(), root, headers)
+            return self.value_answer(200, value(), root, headers)
 
         return read
 
@@ -163,7 +163,7 @@ class Rest:
             if abs(twist[part][axis]) > self._body.further_axes:
                 raise RefusedError(422, f"{part}.{axis}: {twist[part][axis]!r} cannot be actuated, it must be 0")
         self._drive(twist["linear"]["x"], twist["angular"]["z"])
-        return self.done(headers, "Twist", twist)
+        return self.done_answer(headers, "Twist", twist)
 
     def _put_linear(self, headers: Message, body: bytes, _target: str) -> Answer:
         vector = self._input(headers, body, "Vector3", reading.VECTOR3)
@@ -171,7 +171,7 @@ class Rest:
             if abs(vector[axis]) > self._body.further_axes:
                 raise RefusedError(422, f"{axis}: {vector[axis]!r} cannot be actuated, it must be 0")
         self._drive(vector["x"], None)
-        return self.done(headers, "Vector3", vector)
+        return self.done_answer(headers, "Vector3", vector)
 
     def _drive(self, v: float, w: float | None) -> None:
         limits = self._body.build
@@ -188,7 +188,7 @@ class Rest:
         goal = self._body.current()
         if goal is None:
             raise RefusedError(404, "there is no goal")
-        return self.shown(200, goal_value(goal), "MoveBaseActionGoal", headers)
+        return self.value_answer(200, goal_value(goal), "MoveBaseActionGoal", headers)
 
     def _put_goal(self, headers: Message, body: bytes, _target: str) -> Answer:
         self._format(headers)  # before anything is done
@@ -207,7 +207,7 @@ class Rest:
             goal, new = self._body.send(given.get("goal_id", {}).get("id"), target["pose"], frame)
         except ConflictError:
             raise RefusedError(409, f"goal_id.id: {given['goal_id']['id']!r} has another pose") from None
-        return self.accepted(goal, headers, new=new)
+        return self.goal_answer(goal, headers, new=new)
 
     def _delete_goal(self, _headers: Message, _body: bytes, _target: str) -> Answer:
         if not self._body.cancel() and self.foresees:
@@ -223,7 +223,7 @@ class Rest:
         for name in ("x", "y"):
             if name not in given:
                 raise RefusedError(422, f"{name}: missing in the query")
-        return self.shown(200, plan_value(self._body, given), "GetPlan", headers)
+        return self.value_answer(200, plan_value(self._body, given), "GetPlan", headers)
 
     def deliver(self, headers: Message, _body: bytes, target: str) -> Answer:
         """Accept a delivery.
@@ -239,7 +239,7 @@ class Rest:
             self.number(code, "code", integer=True),
             [self.number(text, name) for name, text in zip(_ORDER, texts, strict=True)],
         )
-        return self.done(headers, "Accepted", {"accepted": "thank you"})
+        return self.done_answer(headers, "Accepted", {"accepted": "thank you"})
 
     def _openapi(self, _headers: Message, _body: bytes, _target: str) -> Answer:
         document = yaml.safe_load((CONTRACT_DIR / "openapi.yaml").read_text(encoding="utf-8"))
@@ -251,7 +251,7 @@ class Rest:
         host = str(headers.get("Host", "")).encode()
         return Answer(200, wadl.replace(b"127.0.0.1:7003", host), "application/vnd.sun.wadl+xml")
 
-    def shown(self, status: int, value: Any, root: str, headers: Message) -> Answer:
+    def value_answer(self, status: int, value: Any, root: str, headers: Message) -> Answer:
         """Return a response with a value in the format that the client accepts.
 
         Raises:
@@ -259,7 +259,7 @@ class Rest:
         """
         format_ = self._format(headers)
         media_type = format_ + self.charsets.get(format_, "")
-        return Answer(status, self.written(value, root, format_), media_type, {"Vary": "Accept"})
+        return Answer(status, self.write(value, root, format_), media_type, {"Vary": "Accept"})
 
     def _format(self, headers: Message) -> str:
         format_ = choose(accept_of(headers), self.formats)

@@ -57,14 +57,14 @@ class Soap:
         try:
             content = self._envelope(body, reading=path.endswith("subscriber_ws"))
         except MalformedError as error:
-            return self.malformed(str(error))
+            return self.malformed_answer(str(error))
         except RefusedError as refused:
             return self.fault("Client", str(refused))
         except FaultError as fault:
             return self.fault(fault.code, str(fault))
-        return self.enveloped(200, content)
+        return self.envelop(200, content)
 
-    def malformed(self, _problem: str) -> Answer:
+    def malformed_answer(self, _problem: str) -> Answer:
         """Return the response to content that is no XML."""
         return Answer(400)
 
@@ -81,7 +81,7 @@ class Soap:
         content = "".join(element("return", value) for value in values)
         return f'<m:{operation}Response xmlns:m="{TNS}">{content}</m:{operation}Response>'
 
-    def enveloped(self, status: int, content: str) -> Answer:
+    def envelop(self, status: int, content: str) -> Answer:
         """Return a SOAP message."""
         text = (
             f'<?xml version="1.0" encoding="UTF-8"?><soap:Envelope xmlns:soap="{SOAP}">'
@@ -92,7 +92,7 @@ class Soap:
     def fault(self, code: str, text: str) -> Answer:
         """Return a fault."""
         fields = element("faultcode", f"soap:{code}") + element("faultstring", text)
-        return self.enveloped(500, f"<soap:Fault>{fields}</soap:Fault>")
+        return self.envelop(500, f"<soap:Fault>{fields}</soap:Fault>")
 
     def _envelope(self, body: bytes, *, reading: bool) -> str:
         """Process an envelope (SOAP 1.1 section 4), faults in the order of WS-I R2725; return the response."""

@@ -40,7 +40,7 @@ def _quality(format_: str, ranges: list[tuple[str, float]]) -> float:
     return 0.0
 
 
-def written(value: Any, root: str, format_: str) -> bytes:
+def write(value: Any, root: str, format_: str) -> bytes:
     """Return a value in a format."""
     if format_ == "application/xml":
         return f'<?xml version="1.0" encoding="UTF-8"?>{element(root, value)}'.encode()
@@ -74,7 +74,7 @@ def element(name: str, value: Any) -> str:
         return f"<{name}>{inner}</{name}>"
     if isinstance(value, list):
         return f"<{name}>{''.join(element('item', item) for item in value)}</{name}>"
-    text = escape(_carried(value), _RETURN) if isinstance(value, str) else repr(value)
+    text = escape(_without_illegal(value), _RETURN) if isinstance(value, str) else repr(value)
     return f"<{name}>{text}</{name}>"
 
 
@@ -100,7 +100,7 @@ def _yaml(value: Any, indent: str) -> list[str]:
 
 def _scalar(value: Any) -> str:
     if isinstance(value, str):
-        return '"' + "".join(_quoted(char) for char in value) + '"'
+        return '"' + "".join(_quote(char) for char in value) + '"'
     if isinstance(value, list | dict):
         return "[]" if isinstance(value, list) else "{}"
     text = repr(value)
@@ -108,13 +108,13 @@ def _scalar(value: Any) -> str:
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 
-def _quoted(char: str) -> str:
+def _quote(char: str) -> str:
     """Return a character as it is written inside YAML's double quotes."""
     if char in '"\\':
         return "\\" + char
     return char if char == " " or char.isprintable() else f"\\U{ord(char):08x}"
 
 
-def _carried(text: str) -> str:
+def _without_illegal(text: str) -> str:
     """Return a text without the characters that XML 1.0 does not allow (2.2)."""
     return "".join(char if char in "\t\n\r" or (char >= " " and char not in "\ufffe\uffff") else "?" for char in text)

@@ -13,7 +13,7 @@ import yaml
 from proof.table1.independent_robots.plain import reading
 from proof.table1.independent_robots.plain.reading import MalformedError, RefusedError, fit_element, parse_xml
 from proof.table1.independent_robots.plain.server import Answer, start
-from proof.table1.independent_robots.plain.writing import as_json, choose, element, written
+from proof.table1.independent_robots.plain.writing import as_json, choose, element, write
 
 CONTRACT = Path(__file__).parent.parent / "data" / "library-contract"
 _BOOK = {"title": "id", "year": "int32", "price": "double", "shelf": {"room": "id", "row": "int32"}}
@@ -128,7 +128,7 @@ class Library:
             raise RefusedError(406, f"Accept: {accept!r} has nothing of ours")
         if self.fault == "xml-rounds" and format_ == "application/xml":
             value = json.loads(json.dumps(value), parse_float=lambda text: float(round(float(text))))
-        return Answer(200, written(value, root, format_), format_)
+        return Answer(200, write(value, root, format_), format_)
 
 
 def _bounded(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conformance.api.rest.inputs import Inputs, written
+from conformance.api.rest.inputs import Inputs, request_of
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, valid_variations
@@ -63,7 +63,7 @@ def test_equal_items_are_sent_in_a_query():
 def test_several_items_are_sent_in_their_style(style, schema, query):
     operation = _operation({**style, "schema": schema})
     sent = [
-        written(operation, one.inputs).target.partition("?")[2]
+        request_of(operation, one.inputs).target.partition("?")[2]
         for one in valid_variations(operation, Inputs(), Values())
         if one.kind is Kind.BOUND
     ]

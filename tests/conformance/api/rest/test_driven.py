@@ -63,7 +63,7 @@ def test_a_stop_names_all_that_was_moved(path, stop, sent, stops, tmp_path):
         target, body = (one, b"") if isinstance(one, str) else one
         driven.sends("POST", _BASE + target)
         request = Request("POST", _BASE + target, (("Content-Type", "application/json"),), body)
-        driven.answered(Exchange(request, Response(200, (), b"", 1.0)))
+        driven.on_response(Exchange(request, Response(200, (), b"", 1.0)))
     assert _stops(driven, operation) == stops
 
 
@@ -73,7 +73,7 @@ def test_what_was_refused_is_stopped_last_and_what_was_not_answered_is(tmp_path)
         request = Request("POST", f"{_BASE}/arms/{arm}/speed")
         driven.sends(request.method, request.url)
         if status is not None:
-            driven.answered(Exchange(request, Response(status, (), b"", 1.0)))
+            driven.on_response(Exchange(request, Response(status, (), b"", 1.0)))
     driven.sends("GET", f"{_BASE}/arms/read/speed")
     driven.sends("POST", f"{_BASE}/arms/stopped/stop")
     assert {*_stops(driven, operation)} == {"lost", "taken", "broken"}
@@ -83,7 +83,7 @@ def test_what_was_refused_is_stopped_last_and_what_was_not_answered_is(tmp_path)
 
 def test_thousands_of_values_cost_a_bounded_number_of_stops(tmp_path):
     driven, operation = _driven(tmp_path, _operation(_parameter("arm", "path")), "/arms/{arm}/stop")
-    driven.answered(Exchange(Request("POST", f"{_BASE}/arms/real/speed"), Response(200, (), b"", 1.0)))
+    driven.on_response(Exchange(Request("POST", f"{_BASE}/arms/real/speed"), Response(200, (), b"", 1.0)))
     for number in range(2000):
         driven.sends("POST", f"{_BASE}/arms/made-up-{number}/speed")
     found = _stops(driven, operation)

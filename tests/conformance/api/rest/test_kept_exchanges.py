@@ -41,7 +41,7 @@ def _found(api, change, *exchanges):
     theirs = {item.address: item for item in described_by_openapi(document, BASE)}
     listener = KeptExchanges(api)
     for one in exchanges:
-        listener.answered(one)
+        listener.on_response(one)
     return [
         found
         for kept in listener.kept.values()
@@ -93,7 +93,7 @@ def test_of_many_exchanges_the_longest_request_is_kept(api):
     many = [_exchange(sent={**STILL, "n": "a" * length}) for length in range(1, 40)]
     listener = KeptExchanges(api)
     for one in [*many, _exchange("GET", "/robot/unknown/", None), _exchange("HEAD", sent=None)]:
-        listener.answered(one)
+        listener.on_response(one)
     ((label, kept),) = listener.kept.items()
     assert label == f"PUT {VELOCITY}"
     assert kept[-1][1] is many[-1]

@@ -41,16 +41,16 @@ def finding(number, attempt, *operations):
 
 def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     log = OperationLog(Contract.load(write_described_pack(tmp_path, API, API)), BASE)
-    log.answered(exchange("/joints/a?unit=rad", body=b'{"x": 1}'))
-    log.answered(exchange("/joints/b", status=404))
+    log.on_response(exchange("/joints/a?unit=rad", body=b'{"x": 1}'))
+    log.on_response(exchange("/joints/b", status=404))
     log.by_hand(exchange("/joints/b", status=304))
-    log.answered(exchange("/elsewhere"))
-    log.unanswered(Unanswered(Request("GET", f"{BASE}/joints/c"), "closed", NoAnswer.CLOSED))
+    log.on_response(exchange("/elsewhere"))
+    log.on_no_response(Unanswered(Request("GET", f"{BASE}/joints/c"), "closed", NoAnswer.CLOSED))
     head, brew = exchange("/joints/b", method="HEAD"), exchange("/joints/b", method="BREW")
     findings = [
         finding(1, exchange("/joints/b"), "GET /joints/{name}", "GET /state"),
-        finding(2, head, *log.concerned(head.request)),
-        finding(3, brew, *log.concerned(brew.request)),
+        finding(2, head, *log.labels_of(head.request)),
+        finding(3, brew, *log.labels_of(brew.request)),
         finding(4, None),
     ]
     document = log.document(CallRules(), findings)

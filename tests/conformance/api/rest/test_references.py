@@ -85,7 +85,7 @@ def test_what_the_device_named_is_found_by_name_collection_and_link(name, templa
     operation = Operation("x", "POST", template)
     assert values.references(operation, name, _TEXT)[:1] == expected
     schema = {"type": "object", "properties": {name: _TEXT}}
-    assert values.filled({name: "roaas"}, schema, operation) == {name: (expected or ["roaas"])[0]}
+    assert values.fill({name: "roaas"}, schema, operation) == {name: (expected or ["roaas"])[0]}
 
 
 def test_a_request_invents_what_the_device_neither_named_nor_accepted():
@@ -97,5 +97,5 @@ def test_a_request_invents_what_the_device_neither_named_nor_accepted():
         return Outgoing.of("GET", f"/openings?valve={text}", "", b"")
 
     assert [values.invents(operation, request(text)) for text in ("v-1", "given", "roaas")] == [False, False, True]
-    values.accepted(operation, request("roaas"))
+    values.remember(operation, request("roaas"))
     assert not values.invents(operation, request("roaas"))

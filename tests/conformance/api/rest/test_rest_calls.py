@@ -8,7 +8,7 @@ from toy_server import Handler, server_of
 from conformance.api.rest import calls
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.questions import Question, misplaced, questions
+from conformance.api.rest.questions import Question, mismatch_of, questions
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import Connection, HttpClient
@@ -80,10 +80,10 @@ def test_an_answer_is_another_one_s_unless_the_robot_gives_it_alone_as_well(alon
 
     api = RestInterface(Run(contract=Contract.load()), SimpleNamespace(send=send))
     goal = Question("/goal/", "application/json", lambda answer: "" if answer.status == 200 else f"{answer.status}")
-    assert misplaced(api, goal, _answer(200)) == ""
-    assert bool(misplaced(api, goal, _answer(404))) is misplaced_too
-    assert misplaced(api, goal, _answer(500)) == ""
-    assert misplaced(api, goal, _answer(429)) == ""  # a rate limit refuses any request
+    assert mismatch_of(api, goal, _answer(200)) == ""
+    assert bool(mismatch_of(api, goal, _answer(404))) is misplaced_too
+    assert mismatch_of(api, goal, _answer(500)) == ""
+    assert mismatch_of(api, goal, _answer(429)) == ""  # a rate limit refuses any request
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,9 @@ def test_operations_of_the_robot():
     assert operations["getDeliveries"].optional
     assert not operations["getPose"].motion
     assert operations["getPose"].formats == ("application/json", "application/xml", "text/plain")
-    assert operations["getPose"].declared(200)
-    assert operations["getPose"].declared(404) is None
-    assert operations["putDelivery"].declared(204) == {}
+    assert operations["getPose"].schemas_for(200)
+    assert operations["getPose"].schemas_for(404) is None
+    assert operations["putDelivery"].schemas_for(204) == {}
 
 
 def test_a_foreign_contract_moves_unless_it_says_otherwise():

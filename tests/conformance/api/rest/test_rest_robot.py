@@ -9,7 +9,7 @@ import pytest
 from lending_library import CONTRACT, Library, open_library
 
 from conformance.api.rest import effects
-from conformance.api.rest.applicable import answered, applicable_operations, readable, reads
+from conformance.api.rest.applicable import applicable_operations, readable, reads, working_reads
 from conformance.api.rest.calls import example_call
 from conformance.api.rest.formats import disagreements
 from conformance.api.rest.generated import as_request, targets
@@ -56,9 +56,9 @@ def test_requests_are_made_from_examples(api):
 def test_reads_and_what_is_answered(api, library):
     assert [call.operation.id for call in reads(api)] == ["getHours", "listBooks", "getBook"]
     # A book may be lent between two requests.
-    assert "getBook" not in [call.operation.id for call in answered(api)]
+    assert "getBook" not in [call.operation.id for call in working_reads(api)]
     library.books.clear()
-    assert [call.operation.id for call in answered(api)] == ["getHours", "listBooks"]
+    assert [call.operation.id for call in working_reads(api)] == ["getHours", "listBooks"]
     assert readable(api, _operation(api, "listBooks")).send(api).response.status == 200
 
 
@@ -89,14 +89,14 @@ def test_what_changes_is_told_from_what_is_steady(api, library):
     before = effects.take_snapshots(api, [call])["getBook"][0]
     assert before["price"] == 7.25
     library.books[9780141439600] = dict(library.books[9780141439600], price=8.0)
-    assert effects.changed(before, effects.flatten(call.send(api))) == {"price": (7.25, 8.0)}
+    assert effects.deltas(before, effects.flatten(call.send(api))) == {"price": (7.25, 8.0)}
     assert not effects.changes_by_itself(api, call, "price", 0.05)
     assert effects.steady([{"a": 1, "b": 2}, {"a": 1, "b": 3}]) == {"a": 1}
 
 
 def test_a_slow_robot_is_asked_less(api):
     assert api.run.effort.subsample(range(10), 3) == list(range(10))
-    api.run.effort = api.run.effort.seen(usual_ms=300)
+    api.run.effort = api.run.effort.slowed_to(usual_ms=300)
     assert api.run.effort.subsample(range(10), 3) == [0, 3, 6]
     assert len(api.run.effort.draw(range(100), 50, "0/name")) == 3
     assert api.run.effort.draw(range(100), 50, "0/name") == api.run.effort.draw(range(100), 50, "0/name")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from conformance.api.rest.inputs import NOTHING, Inputs, usual_inputs, written
+from conformance.api.rest.inputs import NOTHING, Inputs, request_of, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.samples import fits
 from conformance.api.rest.values import Values
@@ -59,7 +59,7 @@ _MANY = _operation(
 
 def test_the_usual_request_has_what_is_required():
     inputs = usual_inputs(_MANY, Values())[0]
-    request = written(_MANY, inputs)
+    request = request_of(_MANY, inputs)
     assert request.target == "/a/1?id=4&many=roaas,roaas"
     assert dict(request.headers) == {"X-H": "true", "Cookie": "c=roaas", "Content-Type": "application/json"}
     assert json.loads(request.body) == {"x": 0}
@@ -76,7 +76,7 @@ def test_the_usual_request_has_what_is_required():
 )  # fmt: skip
 def test_bodies_are_written_by_their_media_types(media_type, schema, body):
     operation = _operation(path="/a", body=schema, media_type=media_type)
-    request = written(operation, usual_inputs(operation, Values())[0])
+    request = request_of(operation, usual_inputs(operation, Values())[0])
     assert (request.media_type, request.body) == (media_type, body)
 
 
@@ -300,10 +300,10 @@ def test_odd_values_can_be_sent():
     found = _variations(_MANY, odd_variations)
     assert len(found) > 20
     for one in found:
-        request = written(_MANY, one.inputs)
+        request = request_of(_MANY, one.inputs)
         assert "/../" not in request.target
         assert all("\r" not in value and "\n" not in value and "\x00" not in value for _, value in request.headers)
-    bodies = [written(_MANY, one.inputs).body for one in found]
+    bodies = [request_of(_MANY, one.inputs).body for one in found]
     assert any(rb"\u0000" in body or b"\0" in body for body in bodies), "a NUL in a text"
 
 

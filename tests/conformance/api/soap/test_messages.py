@@ -44,21 +44,21 @@ REQUEST = DELIVERY.shape(clark("http://soap.turtlebot.mybot.org/", "ExecuteDeliv
 
 def test_an_ordinary_message_is_valid():
     for optional in (False, True):
-        assert TYPES.valid(parse(ordinary(ORDER, optional=optional).written()))
+        assert TYPES.valid(parse(ordinary(ORDER, optional=optional).serialize()))
     assert [child.name for child in ordinary(ORDER).children] == ["size", "hot", "cups", "weight", "serial", "milk"]
 
 
 @settings(max_examples=300, database=None, deadline=None)
 @given(variants(ORDER, ordinary(ORDER, optional=True)))
 def test_all_variants_are_valid(message):
-    element = parse(message.written())
+    element = parse(message.serialize())
     assert (TYPES.libxml_problem(element), TYPES.python_problem(element)) == ("", "")
 
 
 @settings(max_examples=300, database=None, deadline=None)
 @given(variants(REQUEST, ordinary(REQUEST)))
 def test_variants_of_the_contract_are_valid_and_finite(message):
-    assert DELIVERY.types.valid(parse(message.written()))
+    assert DELIVERY.types.valid(parse(message.serialize()))
     assert all(abs(float(leaf.text)) < float("inf") for leaf in message.children[0].children)
 
 
@@ -68,7 +68,7 @@ def test_mutations_are_of_every_kind_and_invalid_to_both():
     assert {mutant.kind for mutant in found} == kinds
     for mutant in found:
         if mutant.kind not in {"body", "non-finite"}:
-            element = parse(mutant.made[0].written())
+            element = parse(mutant.made[0].serialize())
             assert TYPES.libxml_problem(element), mutant.what
             assert TYPES.python_problem(element), mutant.what
     # A nillable element that is nil is no mutation, nor is an optional one that is left out.
@@ -80,7 +80,7 @@ def test_mutations_are_of_every_kind_and_invalid_to_both():
 
 def test_a_text_that_one_validator_takes_is_no_mutation():
     leaf = next(path for path, simple in simple_leaves(REQUEST, ordinary(REQUEST)) if simple.builtin == "double")
-    element = parse(with_text(ordinary(REQUEST), leaf, "1e").written())
+    element = parse(with_text(ordinary(REQUEST), leaf, "1e").serialize())
     # libxml2 reads an empty exponent, against XML Schema 1.0 Part 2, 3.2.5.1.
     assert DELIVERY.types.python_problem(element)
     assert not DELIVERY.types.invalid(element)

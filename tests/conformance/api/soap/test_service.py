@@ -47,7 +47,7 @@ def test_without_a_wsdl_the_service_is_at_its_url(listening, problem, answer):
     assert service.endpoint == f"{base}/robot_ws"
     assert service.own is None
     assert problem in service.own_problem
-    assert service.described is service.contract
+    assert service.description is service.contract
 
 
 def test_a_robot_that_hangs_costs_its_deadline(listening):

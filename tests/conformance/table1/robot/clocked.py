@@ -58,7 +58,7 @@ class Drive(drive.Drive):
 
     def __init__(self, body: Body, looks: dict[int, float], hold_s: float, usual_s: float = 0.001) -> None:
         declared = {"settle_s": SETTLE_S, "hold_s": hold_s, "tolerance_abs": 0.02}
-        limits = DeclaredLimits(**declared).resolved()
+        limits = DeclaredLimits(**declared).resolve()
         given: dict[str, Any] = {"limits": limits, "clock": body.clock, "settle_s": 1.25 * SETTLE_S + 0.25}
         given |= {"sample_s": SAMPLE_S, "usual_s": usual_s}
         super().__init__(SimpleNamespace(**given))
@@ -87,7 +87,9 @@ class Drive(drive.Drive):
         else:
             self.body.tell()
         self.body.clock.time_s += self.robot.usual_s
-        self.trace = self.trace.commanded(Command(velocity, sent, self.body.clock.time_s, _EXCHANGE, renewal=renewal))
+        self.trace = self.trace.with_command(
+            Command(velocity, sent, self.body.clock.time_s, _EXCHANGE, renewal=renewal)
+        )
 
     def _renew(self) -> None:
         self.tell(renewal=True)
@@ -98,5 +100,5 @@ class Drive(drive.Drive):
         clock.time_s += self.looks.get(len(self.trace.turns), max(_LOOK_S, self.look_s))
         seen = self.body.velocity
         odometry = Odometry(clock.time_s, clock.time_s, self.body.sampled, Pose(0.0, 0.0, 0.0), seen, _EXCHANGE)
-        self.trace = self.trace.looked(Turn(odometry, clock.time_s, seen, _EXCHANGE, None, _EXCHANGE))
+        self.trace = self.trace.with_look(Turn(odometry, clock.time_s, seen, _EXCHANGE, None, _EXCHANGE))
         return seen, _EXCHANGE

@@ -8,8 +8,8 @@ from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.abilities import drivable, handiest, turn_beside
 from conformance.packs.table1.statement import Motion
 
-LIMITS = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5).resolved()
-ONE_WAY = DeclaredLimits(linear_m_s=(0.0, 0.7), angular_rad_s=(-1.0, 2.5)).resolved()
+LIMITS = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5).resolve()
+ONE_WAY = DeclaredLimits(linear_m_s=(0.0, 0.7), angular_rad_s=(-1.0, 2.5)).resolve()
 PLAIN, CAR = Motion(), Motion(turns_on_the_spot=False, min_radius_m=0.5)
 COUPLED = Motion(wheel_separation_m=0.4)
 speeds = st.floats(-3, 3)

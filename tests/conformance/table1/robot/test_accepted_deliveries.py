@@ -67,17 +67,17 @@ class Robot:
     def _answered(self, request: Request, response: Response) -> None:
         self._now += 0.01
         object.__setattr__(response, "received_s", self._now)
-        self.observer.answered(Exchange(request, response))
+        self.observer.on_response(Exchange(request, response))
 
     def coffee(self, **held: float) -> None:
         """Accept the paper's coffee over SOAP, and hold it with some values replaced."""
-        body = envelope([delivery("ExecuteCoffeeRequest")]).written()
+        body = envelope([delivery("ExecuteCoffeeRequest")]).serialize()
         self.hold(_COFFEE._replace(**held), "soap")
         self._answered(Request("POST", f"{_BASE}/publisher", (), body), Response(200, (), b"", 1.0))
 
     @property
     def blamed(self) -> set[str]:
-        return set(self.api.run.judge.refuted())
+        return set(self.api.run.judge.failure_counts())
 
 
 def _some(number: float) -> Delivery:

@@ -6,7 +6,7 @@ import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
-from conformance.packs.table1.robot.state_over_soap import StateRead, agreed, contradiction, counted, restamped
+from conformance.packs.table1.robot.state_over_soap import StateRead, best_of, contradiction, stamp_fault, usable
 
 _SLACK = Slack(0.02, 0.05)
 
@@ -60,13 +60,13 @@ def stamped(sec, nanosec):
 def test_a_stamp_that_is_off_by_some_nanoseconds_belongs_to_no_message(apart):
     before, after = stamped(1_700_000_000, 999_999_500), stamped(1_700_000_000, 999_999_500)
     sec, nanosec = divmod(1_700_000_000 * 10**9 + 999_999_500 + apart, 10**9)
-    assert f"{apart:+d} ns" in restamped(stamped(sec, nanosec), before, after)
+    assert f"{apart:+d} ns" in stamp_fault(stamped(sec, nanosec), before, after)
 
 
 def test_the_same_stamp_and_that_of_another_sample_are_in_order():
     before, after = stamped(5, 100), stamped(5, 20_000_100)
     for sound in (before, after, stamped(5, 10_000_100), {}):
-        assert not restamped(sound, before, after)
+        assert not stamp_fault(sound, before, after)
 
 
 def test_a_sample_that_rest_tells_alike_is_no_other_over_soap():
@@ -81,10 +81,10 @@ def test_a_sample_that_rest_tells_alike_is_no_other_over_soap():
 def test_of_several_tries_the_last_counts_and_what_is_wrong_for_good_in_those_before():
     answer = exchange(200)
     lags, wrong, same = (StateRead("pose", answer, *texts) for texts in (("", "x is 1"), ("no x", "x is 1"), ("", "")))
-    assert agreed([lags, same, lags]) == [same]
-    assert agreed([lags, lags]) == [lags]
-    assert agreed([lags, None, lags]) == []
-    assert [[case.holds for case in one.cases] for one in agreed([wrong, same])] == [[False, True], [True]]
+    assert best_of([lags, same, lags]) == [same]
+    assert best_of([lags, lags]) == [lags]
+    assert best_of([lags, None, lags]) == []
+    assert [[case.holds for case in one.cases] for one in best_of([wrong, same])] == [[False, True], [True]]
 
 
 @pytest.mark.parametrize(
@@ -97,5 +97,5 @@ def test_of_several_tries_the_last_counts_and_what_is_wrong_for_good_in_those_be
     ],
 )
 def test_a_difference_counts_only_of_a_state_that_lasted(broken, differs, lasted, counts):
-    read = counted(StateRead("velocity", exchange(), broken, differs), lasted=lasted)
+    read = usable(StateRead("velocity", exchange(), broken, differs), lasted=lasted)
     assert (read and (read.broken, read.differs)) == counts

@@ -47,7 +47,7 @@ def test_how_far_a_clock_is_ahead_of_date():
     told = Clock()
     assert told.ahead_s is None
     for seconds, date in ((9.5, "Thu, 01 Jan 1970 00:00:02 GMT"), (0.0, "yesterday"), (0.0, ""), (9.0, "two, dates")):
-        told.dated(seconds, date)
+        told.add(seconds, date)
     assert told.ahead_s == 7.5
 
 

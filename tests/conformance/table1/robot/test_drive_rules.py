@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 from conformance.transport.exchange import Exchange
 
 _AHEAD = Velocity(linear_x=0.3, angular_z=0.5)
-_LIMITS = DeclaredLimits(settle_s=1.0, tolerance=0.05, tolerance_abs=0.02).resolved()
+_LIMITS = DeclaredLimits(settle_s=1.0, tolerance=0.05, tolerance_abs=0.02).resolve()
 
 
 def exchange(status: int = 200, value: object = None) -> Exchange:
@@ -32,11 +32,11 @@ def turn(at: float, odometry: Velocity | None, velocity: Velocity | None, linear
 
 def driven(velocity: Velocity | None = _AHEAD, linear: Velocity | None = None, turns: int = 40, odd: int = 20) -> Trace:
     """Four fifths of a second of going ahead, with what two resources say of it in the last turns, so many."""
-    trace = Trace(0.0).commanded(command())
+    trace = Trace(0.0).with_command(command())
     straight = Velocity(*_AHEAD[:3])
     for index in range(turns):
         is_odd = index >= turns - odd
-        trace = trace.looked(
+        trace = trace.with_look(
             turn(0.02 * index, _AHEAD, velocity if is_odd else _AHEAD, linear if is_odd and linear else straight)
         )
     return trace
@@ -51,18 +51,18 @@ def test_readings_that_agree_are_judged_and_hold():
 
 
 def test_where_answers_take_long_three_turns_without_a_command_are_judged():
-    trace, straight = Trace(0.0).commanded(command()), Velocity(*_AHEAD[:3])
+    trace, straight = Trace(0.0).with_command(command()), Velocity(*_AHEAD[:3])
     for index in range(3):
         assert list(agreement(trace, _LIMITS)) == []
-        trace = trace.looked(turn(0.1 + 0.2 * index, _AHEAD, _AHEAD, straight))
+        trace = trace.with_look(turn(0.1 + 0.2 * index, _AHEAD, _AHEAD, straight))
     assert [one.holds for _, one in agreement(trace, _LIMITS)] == [True, True]
-    assert list(agreement(trace.commanded(command(at=0.2)), _LIMITS)) == []
+    assert list(agreement(trace.with_command(command(at=0.2)), _LIMITS)) == []
 
 
 def test_a_robot_that_moves_between_two_readings_is_not_judged_by_what_else_was_read():
     trace, straight = Trace(0.0), Velocity(*_AHEAD[:3])
     for index, turning in enumerate((0.5, 0.9, 0.9)):
-        trace = trace.looked(turn(0.2 * index, _AHEAD, _AHEAD._replace(angular_z=turning), straight))
+        trace = trace.with_look(turn(0.2 * index, _AHEAD, _AHEAD._replace(angular_z=turning), straight))
     assert list(agreement(trace, _LIMITS)) == []
 
 
@@ -88,9 +88,9 @@ def test_one_reading_that_differs_refutes_nothing():
     [
         Trace(0.0),
         driven(STILL, turns=8),
-        driven(STILL).commanded(command(at=0.79)).looked(turn(0.8, _AHEAD, _AHEAD, None)),
-        driven(STILL).looked(turn(0.8, STILL, _AHEAD, None)),
-        driven(STILL).looked(turn(0.8, None, _AHEAD, None)),
+        driven(STILL).with_command(command(at=0.79)).with_look(turn(0.8, _AHEAD, _AHEAD, None)),
+        driven(STILL).with_look(turn(0.8, STILL, _AHEAD, None)),
+        driven(STILL).with_look(turn(0.8, None, _AHEAD, None)),
     ],
     ids=["nothing", "too short", "a command between", "not steady", "no odometry after it"],
 )
@@ -117,7 +117,7 @@ def test_the_answer_to_a_command(answer, problem):
 
 def test_each_way_to_command_has_a_requirement_of_its_own():
     linear = command(exchange=exchange(200, _AHEAD.linear), linear_only=True)
-    trace = Trace(0.0).commanded(command()).commanded(linear).commanded(command(integers=True))
+    trace = Trace(0.0).with_command(command()).with_command(linear).with_command(command(integers=True))
     judged = [(id_.split("/")[1], one.holds) for id_, one in every_outcome(trace, _LIMITS, way=False)]
     assert judged == [("velocity-put", True), ("linear-put", True), ("velocity-integers", True)]
 
@@ -126,7 +126,7 @@ def seen(*velocities: Velocity | None) -> Trace:
     """One turn for each velocity, each of a sample of its own."""
     trace = Trace(0.0)
     for index, velocity in enumerate(velocities):
-        trace = trace.looked(turn(0.1 * index, _AHEAD, velocity, None))
+        trace = trace.with_look(turn(0.1 * index, _AHEAD, velocity, None))
     return trace
 
 
@@ -151,24 +151,24 @@ def test_a_robot_is_not_faster_than_it_was_ever_asked_to_be():
     assert speed(seen(_AHEAD, _AHEAD, _AHEAD)) is None
     fast = _AHEAD._replace(linear_x=-0.7)
     for velocities, holds in (((_AHEAD,) * 3, True), ((fast,) * 3, False), ((_AHEAD, fast, _AHEAD), True)):
-        assert speed(seen(*velocities).commanded(command()).commanded(command(STILL, at=1.0))).holds is holds
+        assert speed(seen(*velocities).with_command(command()).with_command(command(STILL, at=1.0))).holds is holds
 
 
 def test_times_of_commands():
     trace = Trace(5.0)
-    assert (trace.sent, trace.full_sent, trace.answered) == (5.0, 5.0, 5.0)
-    trace = trace.commanded(command(at=6.0)).commanded(command(at=7.0, linear_only=True))
-    assert (trace.sent, trace.full_sent, trace.answered) == (7.0, 6.0, 7.01)
-    trace = trace.commanded(command(at=8.0, linear_only=True, renewal=True))
-    assert (trace.sent, trace.full_sent, trace.answered) == (8.0, 6.0, 7.01)
+    assert (trace.last_sent_s, trace.full_sent, trace.last_answered_s) == (5.0, 5.0, 5.0)
+    trace = trace.with_command(command(at=6.0)).with_command(command(at=7.0, linear_only=True))
+    assert (trace.last_sent_s, trace.full_sent, trace.last_answered_s) == (7.0, 6.0, 7.01)
+    trace = trace.with_command(command(at=8.0, linear_only=True, renewal=True))
+    assert (trace.last_sent_s, trace.full_sent, trace.last_answered_s) == (8.0, 6.0, 7.01)
 
 
 def sped_up(linear) -> Trace:
     """A second of speeding up, with what the linear velocity is at each of its steps."""
-    trace = Trace(0.0).commanded(command())
+    trace = Trace(0.0).with_command(command())
     for step in range(20):
         velocity = Velocity(linear_x=0.03 * step)
-        trace = trace.looked(turn(0.02 * step, velocity, velocity, Velocity(linear_x=linear(step))))
+        trace = trace.with_look(turn(0.02 * step, velocity, velocity, Velocity(linear_x=linear(step))))
     return trace
 
 

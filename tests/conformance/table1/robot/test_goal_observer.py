@@ -29,11 +29,11 @@ def refuted(api: RestInterface, *rounds: list[dict]) -> set[str]:
     observer = watching(api)
     url = f"{_BASE}/robot/navigation/action/goal/"
     for shown in rounds:
-        observer.answered(Exchange(Request("PUT", url, ()), Response(201, (), b"", 1.0)))
+        observer.on_response(Exchange(Request("PUT", url, ()), Response(201, (), b"", 1.0)))
         for one in shown:
             answer = Response(200, _JSON, json.dumps(one).encode(), 1.0)
-            observer.answered(Exchange(Request("GET", url, ()), answer))
-    return set(api.run.judge.refuted())
+            observer.on_response(Exchange(Request("GET", url, ()), answer))
+    return set(api.run.judge.failure_counts())
 
 
 def test_goals_of_one_piece(api):
@@ -88,8 +88,8 @@ def test_another_goal_may_follow_and_that_before_it_be_put_again(api):
 )
 def test_the_response_to_a_put_has_the_goal_of_its_request(api, shown, wrong):
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(goal("<b>&amp;")).encode())
-    watching(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
-    assert api.run.judge.refuted().get("rest-resources/goal-id", 0) == wrong
+    watching(api).on_response(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
+    assert api.run.judge.failure_counts().get("rest-resources/goal-id", 0) == wrong
 
 
 def turned(x: float, frame: str = "map") -> dict:
@@ -107,5 +107,5 @@ def turned(x: float, frame: str = "map") -> dict:
 def test_the_response_to_a_put_has_the_pose_of_its_request_in_the_same_frame(api, shown, wrong):
     body = {"goal": goal("1", x=0.123456)["goal"]}
     sent = Request("PUT", f"{_BASE}/robot/navigation/action/goal/", _JSON, json.dumps(body).encode())
-    watching(api).answered(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
-    assert api.run.judge.refuted().get("rest-resources/goal-put", 0) == wrong
+    watching(api).on_response(Exchange(sent, Response(202, _JSON, json.dumps(shown).encode(), 1.0)))
+    assert api.run.judge.failure_counts().get("rest-resources/goal-put", 0) == wrong

@@ -63,8 +63,8 @@ def _refuted(checker, reads, apart_s=1.0) -> set[str]:
     observer = CheckerListener(run.judge, [checker])
     for number, (method, path, sent, status, media_type, body) in enumerate(reads, 1):
         response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=10 + number * apart_s)
-        observer.answered(Exchange(Request(method, _BASE + path, (), sent), response))
-    return set(run.judge.refuted())
+        observer.on_response(Exchange(Request(method, _BASE + path, (), sent), response))
+    return set(run.judge.failure_counts())
 
 
 def _goals(other, value):
@@ -126,9 +126,9 @@ def test_what_has_no_response_may_have_changed_the_goal():
     for number in range(4):
         for method, path, sent, status, media_type, body in (_json(GOAL_PATH, _A), _soap("Goal", None)):
             response = Response(status, (("Content-Type", media_type),), body, 1.0, received_s=number + 1.0)
-            observer.answered(Exchange(Request(method, _BASE + path, (), sent), response))
-        observer.unanswered(Unanswered(Request("DELETE", _BASE + GOAL_PATH), "none", "timeout"))
-    assert not run.judge.refuted()
+            observer.on_response(Exchange(Request(method, _BASE + path, (), sent), response))
+        observer.on_no_response(Unanswered(Request("DELETE", _BASE + GOAL_PATH), "none", "timeout"))
+    assert not run.judge.failure_counts()
 
 
 def _at(x):

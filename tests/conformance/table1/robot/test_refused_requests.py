@@ -45,8 +45,8 @@ def _came(api, method, path, status, body=b"", fields=(), detail="no", media_typ
 def _chosen(api, *exchanges, effort="standard"):
     refused = RefusedRequests(api)
     for one in exchanges:
-        refused.answered(one)
-    return refused, refused.chosen((), Effort(effort))
+        refused.on_response(one)
+    return refused, refused.choose((), Effort(effort))
 
 
 @pytest.mark.parametrize("status", [400, 404, 405, 406, 415, 422])
@@ -104,8 +104,8 @@ def test_one_that_the_robot_takes_later_is_not_sent_again(api):
     exchange = _came(api, "PUT", VELOCITY, 422, b"{}", JSON_BODY)
     refused, (one,) = _chosen(api, exchange)
     refused.drop(one)
-    refused.answered(exchange)
-    assert refused.chosen((), Effort()) == []
+    refused.on_response(exchange)
+    assert refused.choose((), Effort()) == []
 
 
 class _Body:
@@ -287,5 +287,5 @@ def test_a_walk_pauses_once(api):
 
 
 def test_a_slow_robot_is_sent_no_more_than_the_commands(api):
-    walk = Walk(Robot(api), Effort("quick").seen(1000.0), 0.1, preludes=[lambda: pytest.fail("sent")])
+    walk = Walk(Robot(api), Effort("quick").slowed_to(1000.0), 0.1, preludes=[lambda: pytest.fail("sent")])
     walk.prelude()

@@ -12,7 +12,7 @@ from lxml import etree
 from conformance.contract.classes import CauseKind
 from conformance.documents.wsdl import read_file
 from conformance.packs.table1.robot.deliveries_seen import QUIET_S, ProbeObserver
-from conformance.packs.table1.robot.delivery import Delivery, deliveries, doubles, path_of, written
+from conformance.packs.table1.robot.delivery import Delivery, deliveries, doubles, notations, path_of
 from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
 from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.rules.equivalence import test_equivalence_delivery as rules
@@ -34,15 +34,15 @@ def bits(value: float) -> bytes:
 @settings(max_examples=300, deadline=None, database=None)
 @given(doubles())
 def test_every_form_of_a_number_is_the_contracts_and_loses_no_bit(value):
-    for form in written(value):
+    for form in notations(value):
         assert _NUMBER.fullmatch(form), form
         assert bits(float(form)) == bits(value), form
 
 
 def test_the_forms_are_not_all_the_same():
-    assert set(written(0.5)) >= {"0.5", ".5"}
-    assert set(written(3.0)) >= {"3", "+3", "003"}
-    assert math.copysign(1, float(written(-0.0)[0])) < 0
+    assert set(notations(0.5)) >= {"0.5", ".5"}
+    assert set(notations(3.0)) >= {"3", "+3", "003"}
+    assert math.copysign(1, float(notations(-0.0)[0])) < 0
 
 
 def test_a_path_has_its_values_in_the_papers_order():
@@ -111,7 +111,7 @@ def judged(sender, first=0) -> Judge:
 def found(fault) -> set[str]:
     sender = sender_of(fault)
     sender.send([order(number, how) for number, how in enumerate(("rest", "soap", "coffee", "same") * 3)])
-    return {id_.split("/")[1] for id_ in judged(sender).refuted()}
+    return {id_.split("/")[1] for id_ in judged(sender).failure_counts()}
 
 
 def narrowed(seen: Seen) -> Seen:
@@ -158,11 +158,11 @@ def test_a_second_message_is_found_whenever_it_comes(late):
 
     sender = sender_of(again)
     sender.send([order(number, "rest") for number in range(2)])
-    assert not judged(sender).refuted()
+    assert not judged(sender).failure_counts()
     for turn in (1, 2):
         sender.send([order(number, "soap") for number in (2 * turn, 2 * turn + 1)])
     sender.watch(0.0)
-    assert set(judged(sender, 1).refuted()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
+    assert set(judged(sender, 1).failure_counts()) == {"equivalence/delivery-rest", "equivalence/delivery-only"}
 
 
 @pytest.mark.parametrize(("batches", "requirements"), [(1, set()), (2, {"delivery-only"})])
@@ -170,7 +170,7 @@ def test_messages_that_the_suite_did_not_cause_fail_only_when_they_come_repeated
     sender = sender_of(lambda number, seen: [seen, Seen(order(900 + number, "rest").delivery)])
     for number in range(batches):
         sender.send([order(number, "rest")])
-    assert {id_.split("/")[1] for id_ in judged(sender).refuted()} == requirements
+    assert {id_.split("/")[1] for id_ in judged(sender).failure_counts()} == requirements
 
 
 @pytest.mark.parametrize(("status", "arrives", "found"), [(500, True, True), (500, False, False), (504, True, False)])

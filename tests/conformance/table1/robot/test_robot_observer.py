@@ -38,8 +38,8 @@ def test_answers_of_several_clients_that_crossed_say_nothing_of_order(api, recei
     for second, at in ((2, 100.0), (1, received_s)):
         answer = Response(200, json_type, json.dumps(odometry(second)).encode(), 5.0, received_s=at)
         for listener in api.client.connection.listeners:
-            listener.answered(Exchange(request, answer))
-    assert set(api.run.judge.refuted()) == refuted
+            listener.on_response(Exchange(request, answer))
+    assert set(api.run.judge.failure_counts()) == refuted
 
 
 @pytest.fixture
@@ -53,11 +53,11 @@ def see(api, path, value, *, status=200, headers=(("Accept", "*/*"),), method="G
     said = (("Content-Type", "application/json"), *((("Retry-After", after),) if after else ()))
     exchange = Exchange(request, Response(status, said, body, 0.0, received_s=time.monotonic()))
     for listener in api.client.connection.listeners:
-        listener.answered(exchange)
+        listener.on_response(exchange)
 
 
 def found(api: RestInterface) -> set[str]:
-    return set(api.run.judge.refuted())
+    return set(api.run.judge.failure_counts())
 
 
 def test_good_readings_are_cases(api):

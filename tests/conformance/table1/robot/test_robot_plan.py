@@ -66,13 +66,13 @@ def _seen(poses: list[Pose], *, path: str = "/robot/navigation/service/plan?x=1.
     ]
     body = json.dumps({"plan": {"header": header(), "poses": there}}).encode()
     response = replace(Response(200, (("Content-Type", "application/json"),), body, 1.0), **answer)
-    observer.answered(Exchange(Request("GET", _BASE + path), response))
+    observer.on_response(Exchange(Request("GET", _BASE + path), response))
     return run
 
 
 def test_every_plan_counts():
     assert _seen(_straight(0.1)).judge.counts([_ID]) == {_ID: 1}
-    assert _seen(_leaping(1.5)).judge.refuted() == {_ID: 1}
+    assert _seen(_leaping(1.5)).judge.failure_counts() == {_ID: 1}
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_every_plan_counts():
 def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?{asked}").judge
     assert judge.counts([_END]) == {_END: cases}
-    assert judge.refuted().get(_END, 0) == failures
+    assert judge.failure_counts().get(_END, 0) == failures
 
 
 @pytest.mark.parametrize(
@@ -109,30 +109,30 @@ def test_every_plan_ends_where_it_was_asked_to(asked, cases, failures):
 def test_every_plan_starts_where_it_was_asked_to(start, cases, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{start}").judge
     assert judge.counts(["rest-resources/plan-given-start"]) == {"rest-resources/plan-given-start": cases}
-    assert judge.refuted().get("rest-resources/plan-start", 0) == failures
+    assert judge.failure_counts().get("rest-resources/plan-start", 0) == failures
 
 
 @pytest.mark.parametrize(("frame", "failures"), [("", 0), ("&frame_id=map", 0), ("&frame_id=odom", 1)])
 def test_every_plan_is_in_the_frame_that_was_asked_for(frame, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{frame}").judge
-    assert judge.refuted().get("rest-resources/plan-frame", 0) == failures
+    assert judge.failure_counts().get("rest-resources/plan-frame", 0) == failures
 
 
 @pytest.mark.parametrize(("asked", "failures"), [("", 0), ("&yaw=0.1", 0), ("&yaw=0.3", 1), ("&yaw=nan", 0)])
 def test_every_plan_ends_with_the_heading_that_was_asked_for(asked, failures):
     judge = _seen(_straight(0.1), path=f"/robot/navigation/service/plan?x=1.9&y=0.0{asked}").judge
-    assert judge.refuted().get("rest-resources/plan-yaw", 0) == failures
+    assert judge.failure_counts().get("rest-resources/plan-yaw", 0) == failures
 
 
 @pytest.mark.parametrize(("step", "failures"), [(1.0, 0), (1.1, 1)])
 def test_no_step_is_longer_than_declared(step, failures):
-    assert _seen(_straight(step)).judge.refuted().get(_ID, 0) == failures
+    assert _seen(_straight(step)).judge.failure_counts().get(_ID, 0) == failures
 
 
 def test_a_pose_in_another_frame_is_found_where_none_was_asked_for():
     body = json.dumps({"plan": {"header": header(), "poses": [{"header": header("odom"), "pose": pose(1.9)}]}}).encode()
     judge = _seen([], octets=body).judge
-    assert judge.refuted().get("rest-resources/plan-frame", 0) == 1
+    assert judge.failure_counts().get("rest-resources/plan-frame", 0) == 1
 
 
 @pytest.mark.parametrize("x", ["1.9", "0.0"])
@@ -149,9 +149,9 @@ def test_a_plan_over_soap_ends_where_it_was_asked_to(x):
     request = Request("POST", "http://robot:5555/turtlesim_subscriber_ws", (("Content-Type", "text/xml"),), body=asked)
     run = Run(statement=Statement())
     observer = CheckerListener(run.judge, [Plans(_BASE.__add__, run.statement)])
-    observer.answered(Exchange(request, Response(200, (("Content-Type", "text/xml"),), answer, 1.0)))
+    observer.on_response(Exchange(request, Response(200, (("Content-Type", "text/xml"),), answer, 1.0)))
     assert run.judge.counts([_SOAP]) == {_SOAP: 2}  # its end and its frame
-    assert run.judge.refuted().get(_SOAP, 0) == (x != "1.9")
+    assert run.judge.failure_counts().get(_SOAP, 0) == (x != "1.9")
 
 
 @pytest.mark.parametrize(

@@ -41,10 +41,10 @@ class Heard(Listener):
     def __init__(self) -> None:
         self.exchanges: list[object] = []
 
-    def answered(self, exchange) -> None:
+    def on_response(self, exchange) -> None:
         self.exchanges.append(exchange)
 
-    unanswered = answered
+    on_no_response = on_response
 
 
 def api(url: str, *, motion: bool = True, timeout_s: float = 60.0) -> RestInterface:

@@ -25,7 +25,7 @@ class _Run:
 
     def __init__(self, sample_s: float = _TURN_S, **declared: object) -> None:
         self.judge: Judge = Run().judge
-        self.beside = BesideOdometry[Any](DeclaredLimits(tolerance_abs=0.02, **declared).resolved())
+        self.beside = BesideOdometry[Any](DeclaredLimits(tolerance_abs=0.02, **declared).resolve())
         self.sample_s, self.now = sample_s, 100.0
 
     def turns(self, count: int, odometry: Any = STILL, velocity: Any = None) -> None:
@@ -37,7 +37,7 @@ class _Run:
 
     @property
     def refuted(self) -> int:
-        return self.judge.refuted().get(_ID, 0)
+        return self.judge.failure_counts().get(_ID, 0)
 
     @property
     def cases(self) -> int:
@@ -155,8 +155,8 @@ def test_a_velocity_that_is_gone_while_the_robot_drives_is_judged():
 )
 def test_one_sample_is_told_in_one_way(told, cases, failures):
     judge: Judge = Run().judge
-    sample = OneSample(DeclaredLimits(tolerance_abs=0.02).resolved())
+    sample = OneSample(DeclaredLimits(tolerance_abs=0.02).resolve())
     for stamp, x in told:
         record(judge, _SAMPLE, sample.odometry((stamp, 0), odometry(x=x), _EXCHANGE))
     assert judge.counts([_SAMPLE])[_SAMPLE] == cases
-    assert judge.refuted().get(_SAMPLE, 0) == failures
+    assert judge.failure_counts().get(_SAMPLE, 0) == failures

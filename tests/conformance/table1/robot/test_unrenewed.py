@@ -1,7 +1,7 @@
 import pytest
 
 from conformance.packs.table1.robot.robot import Velocity
-from conformance.packs.table1.robot.velocity_range import unrenewed
+from conformance.packs.table1.robot.velocity_range import unrenewed_velocities
 
 _BENT, _AHEAD = Velocity(linear_x=-0.1, angular_z=-0.8), Velocity(linear_x=0.1, angular_z=0.8)
 _ACROSS = Velocity(linear_x=0.1, angular_z=-0.8)
@@ -9,7 +9,7 @@ _OTHERS = (Velocity(linear_x=-0.05), Velocity(angular_z=0.3), Velocity(linear_x=
 
 
 def _ways(effort: str, seed: int) -> list[tuple[Velocity, bool]]:
-    return unrenewed(_BENT, _AHEAD, _ACROSS, _OTHERS, effort, seed)
+    return unrenewed_velocities(_BENT, _AHEAD, _ACROSS, _OTHERS, effort, seed)
 
 
 @pytest.mark.parametrize("effort", ["standard", "deep"])
@@ -32,6 +32,6 @@ def test_at_quick_seeds_let_each_of_them_go():
 
 def test_a_robot_without_a_reverse_gear_lets_no_rest_go():
     straight = Velocity(linear_x=0.2)
-    assert unrenewed(straight, Velocity(), Velocity(), (straight,), "standard", 0) == [
+    assert unrenewed_velocities(straight, Velocity(), Velocity(), (straight,), "standard", 0) == [
         (straight, by) for by in ("linear", "velocity", "closing")
     ]

@@ -57,8 +57,8 @@ def judged(body, status=200):
     run = Run()
     response = Response(status, (("Content-Type", "text/xml"),), body.encode(), 1.0)
     exchange = Exchange(Request("POST", _URL, (), b"<a/>"), response)
-    CheckerListener(run.judge, [SoapResponses([service])]).answered(exchange)
-    return set(run.judge.refuted())
+    CheckerListener(run.judge, [SoapResponses([service])]).on_response(exchange)
+    return set(run.judge.failure_counts())
 
 
 _OPERATIONS = {
@@ -75,7 +75,7 @@ def made(operation):
     """The text of an ordinary response, with a quaternion of length 1, a goal's status and full names."""
     described = read_file(_WSDL)
     wrapper = described.shape(clark(described.target_namespace, f"{operation}Response"))
-    text = envelope([ordinary(wrapper, optional=True)]).written().decode()
+    text = envelope([ordinary(wrapper, optional=True)]).serialize().decode()
     text = re.sub(r"<orientation>.*?</orientation>", f"<orientation>{_POINT.format('1')}<w>0</w></orientation>", text)
     text = re.sub(r"<code>[^<]*", "<code>1", text)
     kind = "nav_msgs/srv/GetPlan" if operation == "GetNavigationServices" else "sensor_msgs/msg/LaserScan"

@@ -19,7 +19,7 @@ _EXCHANGE = exchange()
 _NOISE = Noise(position_m=0.005, heading_rad=0.005, linear_m_s=0.01, angular_rad_s=0.02)
 _LIMITS = DeclaredLimits(
     linear_m_s=0.7, angular_rad_s=2.5, settle_s=0.6, hold_s=1.0, tolerance=0.05, tolerance_abs=0.01, noise=_NOISE
-).resolved()
+).resolve()
 _FAST = Velocity(linear_x=0.7, angular_z=-2.5)
 _ENOUGH = 9
 rates = st.sampled_from((5, 10, 20, 50))
@@ -54,7 +54,7 @@ def watched(true: list[Velocity], hz: float, seed: int | None = None) -> list[Tu
 
 
 def shown(turns: list[Turn], wanted: Velocity, limits: Limits = _LIMITS) -> bool | None:
-    return windows.shown(limits, turns, wanted, count=_ENOUGH)
+    return windows.is_shown(limits, turns, wanted, count=_ENOUGH)
 
 
 @given(rates, seeds)
@@ -73,7 +73,7 @@ def test_one_sample_that_is_out_fails_nobody(hz, out, back):
     stamp = turns[-back].odometry.stamp
     bad = Velocity(linear_x=out, angular_z=out)
     seen = [turn(one.at, stamp, bad) if one.odometry.stamp == stamp else one for one in turns]
-    assert windows.shown(_LIMITS, seen, _FAST)
+    assert windows.is_shown(_LIMITS, seen, _FAST)
     assert windows.verdict(_LIMITS, seen, _FAST)
 
 
@@ -81,7 +81,7 @@ def test_one_sample_that_is_out_fails_nobody(hz, out, back):
 def test_one_sample_that_fits_saves_nobody_from_the_median(hz):
     turns = watched([STILL] * 100, hz)
     last = turns[-1]
-    assert windows.shown(_LIMITS, [*turns, turn(last.at + 0.02, last.odometry.stamp + 1, _FAST)], _FAST) is False
+    assert windows.is_shown(_LIMITS, [*turns, turn(last.at + 0.02, last.odometry.stamp + 1, _FAST)], _FAST) is False
 
 
 def test_samples_are_told_apart_by_their_stamps():
@@ -101,7 +101,7 @@ def test_without_stamps_that_advance_samples_are_told_apart_by_time(readable):
 
 def test_too_few_samples_say_nothing_but_one_that_fits_does():
     turns = watched([_FAST] * 9, 5)
-    assert windows.shown(_LIMITS, turns, STILL) is None
+    assert windows.is_shown(_LIMITS, turns, STILL) is None
     assert windows.verdict(_LIMITS, turns, STILL) is None
     assert windows.verdict(_LIMITS, turns, _FAST) is True
     assert windows.verdict(_LIMITS, [turn(0.0, 0.0, None)], _FAST) is None

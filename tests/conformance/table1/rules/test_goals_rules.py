@@ -192,6 +192,6 @@ def test_another_clients_goal_after_the_own_one_is_no_fault(left_m, drives_judge
     trace = GoalReached(
         exchange(202), Pose(1.0, 0.0, 0.0), way_m=1.0, has_to_m=0.2, left_m=left_m, reached_m=0.3, read=exchange(200)
     )
-    trace = replace(trace, other=True, undecided=not trace.arrived)
+    trace = replace(trace, other=True, undecided=not trace.is_near)
     assert _holds(drives.goal_drives, trace) == drives_judged
     assert _holds(drives.goal_ended, trace) == _holds(drives.goal_outcome, trace) == []

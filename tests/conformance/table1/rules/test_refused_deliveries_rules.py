@@ -14,7 +14,7 @@ _SENT = [Delivery(3, *(float(number),) * 6) for number in range(60)]
 
 
 def _rejected(status, code="", what=NO_CREDENTIALS):
-    answer = SimpleNamespace(status=status, code=code, exchange=exchange(status), accepted=status == 200)
+    answer = SimpleNamespace(status=status, code=code, exchange=exchange(status), is_taken=status == 200)
     return Rejected.of(what, _SENT[0], answer)
 
 

@@ -135,6 +135,6 @@ def test_a_velocity_from_before_a_pause_is_stale_if_it_is_so_twice(shown, odomet
 
 def test_a_cancel_whose_response_was_late_is_judged_only_where_no_other_was_in_time():
     late, in_time = (Cancelled(exchange(204), exchange(404), gone=True, drive=Trace(0.0), late=one) for one in (1, 0))
-    assert rules.judged(GoalLife(cancelled=(late, in_time))) == (in_time,)
-    assert rules.judged(GoalLife(cancelled=(late, late))) == (late,)
-    assert rules.judged(GoalLife()) == ()
+    assert rules.judged_cancels(GoalLife(cancelled=(late, in_time))) == (in_time,)
+    assert rules.judged_cancels(GoalLife(cancelled=(late, late))) == (late,)
+    assert rules.judged_cancels(GoalLife()) == ()

@@ -44,12 +44,12 @@ delivery_concurrent = _arriving(
 @rule("equivalence/delivery-order", on=(deliveries,))
 def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
     """Judge that deliveries over one interface arrive in order; each interface may have its own ROS publisher."""
-    for batch, _ in trace.judged():
+    for batch, _ in trace.batches_to_judge():
         for interface in ("rest", "soap"):
             # A delivery with two messages has no single place in the order, nor has one that was sent at the same time
             # as others.
             ordered = [
-                message for message in _accepted(batch) if message.interface == interface and message.how not in _TWO
+                message for message in _accepted_in(batch) if message.interface == interface and message.how not in _TWO
             ]
             ordered = [message for message in ordered if message.how != "together"]
             wanted = [trace.key(message.delivery) for message in ordered]
@@ -63,8 +63,8 @@ def delivery_order(trace: Deliveries) -> Iterator[Outcome]:
 @rule("equivalence/delivery-only", on=(deliveries, deliveries_later))
 def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
     """Judge that no message arrives besides one for each accepted request."""
-    for batch, before in trace.judged():
-        exchange = next((message.exchange for message in _accepted(batch)), None)
+    for batch, before in trace.batches_to_judge():
+        exchange = next((message.exchange for message in _accepted_in(batch)), None)
         found, cause = "", ""
         again, refused, unsent = _others(trace, batch, before)
         if again:
@@ -80,8 +80,8 @@ def delivery_only(trace: Deliveries) -> Iterator[Outcome]:
 
 def _arrives_once(trace: Deliveries, how: str) -> Iterator[Case]:
     """Yield a case for each accepted delivery that was sent in this way, and for each of its messages that is late."""
-    for batch, before in trace.judged():
-        accepted = _accepted(batch)
+    for batch, before in trace.batches_to_judge():
+        accepted = _accepted_in(batch)
         arrived = Counter(_keys(trace, batch))
         wanted = Counter(trace.key(message.delivery) for message in accepted)
         others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in wanted]
@@ -123,13 +123,11 @@ def _others(
     Returns:
         The deliveries of earlier batches that arrived again, those that were not accepted, and those never sent.
     """
-    known = {trace.key(message.delivery) for message in _accepted(batch)}
+    known = {trace.key(message.delivery) for message in _accepted_in(batch)}
     sent = list(chain.from_iterable(one.sent for one in (*before, batch)))
     known |= {trace.key(message.delivery) for message in sent if message.may_arrive}
-    earlier = {trace.key(message.delivery): message for message in chain.from_iterable(map(_accepted, before))}
-    refused = {
-        trace.key(message.delivery): message for message in sent if not message.accepted and not message.may_arrive
-    }
+    earlier = {trace.key(message.delivery): message for message in chain.from_iterable(map(_accepted_in, before))}
+    refused = {trace.key(message.delivery): message for message in sent if not message.is_ok and not message.may_arrive}
     others = [sighting.delivery for sighting in batch.seen if trace.key(sighting.delivery) not in known]
     keys = [trace.key(delivery) for delivery in others]
     return (
@@ -147,8 +145,8 @@ def _all(trace: Deliveries, last: Batch) -> Iterator[tuple[Batch, tuple[Batch, .
             return
 
 
-def _accepted(batch: Batch) -> list[Sent]:
-    return [message for message in batch.sent if message.accepted]
+def _accepted_in(batch: Batch) -> list[Sent]:
+    return [message for message in batch.sent if message.is_ok]
 
 
 def _keys(trace: Deliveries, batch: Batch) -> list[bytes]:

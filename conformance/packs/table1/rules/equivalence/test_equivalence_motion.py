@@ -10,7 +10,7 @@ from conformance.packs.table1.checkers.single_readings import BesideOdometry, Pl
 from conformance.packs.table1.robot.geometry import pose_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.robot import Odometry, Velocity
-from conformance.packs.table1.robot.state_over_soap import StateRead, answered
+from conformance.packs.table1.robot.state_over_soap import StateRead, value_in
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
 from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
@@ -50,7 +50,7 @@ def _beside(operation: str, shape: Shape, over_soap: Callable[[Any], Any], of: C
         for odometry in trace.drive.odometry:
             while reads and reads[0].response.received_s < odometry.received:
                 exchange = reads.popleft()
-                value, problem = answered(exchange, shape)
+                value, problem = value_in(exchange, shape)
                 # A value with a wrong shape is judged where whole states are compared.
                 if not problem and not shape.problem(value):
                     beside.reading(over_soap(value), exchange, exchange.response.received_s)

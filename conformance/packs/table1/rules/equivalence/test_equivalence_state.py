@@ -18,7 +18,7 @@ from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TW
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
 from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask, outgoing, request
-from conformance.packs.table1.robot.state_over_soap import STATES, answered, compare
+from conformance.packs.table1.robot.state_over_soap import STATES, compare, value_in
 from conformance.scenarios.rule import record
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
@@ -113,7 +113,7 @@ def _odd_at_one_moment(robot: Robot, subscribers: SoapService, name: str, effort
     readings: list[tuple[Exchange, dict[str, Any]]] = []
     for exchange in itertools.chain(*came):
         if isinstance(exchange, Exchange) and not is_busy(exchange):
-            value, problem = answered(exchange, shape)
+            value, problem = value_in(exchange, shape)
             # The fault may be of either interface; other problems are judged in any response.
             readings += [] if problem or shape.problem(value) else [(exchange, flattened(value))]
     odd: _Odd = {}
@@ -134,7 +134,7 @@ def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge,
     for _ in range(_READ * effort.cases(_VELOCITIES)):
         odometry = robot.odometry()
         exchange = ask(subscribers, "GetVelocity")
-        twist, problem = answered(exchange, TWIST)
+        twist, problem = value_in(exchange, TWIST)
         if odometry is None or problem or TWIST.problem(twist):
             return  # judged by those who compare all of it
         outcomes = beside.odometry(odometry.stamp, odometry.velocity, odometry.received)
@@ -200,7 +200,7 @@ def _compare_plans(
     first()
     written = {name: _all_digits(value) if in_full else value for name, value in parameters.items()}
     exchange = ask(subscribers, "GetPlan", **written)
-    between, problem = answered(exchange, GET_PLAN)
+    between, problem = value_in(exchange, GET_PLAN)
     after, _ = robot.read(query(**parameters), GET_PLAN)
     if before is None or after is None:
         return

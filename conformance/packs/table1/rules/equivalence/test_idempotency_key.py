@@ -11,7 +11,7 @@ from conformance.verdict.evidence import Case
 @rule("equivalence/idempotency-key", on=(counted_deliveries,))
 def one_key(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that two requests with one key cause one message and have the same status."""
-    keyed = _keyed(trace)
+    keyed = _keyed_of(trace)
     if isinstance(keyed, NotTested):
         yield keyed
         return
@@ -28,7 +28,7 @@ def one_key(trace: CountedDeliveries) -> Iterator[Outcome]:
 @rule("equivalence/idempotency-other-key", on=(counted_deliveries,))
 def two_keys(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that two requests with two keys make two messages."""
-    keyed = _keyed(trace)
+    keyed = _keyed_of(trace)
     if isinstance(keyed, NotTested):
         yield keyed
         return
@@ -41,7 +41,7 @@ def two_keys(trace: CountedDeliveries) -> Iterator[Outcome]:
     )
 
 
-def _keyed(trace: CountedDeliveries) -> Keyed | NotTested:
+def _keyed_of(trace: CountedDeliveries) -> Keyed | NotTested:
     """Return the deliveries with a key, or why there is nothing to judge."""
     if trace.keyed is None:
         return NotTested(trace.unseen)

@@ -69,7 +69,7 @@ def velocity_message(trace: tuple[OnRos, ...], run: Run) -> Iterator[Outcome]:
     """Judge that an accepted velocity is published on the velocity topic; the robot may smooth it."""
     for velocity in trace:
         yield Case(
-            velocity.arrived(said_of(run).limits),
+            velocity.has_arrived(said_of(run).limits),
             velocity.exchange,
             f"a message with {velocity.wanted}, within the tolerance",
             f"{len(velocity.seen)} messages, last {velocity.seen[-1]}" if velocity.seen else "no message",

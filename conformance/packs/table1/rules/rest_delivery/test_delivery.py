@@ -92,7 +92,7 @@ def test_a_body_is_ignored(api: RestInterface, rest: HttpClient, judge: Judge, e
 def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, effort: Effort) -> None:
     """PUT invalid deliveries: text or nothing for a number, numbers beyond a double's range, other codes."""
 
-    def refused(name: str, place: int, text: str) -> None:
+    def judge_refusal(name: str, place: int, text: str) -> None:
         values = list(_VALID)
         values[place] = text
         exchange = rest.send("PUT", path_of(*values))
@@ -108,20 +108,20 @@ def test_what_is_no_delivery(rest: HttpClient, judge: Judge, explore: Explorer, 
         )
 
     for place, text in effort.alternatives([(place, text) for text in _TEXTS for place in range(7)], 8):
-        refused("refuses-text", place, text)
+        judge_refusal("refuses-text", place, text)
     # The checkers judge the format of the refusal.
     rest.send("PUT", path_of("abc", *_VALID[1:]), headers=(("Accept", "application/xml"),))
     for place, text in effort.alternatives([(place, text) for text in _NON_FINITE for place in range(1, 7)], 8):
-        refused("refuses-non-finite", place, text)
+        judge_refusal("refuses-non-finite", place, text)
     for code in effort.alternatives(_CODES, 8):
-        refused("refuses-code", 0, code)
+        judge_refusal("refuses-code", 0, code)
     explore(
         st.integers(-(2**31), 2**31 - 1).filter(lambda code: code not in {3, 4}),
-        lambda code: refused("refuses-code", 0, str(code)),
+        lambda code: judge_refusal("refuses-code", 0, str(code)),
         cases=20,
     )
     explore(
         st.tuples(st.integers(0, 6), st.text("abcdfghjklmopqrstuvwyz", min_size=1, max_size=12)),
-        lambda case: refused("refuses-text", *case),
+        lambda case: judge_refusal("refuses-text", *case),
         cases=20,
     )

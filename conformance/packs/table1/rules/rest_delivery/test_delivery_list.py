@@ -90,15 +90,15 @@ class Listed(NamedTuple):
     before: list[Delivery]
 
     @property
-    def _known(self) -> list[dict[str, Any]]:
+    def _own_entries(self) -> list[dict[str, Any]]:
         return [entry for entry in self.entries if _request(entry) in [*self.taken, *self.before]]
 
     @property
     def _pairs(self) -> Iterator[tuple[Delivery, dict[str, Any] | None]]:
         """Yield each of the last deliveries that the list has to hold, and the entry in its place."""
-        others = len(self.entries) - len(self._known)
+        others = len(self.entries) - len(self._own_entries)
         wanted = self.taken[::-1][: max(0, _LEAST - others)]
-        return itertools.zip_longest(wanted, self._known[: len(wanted)])
+        return itertools.zip_longest(wanted, self._own_entries[: len(wanted)])
 
     @property
     def out_of_order(self) -> str:

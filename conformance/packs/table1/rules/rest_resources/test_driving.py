@@ -9,7 +9,7 @@ from conformance.packs.table1.robot.geometry import pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
 from conformance.packs.table1.robot.motion_map import velocity_of
 from conformance.packs.table1.robot.robot import STILL, is_near
-from conformance.packs.table1.scenarios.trace import Driven, shown
+from conformance.packs.table1.scenarios.trace import Driven, rule_on
 from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
@@ -24,10 +24,10 @@ _HEADING_RAD: Final = 0.1
 # Least length of a pause without any request, s.
 _PAUSE_S: Final = 0.25
 
-velocity_put = shown("rest-resources/velocity-put", straight, velocity_walk)
-velocity_integers = shown("rest-resources/velocity-integers", turn)
-velocity_converges = shown("rest-resources/velocity-converges", straight, turn, further_axes, velocity_walk)
-velocity_range = shown("rest-resources/velocity-range", straight, turn, further_axes)
+velocity_put = rule_on("rest-resources/velocity-put", straight, velocity_walk)
+velocity_integers = rule_on("rest-resources/velocity-integers", turn)
+velocity_converges = rule_on("rest-resources/velocity-converges", straight, turn, further_axes, velocity_walk)
+velocity_range = rule_on("rest-resources/velocity-range", straight, turn, further_axes)
 
 
 @rule("rest-resources/velocity-both", on=(turn,))
@@ -41,7 +41,7 @@ def velocity_both(trace: Driven, run: Run) -> Iterator[Outcome]:
     yield from found
 
 
-velocity_odometry = shown("rest-resources/velocity-odometry", straight, turn, velocity_walk)
+velocity_odometry = rule_on("rest-resources/velocity-odometry", straight, turn, velocity_walk)
 
 
 @rule("rest-resources/velocity-odometry", on=(turn,))
@@ -82,8 +82,8 @@ def pose_after_pause(trace: Driven, run: Run) -> Iterator[Outcome]:
         yield Case(False, stale[-1][0].exchange, expected, seen, "after a pause")
 
 
-linear_put = shown("rest-resources/linear-put", turn, velocity_walk)
-linear_keeps_angular = shown("rest-resources/linear-keeps-angular", turn, velocity_walk)
-linear_agrees = shown("rest-resources/linear-agrees", straight, turn, velocity_walk)
-pose_motion = shown("rest-resources/pose-motion", straight, turn, further_axes, velocity_walk)
-pose_rotation = shown("rest-resources/pose-rotation", turn, velocity_walk)
+linear_put = rule_on("rest-resources/linear-put", turn, velocity_walk)
+linear_keeps_angular = rule_on("rest-resources/linear-keeps-angular", turn, velocity_walk)
+linear_agrees = rule_on("rest-resources/linear-agrees", straight, turn, velocity_walk)
+pose_motion = rule_on("rest-resources/pose-motion", straight, turn, further_axes, velocity_walk)
+pose_rotation = rule_on("rest-resources/pose-rotation", turn, velocity_walk)

@@ -27,7 +27,7 @@ def goal_drives(trace: GoalReached) -> Iterator[Outcome]:
     heading = "" if trace.reached_rad is None else f", with a heading within {trace.reached_rad:.2f} rad of its heading"
     turned = "" if trace.reached_rad is None else f" and {abs(trace.off_rad):.2f} rad off its heading"
     yield Case(
-        trace.arrived and far,
+        trace.is_near and far,
         trace.read,
         f"the robot within {trace.reached_m:.2f} m of its goal at ({trace.there.x:.2f}, {trace.there.y:.2f}){heading}",
         f"the robot {trace.left_m:.2f} m away from it{turned}, having moved {trace.way_m:.2f} m",
@@ -51,7 +51,7 @@ def goal_ended(trace: GoalReached) -> Iterator[Outcome]:
 @rule("rest-resources/goal-outcome", on=(goal_reached,))
 def goal_outcome(trace: GoalReached) -> Iterator[Outcome]:
     """Judge that the 404 after the goal reports that it was reached."""
-    if trace.read is not None and trace.ended and trace.arrived:
+    if trace.read is not None and trace.ended and trace.is_near:
         wrong = outcome_fault(trace.read, SUCCEEDED, "reached")
         yield Case(not wrong, trace.read, "a 404 with last_goal {goal_id, status}, which succeeded (code 4)", wrong)
 

@@ -26,7 +26,7 @@ def _read(life: GoalLife) -> Iterator[Put]:
     yield from (put for put in _puts(life) if put.exchange.response.status in NEW | REPEATED and not put.ended)
 
 
-def _shown(put: Put) -> Case:
+def _judge_shown(put: Put) -> Case:
     return Case(not put.differs, put.read, "the goal that was put", put.differs)
 
 
@@ -67,13 +67,13 @@ def goal_id_again(trace: GoalLife) -> Iterator[Outcome]:
         new = again.exchange.response.status in NEW
         yield Case(new, again.exchange, "201 or 202 for a goal whose id was that of a cancelled goal")
         if new and not again.ended:
-            yield _shown(again)
+            yield _judge_shown(again)
 
 
 @rule("rest-resources/goal-get", on=(goal_life,))
 def goal_get(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET shows the goal that was sent, and does so after a velocity that was refused."""
-    yield from map(_shown, _read(trace))
+    yield from map(_judge_shown, _read(trace))
     for put in trace.kept:
         expected = f"the active goal, as {put.exchange.request.method} {put.exchange.request.target} was refused"
         yield Case(not put.differs, put.read, expected, put.differs)
@@ -82,7 +82,7 @@ def goal_get(trace: GoalLife) -> Iterator[Outcome]:
 @rule("rest-resources/goal-id", on=(goal_life,))
 def goal_id(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that GET shows the goal's id."""
-    return (_shown(put) for put in _read(trace) if put is trace.first)
+    return (_judge_shown(put) for put in _read(trace) if put is trace.first)
 
 
 @rule("rest-resources/goal-status", on=(goal_life,))
@@ -143,7 +143,7 @@ def goal_preempt(trace: GoalLife) -> Iterator[Outcome]:
     """Judge that another goal replaces the active one."""
     if trace.second is not None and trace.renamed is False:
         yield Case(False, trace.second.exchange, "201 or 202 for another goal")
-    yield from (_shown(put) for put in _read(trace) if put is trace.second)
+    yield from (_judge_shown(put) for put in _read(trace) if put is trace.second)
 
 
 @rule("rest-resources/goal-fills-in", on=(goal_life,))

@@ -7,7 +7,7 @@ from conformance.packs.table1.scenarios.goal_walk import goal_walk
 from conformance.scenarios.rule import Outcome, Rule, rule
 
 
-def _judged(kind: str) -> Rule:
+def _rule_of_kind(kind: str) -> Rule:
     """Return a rule that judges one requirement by the steps of its kind."""
 
     def judge(trace: tuple[GoalStep, ...]) -> Iterator[Outcome]:
@@ -16,11 +16,11 @@ def _judged(kind: str) -> Rule:
     return rule(f"rest-resources/{kind}", on=(goal_walk,))(judge)
 
 
-goal_put = _judged("goal-put")
-goal_get = _judged("goal-get")
-goal_none = _judged("goal-none")
-goal_repeat = _judged("goal-repeat")
-goal_conflict = _judged("goal-conflict")
-goal_preempt = _judged("goal-preempt")
-goal_delete = _judged("goal-delete")
-goal_delete_none_success = _judged("goal-delete-none-success")
+goal_put = _rule_of_kind("goal-put")
+goal_get = _rule_of_kind("goal-get")
+goal_none = _rule_of_kind("goal-none")
+goal_repeat = _rule_of_kind("goal-repeat")
+goal_conflict = _rule_of_kind("goal-conflict")
+goal_preempt = _rule_of_kind("goal-preempt")
+goal_delete = _rule_of_kind("goal-delete")
+goal_delete_none_success = _rule_of_kind("goal-delete-none-success")

@@ -40,13 +40,13 @@ def plan_start(trace: PlansFromRobot) -> Iterator[Outcome]:
     yield from (read.start.case for read in trace.reads if read.start is not None)
 
 
-def _played(name: str) -> Rule:
+def _player(name: str) -> Rule:
     """Return the rule that plays plans; `checkers.plans` judges them, like those of all other checks."""
     return rule(f"rest-resources/{name}", on=(plans_from_robot, plans_from_start))(lambda _trace: ())
 
 
-plan_given_start, plan_end, plan_yaw = _played("plan-given-start"), _played("plan-end"), _played("plan-yaw")
-plan_continuous, plan_frame = _played("plan-continuous"), _played("plan-frame")
+plan_given_start, plan_end, plan_yaw = _player("plan-given-start"), _player("plan-end"), _player("plan-yaw")
+plan_continuous, plan_frame = _player("plan-continuous"), _player("plan-frame")
 
 
 @rule("rest-resources/plan-defaults", on=(plans_from_start,))

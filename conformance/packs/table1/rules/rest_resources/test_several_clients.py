@@ -44,14 +44,14 @@ def one_goal_is_active(trace: tuple[GoalRead, ...]) -> Iterator[Outcome]:
 @rule("rest-resources/concurrent-puts", on=(concurrent_velocities,))
 def one_velocity_is_reached(trace: tuple[Drive, ...], run: Run) -> Iterator[Outcome]:
     """Judge that the robot reaches one client's velocity in all components."""
-    yield from (case for drive in trace for accepted in drive.commands for case in _echoed(accepted))
+    yield from (case for drive in trace for accepted in drive.commands for case in _judge_echo(accepted))
     yield from one_client.judge(trace, motion_map_of(said_of(run)))
 
 
-def _echoed(put: Command) -> Iterator[Case]:
+def _judge_echo(put: Command) -> Iterator[Case]:
     """Yield whether the response's velocity, if it has one, is the sent velocity."""
     twist, problem = read_as(put.exchange.response, TWIST)
-    if put.accepted and not problem:
+    if put.is_ok and not problem:
         echo, velocity = Velocity.of(twist), velocity_of(put.targets)
         same = all(abs(one - other) <= ECHO for one, other in zip(echo, velocity, strict=True))
         yield Case(same, put.exchange, f"the accepted velocity, {velocity}", f"{echo}")

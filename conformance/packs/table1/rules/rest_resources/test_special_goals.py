@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from conformance.documents.json_text import shown
+from conformance.documents.json_text import clip
 from conformance.packs.table1.robot.goal import NEW
 from conformance.packs.table1.robot.goal_trace import GoalRead, Put, RefusedGoals, SpecialGoal
 from conformance.packs.table1.scenarios.goal_ids import goal_ids, goal_poses
@@ -16,7 +16,7 @@ def goal_id(trace: tuple[Put, ...]) -> Iterator[Outcome]:
     """Judge that the robot accepts a goal with any id, and shows it under this id."""
     for put in trace:
         id_ = put.body["goal_id"]["id"]
-        expected = f"201 or 202 for the id {shown(id_)}, which has {len(id_)} characters"
+        expected = f"201 or 202 for the id {clip(id_)}, which has {len(id_)} characters"
         yield Case(put.exchange.response.status in NEW, put.exchange, expected, cause=put.exchange.came)
     yield from _under_its_id(trace)
 
@@ -47,7 +47,7 @@ def _under_its_id(trace: tuple[Put, ...]) -> Iterator[Case]:
             yield Case(not put.differs, put.read, "the goal that was put last, under its id", put.differs, cause)
 
 
-def _refused(put: SpecialGoal) -> Case:
+def _judge_refusal(put: SpecialGoal) -> Case:
     holds = 400 <= put.exchange.response.status < 500
     return Case(holds, put.exchange, f"4xx for a goal with {put.special}", cause=put.exchange.came)
 
@@ -55,7 +55,7 @@ def _refused(put: SpecialGoal) -> Case:
 @rule("rest-resources/goal-quaternion", on=(refused_goals,))
 def goal_quaternion(trace: RefusedGoals) -> Iterator[Outcome]:
     """Judge that goals with a quaternion of another length than 1 are refused."""
-    return map(_refused, trace.not_unit)
+    return map(_judge_refusal, trace.not_unit)
 
 
 @rule("rest-resources/goal-quaternion-taken", on=(refused_goals,))
@@ -69,7 +69,7 @@ def goal_quaternion_taken(trace: RefusedGoals) -> Iterator[Outcome]:
 @rule("rest-resources/goal-frame", on=(refused_goals,))
 def goal_frame(trace: RefusedGoals) -> Iterator[Outcome]:
     """Judge that goals in unknown frames are refused."""
-    return map(_refused, trace.unknown_frames)
+    return map(_judge_refusal, trace.unknown_frames)
 
 
 @rule("rest-resources/goal-unreachable", on=(refused_goals,))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from conformance.packs.table1.robot.motion_map import motion_map_of
 from conformance.packs.table1.scenarios.attempts import attempts
 from conformance.packs.table1.statement import said_of
-from conformance.rules.motion.test_motion_attempts import incomplete_still, nothing_moved, refused, refused_still
+from conformance.rules.motion.test_motion_attempts import incomplete_still, judge_refused, nothing_moved, refused_still
 from conformance.scenarios.motion.trace import Quiet
 from conformance.scenarios.rule import NotClaimed, Note, Outcome, rule
 from conformance.verdict.evidence import Case
@@ -15,7 +15,7 @@ from conformance.verdict.run import Run
 @rule("safety/limits-refused", on=(attempts,))
 def limits_refused(trace: Quiet) -> Iterator[Outcome]:
     """Judge that a velocity beyond the limits is rejected with 4xx."""
-    return refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
+    return judge_refused(attempt for attempt in trace.tried if attempt.kind == "beyond")
 
 
 @rule("safety/refused-keeps", on=(attempts,))
@@ -35,7 +35,7 @@ def limits_hold(trace: Quiet, run: Run) -> Iterator[Outcome]:
 @rule("safety/unactuated-refused", on=(attempts,))
 def unactuated_refused(trace: Quiet) -> Iterator[Outcome]:
     """Judge that a velocity in a component that the robot does not actuate is rejected with 4xx."""
-    yield from refused(attempt for attempt in trace.tried if attempt.kind == "unactuated")
+    yield from judge_refused(attempt for attempt in trace.tried if attempt.kind == "unactuated")
     driven = [attempt for attempt in trace.tried if attempt.kind == "driven"]
     for attempt in driven:
         yield Case(True, attempt.exchange, f"4xx for {attempt.what}, or that it drives so")

@@ -11,13 +11,13 @@ from conformance.packs.table1.robot.robot import STILL, is_near
 from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.trace import Driven, longer_s, shown
+from conformance.packs.table1.scenarios.trace import Driven, longer_s, rule_on
 from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.rules.motion import test_velocities as generic
-from conformance.rules.motion.judging import renewed
-from conformance.rules.motion.test_velocities import fails, held
+from conformance.rules.motion.judging import judge_renewed
+from conformance.rules.motion.test_velocities import fails, judge_hold
 from conformance.scenarios.motion.trace import Drive
 from conformance.scenarios.rule import NotTested, Outcome, rule
 from conformance.transport.exchange import Exchange
@@ -35,9 +35,9 @@ _OFF: Final = 1.5
 
 
 # A velocity of 0 stops the robot before its watchdog does.
-stop = shown("safety/stop", straight, turn, further_axes, velocity_walk)
-limits_hold = shown("safety/limits-hold", straight, turn, further_axes, velocity_walk)
-refused_keeps = shown("safety/refused-keeps", velocity_walk)
+stop = rule_on("safety/stop", straight, turn, further_axes, velocity_walk)
+limits_hold = rule_on("safety/limits-hold", straight, turn, further_axes, velocity_walk)
+refused_keeps = rule_on("safety/refused-keeps", velocity_walk)
 
 
 @rule("safety/renewal", on=(turn,))
@@ -47,7 +47,9 @@ def renewal(trace: Driven, run: Run) -> Iterator[Outcome]:
     motion, found = motion_map_of(said_of(run)), list[Outcome]()
     for drive in _let_go(trace):
         if drive.was_kept(said_of(run).limits.hold_s):
-            found += (one for name, wanted in drive.wanted.items() for one in renewed(drive, name, wanted, motion))
+            found += (
+                one for name, wanted in drive.wanted.items() for one in judge_renewed(drive, name, wanted, motion)
+            )
     yield from found or [NotTested("responses came too late to renew a velocity within its hold time")]
 
 
@@ -56,15 +58,15 @@ def refused_keeps_under_way(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity lasts beside others that the robot refuses, unless it does not last without them either."""
     motion = motion_map_of(said_of(run))
     disturbed, alone = _apart(trace)
-    if not fails(held(alone[:1], motion, JUDGED)):
-        yield from held(disturbed, motion, JUDGED)
+    if not fails(judge_hold(alone[:1], motion, JUDGED)):
+        yield from judge_hold(disturbed, motion, JUDGED)
 
 
 @rule("safety/hold", on=(turn, further_axes))
 def hold(trace: Driven, run: Run) -> Iterator[Outcome]:
     """Judge that a velocity that is not renewed lasts for the hold time."""
     disturbed, alone = _apart(trace)
-    return held(alone or disturbed, motion_map_of(said_of(run)), JUDGED)
+    return judge_hold(alone or disturbed, motion_map_of(said_of(run)), JUDGED)
 
 
 @rule("safety/watchdog", on=(turn, further_axes))
@@ -92,7 +94,7 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
         yield Case(
             not late,
             seen.exchange,
-            f"a robot that begins to stop {limits.hold_s:g} s after {drive.named}, by {longest_s:.2f} s at the latest",
+            f"a robot that begins to stop {limits.hold_s:g} s after {drive.name}, by {longest_s:.2f} s at the latest",
             f"{velocity_of(seen.speeds)} {seen.sent - last.answered:.2f} s after the command",
             "holds too long",
         )
@@ -100,7 +102,7 @@ def hold_ends(trace: Driven, run: Run) -> Iterator[Outcome]:
 
 def _let_go(trace: Driven) -> tuple[Drive, ...]:
     """Return the drives that were let go and whose commands were accepted; others are judged by their responses."""
-    return tuple(drive for drive in trace.let_go if drive.after and all(command.accepted for command in drive.commands))
+    return tuple(drive for drive in trace.let_go if drive.after and all(command.is_ok for command in drive.commands))
 
 
 def _apart(trace: Driven) -> tuple[tuple[Drive, ...], tuple[Drive, ...]]:
@@ -120,11 +122,11 @@ def _period_s(drive: Drive) -> float:
 @rule("safety/cancel", on=(goal_life,))
 def cancel(trace: GoalLife, run: Run) -> Iterator[Outcome]:
     """Judge that the robot stands still after its goal was cancelled."""
-    for cancellation in judged(trace):
+    for cancellation in judged_cancels(trace):
         yield from outcomes("safety/cancel", cancellation.drive, said_of(run).limits)
 
 
-def judged(trace: GoalLife) -> tuple[Cancelled, ...]:
+def judged_cancels(trace: GoalLife) -> tuple[Cancelled, ...]:
     """Return the cancels that are judged.
 
     Where a response was late, the DELETE may have been late on its way to the robot as well: another one is judged.

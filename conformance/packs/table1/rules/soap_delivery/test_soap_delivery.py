@@ -9,7 +9,7 @@ from conformance.api.soap.envelope import envelope
 from conformance.api.soap.forms import written_integer
 from conformance.api.soap.messages import padded, variants, with_text
 from conformance.api.soap.service import SoapService
-from conformance.api.soap.valid_messages import call_valid, require_valid_document, typed
+from conformance.api.soap.valid_messages import call_valid, require_valid_document, with_xsi_types
 from conformance.api.soap.xml_style import XmlStyle, serialize, single_changes, xml_styles
 from conformance.contract.classes import TAKEN_OCTETS
 from conformance.documents.xml import ADDRESSING, Node, clark
@@ -32,7 +32,7 @@ def test_operations(publishers: SoapService, judge: Judge, effort: Effort) -> No
             code = "3" if operation == "ExecuteDeliveryRequest" and number % 2 else "4"
             answer = call_valid(publishers, soap_services.delivery(operation, code))
             right = answer.payload == clark(soap_services.NAMESPACE, f"{operation}Response")
-            judge_answer(judge, id_, answer.accepted and right, answer, f"2xx with {operation}Response for code {code}")
+            judge_answer(judge, id_, answer.is_taken and right, answer, f"2xx with {operation}Response for code {code}")
 
 
 @pytest.mark.requirement("soap-delivery/range")
@@ -44,7 +44,7 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
     base = soap_services.delivery()
     code_path = base.path_to("message_code")
 
-    def taken(case: tuple[Node, str, int, str]) -> None:
+    def judge_range(case: tuple[Node, str, int, str]) -> None:
         message, operation, form, space = case
         code = 3 if operation == "ExecuteDeliveryRequest" and form % 2 else 4
         message = with_text(message, code_path, f"{space}{written_integer(code, form // 2)}{space}")
@@ -53,7 +53,7 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
         values = ", ".join(f"{leaf.name} {leaf.text!r}" for leaf in message.children[0].children)
         judge.require(
             "soap-delivery/range",
-            answer.accepted,
+            answer.is_taken,
             answer.exchange,
             "2xx for finite doubles and code 3 or 4",
             found=f"{answer.describe()}, for {values}",
@@ -66,19 +66,19 @@ def test_range(publishers: SoapService, judge: Judge, explore: Explorer) -> None
         st.integers(0, 7),
         st.sampled_from(["", " ", "\n"]),
     )
-    explore(strategy, taken, cases=150)
+    explore(strategy, judge_range, cases=150)
 
 
 @pytest.mark.requirement("soap-delivery/syntax")
 def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort: Effort) -> None:
     """Send requests that differ only in XML syntax (prefixes, quotes, white space): the robot must accept all."""
 
-    def taken(operation: str, style: XmlStyle, what: str) -> None:
+    def judge_style(operation: str, style: XmlStyle, what: str) -> None:
         document = serialize(envelope([soap_services.delivery(operation)]), style)
         answer = send(publishers, require_valid_document(publishers, document))
         judge.require(
             "soap-delivery/syntax",
-            answer.accepted,
+            answer.is_taken,
             answer.exchange,
             f"2xx for the same message with {what}",
             found=answer.describe(),
@@ -88,10 +88,10 @@ def test_syntax(publishers: SoapService, judge: Judge, explore: Explorer, effort
         for what, style in single_changes()[: effort.cases(len(single_changes()))]:
             document = serialize(envelope([soap_services.delivery(operation)]), style)
             answer = send(publishers, require_valid_document(publishers, document))
-            judge_answer(judge, "soap-delivery/syntax", answer.accepted, answer, f"2xx for the same with {what}")
+            judge_answer(judge, "soap-delivery/syntax", answer.is_taken, answer, f"2xx for the same with {what}")
     explore(
         st.tuples(st.sampled_from(_BOTH), xml_styles()),
-        lambda case: taken(case[0], case[1], "several changes of syntax"),
+        lambda case: judge_style(case[0], case[1], "several changes of syntax"),
         cases=60,
     )
 
@@ -104,10 +104,10 @@ def test_typed_values(publishers: SoapService, judge: Judge) -> None:
         if declared is None:
             pytest.skip(f"the contract has no {operation}")
         payload = soap_services.delivery(operation)
-        document = require_valid_document(publishers, typed(envelope([payload]), declared, payload))
+        document = require_valid_document(publishers, with_xsi_types(envelope([payload]), declared, payload))
         answer = send(publishers, document)
         expected = "2xx for the same with xsi:type on each value"
-        judge_answer(judge, "soap-delivery/typed-values", answer.accepted, answer, expected)
+        judge_answer(judge, "soap-delivery/typed-values", answer.is_taken, answer, expected)
 
 
 @pytest.mark.requirement("soap-delivery/addressing")
@@ -129,7 +129,7 @@ def test_addressing(publishers: SoapService, judge: Judge, effort: Effort) -> No
                     ),
                 )
                 answer = call_valid(publishers, soap_services.delivery(operation), headers=headers)
-                judge_answer(judge, "soap-delivery/addressing", answer.accepted, answer, f"2xx for wsa:Action {form}")
+                judge_answer(judge, "soap-delivery/addressing", answer.is_taken, answer, f"2xx for wsa:Action {form}")
 
 
 @pytest.mark.requirement("soap-delivery/refuses-code", "strict-input/soap-code", "strict-input/soap-fault")
@@ -142,8 +142,8 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
     for code in codes[: effort.cases(len(codes))]:
         answer = call_valid(publishers, soap_services.delivery(code=code))
         for id_ in ("soap-delivery/refuses-code", "strict-input/soap-code"):
-            judge_answer(judge, id_, answer.refused, answer, f"a refusal of code {code}")
-        if not answer.accepted:
+            judge_answer(judge, id_, answer.is_refused, answer, f"a refusal of code {code}")
+        if not answer.is_taken:
             judge_answer(
                 judge,
                 "strict-input/soap-fault",
@@ -156,9 +156,9 @@ def test_codes(publishers: SoapService, judge: Judge, effort: Effort) -> None:
 @pytest.mark.requirement("soap-delivery/size")
 def test_64_kib(publishers: SoapService, judge: Judge) -> None:
     """Send a valid message of 64 KiB: the robot must accept it."""
-    document = padded(envelope((soap_services.delivery(),)).written(), TAKEN_OCTETS)
+    document = padded(envelope((soap_services.delivery(),)).serialize(), TAKEN_OCTETS)
     answer = send(publishers, require_valid_document(publishers, document))
-    judge_answer(judge, "soap-delivery/size", answer.accepted, answer, f"2xx for a message of {TAKEN_OCTETS:,} bytes")
+    judge_answer(judge, "soap-delivery/size", answer.is_taken, answer, f"2xx for a message of {TAKEN_OCTETS:,} bytes")
 
 
 @pytest.mark.requirement("soap-delivery/concurrent-answers")
@@ -171,5 +171,5 @@ def test_answers_do_not_cross(publishers: SoapService, judge: Judge, effort: Eff
             if isinstance(attempt, Exchange) and not is_busy(attempt):
                 answer = read_exchange(attempt)
                 own = answer.payload == clark(soap_services.NAMESPACE, f"{operation}Response")
-                if answer.accepted:  # it does not show which interface is at fault
+                if answer.is_taken:  # it does not show which interface is at fault
                     judge_answer(judge, "soap-delivery/concurrent-answers", own, answer, f"the answer to {operation}")

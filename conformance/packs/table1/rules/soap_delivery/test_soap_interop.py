@@ -32,18 +32,18 @@ def _has(result: Any, path: str) -> bool:
     """Return whether zeep's result has a number at a path of names, whatever wraps it."""
     from zeep.helpers import serialize_object  # noqa: PLC0415 - see _client
 
-    return _found(serialize_object(result), path.split("."))
+    return _has_path(serialize_object(result), path.split("."))
 
 
-def _found(value: Any, path: list[str]) -> bool:
+def _has_path(value: Any, path: list[str]) -> bool:
     if isinstance(value, list):
-        return any(_found(item, path) for item in value)
+        return any(_has_path(item, path) for item in value)
     if not isinstance(value, dict):
         return False
     here: Any = value
     for step in path:
         here = here.get(step) if isinstance(here, dict) else None
-    return isinstance(here, float) or any(_found(inner, path) for inner in value.values())
+    return isinstance(here, float) or any(_has_path(inner, path) for inner in value.values())
 
 
 def _client(judge: Judge, id_: str, service: SoapService | None) -> ZeepCaller | None:

@@ -14,7 +14,7 @@ from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.message_shapes import GET_PLAN
 from conformance.packs.table1.robot.plan import START_OFF, plan_of
-from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.robot.state_over_soap import value_in
 from conformance.packs.table1.statement import said_of
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
@@ -68,7 +68,7 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         if answer.fault is not None:
             continue
         planned += 1
-        path, problem = _told(answer)
+        path, problem = _path_of(answer)
         if path:
             # The end and frame of every plan are judged elsewhere.
             off_m = path[0].distance(before)
@@ -81,9 +81,9 @@ def test_plan(soap: SoapServices, subscribers: SoapService, judge: Judge, effort
         judge_answer(judge, _PLAN, False, answer, "a plan to where the robot is")
 
 
-def _told(answer: SoapResponse) -> tuple[tuple[Pose, ...], str]:
+def _path_of(answer: SoapResponse) -> tuple[tuple[Pose, ...], str]:
     """Return the path in a response without a fault, and the path's fault."""
-    value, problem = answered(answer.exchange, GET_PLAN)
+    value, problem = value_in(answer.exchange, GET_PLAN)
     problem = problem or GET_PLAN.problem(value)
     return ((), problem) if problem else (plan_of(value).poses, "")
 
@@ -95,7 +95,7 @@ def _after_refusals(subscribers: SoapService, judge: Judge, request: Node) -> No
         call(subscribers, Node(clark(soap_services.NAMESPACE, "GetNothing")))
         answer = call_valid(subscribers, request)
         if answer.fault is None:
-            problem = _told(answer)[1]
+            problem = _path_of(answer)[1]
             judge.check(_PLAN, not problem, answer.exchange, "a path, after another request was refused", found=problem)
         elif call_valid(subscribers, request).fault is None:
             none += 1
@@ -122,7 +122,7 @@ def test_no_plan(soap: SoapServices, subscribers: SoapService, judge: Judge) -> 
         # Another client's fault in place of this response would then be noticed.
         call_valid(subscribers, soap_services.request("GetVelocity"))
         answer = call_valid(subscribers, message)
-        path, _ = _told(answer)
+        path, _ = _path_of(answer)
         # A robot in an open world may have a plan to anywhere; then the plan has to end there.
         arrives = bool(path) and path[-1].distance(Pose(1e7, -1e7, 0.0)) < 1
         judge_answer(

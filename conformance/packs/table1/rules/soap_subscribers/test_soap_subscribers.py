@@ -14,7 +14,7 @@ from conformance.documents.representation import flattened
 from conformance.documents.xml import Node, clark
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST
 from conformance.packs.table1.robot.soap_services import NAMESPACE, ask, outgoing, request
-from conformance.packs.table1.robot.state_over_soap import answered
+from conformance.packs.table1.robot.state_over_soap import value_in
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
@@ -35,9 +35,9 @@ def _ask(judge: Judge, subscribers: SoapService, operation: str) -> None:
     answer = call_valid(subscribers, request(operation))
     right = answer.payload == clark(NAMESPACE, f"{operation}Response")
     if operation == "GetGoal":
-        right = answer.fault is not None or (right and answer.succeeded)
+        right = answer.fault is not None or (right and answer.is_success)
     else:
-        right = answer.accepted and (right or not answer.succeeded)
+        right = answer.is_taken and (right or not answer.is_success)
     judge_answer(judge, _IDS[operation], right, answer, f"{operation}Response")
 
 
@@ -74,10 +74,10 @@ def test_goal(subscribers: SoapService, judge: Judge, effort: Effort) -> None:
 def test_64_kib(subscribers: SoapService, judge: Judge) -> None:
     """Send a valid request of 64 KiB: the robot must respond to it."""
     for operation in _READ:
-        question = envelope((request(operation),)).written()
+        question = envelope((request(operation),)).serialize()
         answer = send(subscribers, require_valid_document(subscribers, padded(question, TAKEN_OCTETS)))
         expected = f"2xx for a message of {TAKEN_OCTETS:,} bytes"
-        judge_answer(judge, "soap-subscribers/size", answer.accepted, answer, expected, cause=answer.describe())
+        judge_answer(judge, "soap-subscribers/size", answer.is_taken, answer, expected, cause=answer.describe())
 
 
 @pytest.mark.requirement(_OWN)
@@ -90,10 +90,10 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
         for operation, attempt in zip(asked, came, strict=True):
             if isinstance(attempt, Exchange) and not is_busy(attempt):
                 answer = read_exchange(attempt)
-                if answer.accepted:  # it does not show which interface is at fault
+                if answer.is_taken:  # it does not show which interface is at fault
                     own = answer.payload == clark(NAMESPACE, f"{operation}Response")
                     judge_answer(judge, _OWN, own, answer, f"the answer to {operation}")
-                if answer.succeeded and alone.get(operation):
+                if answer.is_success and alone.get(operation):
                     found = _strings(attempt, operation)
                     expected = f"the strings of {operation} as they are when nobody else asks, {alone[operation]}"
                     judge.check(
@@ -103,5 +103,5 @@ def test_answers_do_not_cross(subscribers: SoapService, judge: Judge, effort: Ef
 
 def _strings(exchange: Exchange, operation: str) -> dict[str, str]:
     """Return the strings of a state, such as the names of its frames."""
-    value, problem = answered(exchange, _STATES[operation])
+    value, problem = value_in(exchange, _STATES[operation])
     return {} if problem else {place: one for place, one in flattened(value).items() if isinstance(one, str)}

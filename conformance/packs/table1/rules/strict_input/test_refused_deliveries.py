@@ -22,7 +22,7 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
     for exchange in trace.invalid:
         holds = exchange.response.status >= HTTPStatus.BAD_REQUEST
         yield Case(holds, exchange, "a status of 400 or above for an invalid delivery")
-    if not _shown(trace):
+    if not _was_observed(trace):
         reason = trace.unseen or "no valid delivery was seen to arrive"
         yield Note(f"judged by the responses alone: {reason}")
         return
@@ -32,7 +32,7 @@ def delivery_refused(trace: CountedDeliveries) -> Iterator[Outcome]:
         expected = "no DeliveryRequestMsg on ROS: only a PUT to the path that the contract has starts a delivery"
         yield Case(count.delivery not in seen or accepted, count.exchange, expected, "a message", count.method)
     yield from _without_effect(trace, lambda _: True)
-    unknown = [delivery for delivery in seen if delivery not in trace.known]
+    unknown = [delivery for delivery in seen if delivery not in trace.valid_deliveries]
     # A single delivery that resembles none of the suite's may be another client's.
     found = [delivery for delivery in unknown if _resembles(delivery)] or (unknown if len(unknown) > 1 else [])
     accepted_first = next((one for one in trace.invalid if one.response.ok), trace.invalid[-1])
@@ -48,7 +48,7 @@ def unauthorized_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
 
 def _without_effect(trace: CountedDeliveries, which: Callable[[Rejected], bool]) -> Iterator[Outcome]:
     """Judge that messages with valid values that the robot rejected for another reason are not published."""
-    for rejection in trace.rejected if _shown(trace) else ():
+    for rejection in trace.rejected if _was_observed(trace) else ():
         if which(rejection) and rejection.is_rejected:
             arrived = rejection.delivery in (trace.seen or ())
             expected = f"no DeliveryRequestMsg for a rejected SOAP message with {rejection.what}"
@@ -58,7 +58,7 @@ def _without_effect(trace: CountedDeliveries, which: Callable[[Rejected], bool])
 @rule("http/not-acceptable-undone", on=(counted_deliveries,))
 def not_acceptable_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a delivery that the robot answered 406 makes no message."""
-    if _shown(trace) and trace.answer is not None and trace.answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
+    if _was_observed(trace) and trace.answer is not None and trace.answer.response.status == HTTPStatus.NOT_ACCEPTABLE:
         arrived = trace.no_format in (trace.seen or ())
         yield Case(not arrived, trace.answer, "no message for a delivery that is answered 406", "a message")
 
@@ -66,17 +66,17 @@ def not_acceptable_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
 @rule("equivalence/delivery-rest", on=(counted_deliveries,))
 def rest_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a valid delivery directly after invalid ones arrives unchanged."""
-    yield from _arrived(trace, soap=False)
+    yield from _judge_arrivals(trace, soap=False)
 
 
 @rule("equivalence/delivery-soap", on=(counted_deliveries,))
 def soap_after_refusals(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a valid delivery directly after invalid messages arrives unchanged."""
-    yield from _arrived(trace, soap=True)
+    yield from _judge_arrivals(trace, soap=True)
 
 
-def _arrived(trace: CountedDeliveries, *, soap: bool) -> Iterator[Outcome]:
-    for delivery, exchange in trace.after if _shown(trace) else ():
+def _judge_arrivals(trace: CountedDeliveries, *, soap: bool) -> Iterator[Outcome]:
+    for delivery, exchange in trace.after if _was_observed(trace) else ():
         if exchange.response.ok and (exchange.request.method == "POST") is soap:
             found = f"{delivery} is not among {len(trace.seen or ())} messages"
             yield Case(delivery in (trace.seen or ()), exchange, f"a message for {delivery}", found)
@@ -85,12 +85,12 @@ def _arrived(trace: CountedDeliveries, *, soap: bool) -> Iterator[Outcome]:
 @rule("equivalence/delivery-rest", on=(counted_deliveries,))
 def accepted_delivery(trace: CountedDeliveries) -> Iterator[Outcome]:
     """Judge that a delivery whose Accept header excludes all formats arrives if the robot accepts it."""
-    if _shown(trace) and trace.answer is not None and trace.answer.response.ok:
+    if _was_observed(trace) and trace.answer is not None and trace.answer.response.ok:
         arrived = trace.no_format in (trace.seen or ())
         yield Case(arrived, trace.answer, "a message for a delivery that is accepted", "no message")
 
 
-def _shown(trace: CountedDeliveries) -> bool:
+def _was_observed(trace: CountedDeliveries) -> bool:
     """Return whether arrivals were observed, which the last valid delivery proves."""
     return trace.seen is not None and trace.last in trace.seen
 

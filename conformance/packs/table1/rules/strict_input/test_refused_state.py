@@ -23,16 +23,16 @@ def refused_again_at_rest(trace: RefusedAgain) -> Iterator[Outcome]:
 def goal_refused_again(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot sets, keeps or loses no goal by goals and cancels that it has refused, sent again."""
     yield from (rest for rest in trace.rests if rest.observed in {"", GOAL})
-    yield from (_kept(refusal) for refusal in trace.during if _about_goal(refusal))
+    yield from (_judge_kept(refusal) for refusal in trace.during if _about_goal(refusal))
 
 
 @rule("rest-resources/goal-get", on=(refused_again,))
 def goal_kept(trace: RefusedAgain) -> Iterator[Outcome]:
     """Judge that the robot keeps its goal when anything else that it has refused is sent again."""
-    return (_kept(refusal) for refusal in trace.during if not _about_goal(refusal))
+    return (_judge_kept(refusal) for refusal in trace.during if not _about_goal(refusal))
 
 
-def _kept(one: DuringGoal) -> Case:
+def _judge_kept(one: DuringGoal) -> Case:
     expected = f"the goal that was active before {one.exchange.request.method} with {one.what}"
     return Case(not one.differs, one.exchange, expected, one.differs, cause=one.what)
 
