@@ -87,7 +87,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
 
     yield from held_back(sure)
     converted = _convertible(sure, run)
-    acted = [one for one in sure if one.status not in HELD and one not in converted]
+    acted = [one for one in sure if one.status not in HELD and id(one) not in converted]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
 
 
@@ -99,9 +99,9 @@ def types(trace: Survey, run: Run) -> Iterable[Outcome]:
 
     def fault(probe: Probe) -> Fault | None:
         why = "" if probe.says else f", although {probe.why}"
-        return Fault("a type converted", f"status {probe.status}{why}") if probe in converted else None
+        return Fault("a type converted", f"status {probe.status}{why}") if id(probe) in converted else None
 
-    acted = [one for one in sure if one in converted or one.status in _REFUSED]
+    acted = [one for one in sure if id(one) in converted or one.status in _REFUSED]
     yield from told_once(acted, "status 4xx for a value of a type that the description does not declare", fault)
 
 
@@ -115,16 +115,16 @@ def _forbidden(trace: Survey) -> list[Probe]:
     return [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
 
 
-def _convertible(probes: Iterable[Probe], run: Run) -> list[Probe]:
-    """Return the probes whose JSON body was accepted, as a value of the declared type means the same."""
+def _convertible(probes: Iterable[Probe], run: Run) -> set[int]:
+    """Return the `id()` of each probe whose JSON body was accepted, as a value of the declared type means the same."""
     bodies = {operation.label: operation.bodies for operation in operations_of(run.contract)}
-    found = []
+    found = set()
     for probe in probes:
         request = probe.attempt.request
         media_type = request.media_type
         given = bodies.get(probe.operation, {}).get(media_type)
         if probe.ok and probe.exchange and given and is_json(media_type) and _place_of(probe).startswith("body"):
-            found += [probe] if is_converted(given.schema, request.body, probe.exchange.response.body) else []
+            found |= {id(probe)} if is_converted(given.schema, request.body, probe.exchange.response.body) else set()
     return found
 
 
