@@ -241,7 +241,7 @@ class Surveyor:
             return probe
         doubted = exchange.response.status in _DOUBTED and variation.kind in _ACCEPTED and self._is_single(operation)
         is_held = exchange.response.status == CONFLICT and operation.label in self.api.working
-        trial = self.usual[operation.label] if doubted else variation.inputs
+        trial = self.usual.get(operation.label, variation.inputs) if doubted else variation.inputs
         is_tried = by_inputs and (doubted or (is_held and variation.kind in _ACCEPTED))
         if is_tried and self.reaching.finds_new(operation, trial):
             return self.send(operation, variation, fresh=fresh)

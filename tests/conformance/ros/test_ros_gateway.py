@@ -64,7 +64,7 @@ ENDS = {
     ("flask", "quick"): "/odom /cmd_vel /enable /navigate",
     ("aiohttp", "quick"): "/scan /status /note /say /route /navigate",
     ("rosbridge", "quick"): "/odom /cmd_vel /enable",
-    ("flask", "standard"): "/odom /note /cmd_vel /enable",
+    ("flask", "standard"): "/odom /note /say /cmd_vel /enable",
 }
 #: What is judged of values and messages.
 CORE = ("read-exact", "read-fresh", "read-newest", "write-exact", "once", "order", "refused-nothing")
