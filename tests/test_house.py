@@ -237,3 +237,21 @@ def test_no_room_grows_past_its_figure():
         if any(there > most for there, most in zip(weight, allowed[room], strict=True))
     }
     assert grown == {}, "delete something, or raise the figure in tests/house.toml with its reason"
+
+
+# Participles that say nothing of what a function does; those that are left are copies of an argument, as sorted().
+BARE = re.compile(
+    r"_*(?:[a-z]+ed|begun|chosen|done|drawn|driven|found|given|gone|heard|held|kept|known|left|lost|made|met|said|seen"
+    r"|sent|shown|taken|told|written)"
+)
+
+
+def test_no_more_functions_are_named_by_a_bare_participle():
+    named = collections.Counter(
+        node.name
+        for room in ROOMS
+        for path in (ROOT / room).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and BARE.fullmatch(node.name)
+    )
+    assert named.total() <= 105, named
