@@ -80,7 +80,7 @@ def test_delivery_requests_reach_another_process_bit_for_bit(domain_id):
         for number, (code, doubles) in enumerate(sent):
             fields = dict(zip(COORDINATES, doubles, strict=True))
             message = DeliveryRequestMsg(message_code=code, **fields)
-            publisher.publish(message if number % 2 else DeliveryRequest(code, *doubles).serialized())
+            publisher.publish(message if number % 2 else DeliveryRequest(code, *doubles).serialize())
         received, _ = listener.communicate(timeout=240)
     assert received.split() == [struct.pack(">i6d", code, *doubles).hex() for code, doubles in sent]
 
@@ -90,13 +90,13 @@ def test_octets_of_any_sender_are_read_as_they_were_meant():
         request = DeliveryRequest(code, *doubles)
         fields = dict(zip(COORDINATES, doubles, strict=True))
         octets = [
-            request.serialized(),
+            request.serialize(),
             serialize_message(DeliveryRequestMsg(message_code=code, **fields)),
             struct.pack("<4si4x6d", b"\x00\x01\x00\x03", code, *doubles),  # the options' octets may say anything
             struct.pack(">4si4x6d", b"\x00\x00\x00\x00", code, *doubles),  # big endian
         ]
         for each in octets:
-            assert DeliveryRequest.of(each).serialized() == request.serialized()
+            assert DeliveryRequest.of(each).serialize() == request.serialize()
 
 
 @pytest.mark.parametrize("octets", [b"", b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + bytes(55)])
