@@ -28,6 +28,7 @@ from conformance.verdict.evidence import Case
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _MOST_OCTETS: Final = 65_536
 _MOST_THINGS: Final = 1_000
+_KEPT: Final = "description/refused-keeps"
 # A device may carry out an operation this long after its response, s.
 _SETTLES_S: Final = 3.0
 _STATES: Final = frozenset({"state", "status", "phase"})
@@ -183,13 +184,13 @@ class Changes:
         status = occasion.response.status
         refused = self._there.pop(path, "")
         if status in _ABSENT and refused:
-            expected, cause = f"what was there before {refused}", operation.label
-            yield occasion.case("description/refused-keeps", False, expected, cause=cause)  # noqa: FBT003 - see case()
+            expected, doubt = f"what was there before {refused}", "the thing may have ended by itself"
+            yield occasion.case(_KEPT, False, expected, cause=operation.label, doubt=doubt)  # noqa: FBT003 - see case()
         if not occasion.response.ok:
             return
         if refused:
             expected = f"what was there before {refused}"
-            yield occasion.case("description/refused-keeps", True, expected, cause=operation.label)  # noqa: FBT003 - see case()
+            yield occasion.case(_KEPT, True, expected, cause=operation.label)  # noqa: FBT003 - see case()
         if len(self._there) < _MOST_THINGS:
             self._there[path] = ""
         template = operation.template.rstrip("/")

@@ -173,8 +173,8 @@ class WriteOnly:
         name = _shown_of(content[answer.media_type], read_json(answer.body).value)
         if name is not None:
             expected, cause = "a response without what is writeOnly", f"{operation.id} {name}"
-            found = f"{name} in the response"
-            yield occasion.case("description/read-only", not name, expected, found, cause=cause)
+            found, doubt = f"{name} in the response", "OpenAPI does not forbid it"
+            yield occasion.case("description/read-only", not name, expected, found, cause=cause, doubt=doubt)
 
 
 def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:

@@ -97,7 +97,8 @@ class Identities:
         if value and f"{near}/".endswith(f"{above}/") and is_item and other in known:
             expected, cause = f"Content-Location of the item {id_}, if any", f"{operation.label} Content-Location"
             found = f"Content-Location: {value}"
-            yield occasion.case("description/own-identifier", other == id_, expected, found, cause=cause)
+            doubt = "the name may lead to the same item"
+            yield occasion.case("description/own-identifier", other == id_, expected, found, cause=cause, doubt=doubt)
 
 
 class Uniques:
@@ -181,7 +182,8 @@ class Uniques:
                 )
                 expected = f"another {name} than {above}/{twice} has, because creations with a taken one are refused"
                 found, cause = f"{name} {clip(value)}, as {above}/{twice} has", f"{operation.label} {name} twice"
-                yield occasion.case("description/own-identifier", not twice, expected, found, cause=cause)
+                doubt = "those creations may have been refused for another reason"
+                yield occasion.case("description/own-identifier", not twice, expected, found, cause=cause, doubt=doubt)
 
 
 def _is_plain(value: Any) -> bool:

@@ -169,7 +169,8 @@ class Lists:
                 expected = f"items with {bound.member} {side} {text}, which the parameter {name} asks for"
                 found = f"an item with {text_of(wrong[0])}" if wrong else ""
                 cause = f"{listing.operation.label} {name}"
-                yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
+                doubt = "" if bound.is_said else f"no description says what {name} means"
+                yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
 
     def _search(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge a search in members that the description names: items that contain the text, and no others."""
@@ -186,7 +187,8 @@ class Lists:
             names, id_ = " or ".join(listing.searched), "description/list-filter"
             other = [one for one, item in items.items() if not _contains(listing, item, text, str.casefold)]
             expected = f"items with {text} in {names}, by the description of {search.name}"
-            yield occasion.case(id_, not other, expected, f"the item {''.join(other[:1])}", cause=cause)
+            found, doubt = f"the item {''.join(other[:1])}", "a search may find similar words too"
+            yield occasion.case(id_, not other, expected, found, cause=cause, doubt=doubt)
             there = self._whole[label] if not page.goes_on and len(self._missed[label]) < _COMPARED else {}
             for one in [one for one in there if one not in items and _contains(listing, there[one], text)][:1]:
                 case = occasion.case(id_, False, f"the item {one}, which has {text}", cause=cause)  # noqa: FBT003

@@ -22,6 +22,8 @@ from conformance.api.rest.things import (
     as_answered,
     collection_of,
     differences,
+    doubt_of_deletion,
+    doubt_of_life,
     id_member,
     identifier_of,
     is_marked_deleted,
@@ -37,7 +39,7 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import Exchange
 from conformance.transport.reach import is_same, joined
-from conformance.verdict.evidence import Case
+from conformance.verdict.evidence import SENTENCE, Case
 
 # A device may store a change this long after its response, s.
 _SETTLES_S: Final = 3.0
@@ -83,6 +85,7 @@ class _Thing:
         absent: whether a read has shown that it is not there.
         own: whether this run has created what it deleted.
         ends: kinds of things that end with it, by what the description of its DELETE says.
+        doubt: why it may be read although it was deleted; empty: it may not.
         made: whether this run created it, and no read has shown it yet.
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
@@ -100,6 +103,7 @@ class _Thing:
     absent: bool = False
     own: bool = False
     ends: frozenset[str] = frozenset()
+    doubt: str = ""
     made: bool = False
     body: int = 0
     replaced: bool = False
@@ -242,6 +246,7 @@ class Memory:
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
+            thing.doubt = doubt_of_deletion(operation)
             self._things |= {text.casefold(): replace(thing, path=text, own=True) for text in below}
         if status == HTTPStatus.CREATED:
             self._made.add(path)
@@ -354,8 +359,9 @@ class Memory:
             )
             expected = f"{name}, which is readOnly, as the device gave it"
             found = f"{clip(now[name])} as {name}" + (f", and {clip(before[name])} before" if name in before else "")
-            holds = not (is_taken or is_other)
-            yield occasion.case("description/read-only", holds, expected, found, cause=f"{item.label} {name}")
+            holds, cause = not (is_taken or is_other), f"{item.label} {name}"
+            doubt = "" if is_taken else "the member may belong to the content, and not to the thing"
+            yield occasion.case("description/read-only", holds, expected, found, cause=cause, doubt=doubt)
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         thing = self._things.get(path.casefold())
@@ -374,7 +380,7 @@ class Memory:
         if response.status in _ABSENT and thing.made:
             if age_s > _SETTLES_S and not thing.replaced:
                 expected = f"the thing that {thing.change} has created {age_s:.0f} s before"
-                case = self._case("created-is-there", occasion, expected, cause=item.label)
+                case = self._case("created-is-there", occasion, expected, cause=item.label, doubt=doubt_of_life(item))
                 yield from self._differs(kept, age_s, "none", case)
         elif response.ok:
             thing.made = False
@@ -390,7 +396,7 @@ class Memory:
         thing.absent |= response.status in _ABSENT
         if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
-            case = self._case("deleted-is-gone", occasion, expected, cause=item.label)
+            case = self._case("deleted-is-gone", occasion, expected, cause=item.label, doubt=thing.doubt)
             # A thing that always exists is emptied by DELETE, or reset.
             if thing.own or item.template in self._gone:
                 yield case
@@ -407,7 +413,8 @@ class Memory:
             age_s, last = occasion.sent_s - above.changed_s, singular(path.rpartition("/")[2])
             if last in above.ends and age_s > _SETTLES_S:
                 expected = f"status 404, as {above.change} ended the {last} too, by the description"
-                yield self._case("deleted-is-gone", occasion, expected, cause=f"{operation.label} below")
+                cause = f"{operation.label} below"
+                yield self._case("deleted-is-gone", occasion, expected, cause=cause, doubt=SENTENCE)
         item = self._of_collections.get(operation.template.rstrip("/"))
         gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
         if item is None or not gone or not is_json(occasion.response.media_type):
@@ -485,12 +492,12 @@ class Memory:
             self._untrue[key] |= {write.request.body} if other else set()
             if not other or len(self._untrue[key]) >= _SEEN:
                 expected = f"{clip(now[name])} as {name}, as it was sent and as the next GET shows it"
-                cause = f"{operation.label} {name} told"
-                yield write.case(f"description/{_READ}", not other, expected, other, cause=cause)
+                cause, doubt = f"{operation.label} {name} told", "the response may show the state before the request"
+                yield write.case(f"description/{_READ}", not other, expected, other, cause=cause, doubt=doubt)
 
     @staticmethod
-    def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str) -> Case:
-        return occasion.case(f"description/{name}", False, expected, found, cause=cause)  # noqa: FBT003
+    def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str, doubt: str = "") -> Case:
+        return occasion.case(f"description/{name}", False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
 
 def _read_only(item: Operation) -> frozenset[str]:

@@ -70,6 +70,7 @@ class Occasion:
         found: str = "",
         *,
         cause: str = "",
+        doubt: str = "",
     ) -> Case:
         """Return a case of a requirement; the arguments are as in Case."""
-        return Case(holds, self.exchange, expected, found, cause, requirement=requirement)
+        return Case(holds, self.exchange, expected, found, cause, requirement=requirement, doubt=doubt)

@@ -130,4 +130,5 @@ class Untouched:
             f"{clip(now[text])} as {text}, and {clip(before.members.get(text))} before" for text in wrong[:1]
         )
         expected = f"the members as before {label}, as {times} times"
-        yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched")
+        doubt = "" if self._keeps_all and label != _CONDITIONAL else "it may count requests, also refused ones"
+        yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched", doubt=doubt)

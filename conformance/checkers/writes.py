@@ -12,6 +12,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from email.utils import parsedate_to_datetime
 from http import HTTPStatus
@@ -39,6 +40,8 @@ _MOST_OCTETS: Final = 65_536
 _SEEN: Final = 2
 # Whole numbers beyond this are not exact as doubles (RFC 8259 6).
 _EXACT: Final = 2**53
+# Characters of a value to which a device does not come by itself.
+_TELLING: Final = 5
 # Relative differences of doubles. _EQUAL: smaller ones do not count. _CLOSE: larger ones are no rounding.
 _EQUAL, _CLOSE = 1e-14, 0.005
 _ZEROS: Final = re.compile(r"\b0+(?=\d)")
@@ -51,6 +54,10 @@ GONE: Final = re.compile(
 _CHANGED_AT: Final = re.compile(r"(?:last)?(?:updated|modified|changed|edited)(?:at|on|time|date)?")
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
 _KEPT, _DEFAULTS = "description/refused-keeps", "description/defaults"
+# What a right device may do with a value.
+_COARSE: Final = "it may keep numbers only as finely as it can set or measure them"
+_LINES: Final = "it may end lines of a text in its own way"
+_SET: Final = "it may keep the numbers as a set, in which neither order nor repetition counts"
 
 
 class _State(NamedTuple):
@@ -247,17 +254,26 @@ class Writes:
             made = [item for item in partly_patched(change.before, sent) if isinstance(item, dict)]
         else:
             made = [sent] if isinstance(sent, dict) else []
-        wrong = ""
+        wrong = doubt = ""
         for name in sorted({name for item in made for name in item} - change.moving):
             was, now = change.before.get(name), change.now.get(name)
             is_late = isinstance(accepted, dict) and name in accepted and same(accepted[name], now)
             is_taken = not same(was, now) and any(name in item and same(item[name], now) for item in made)
             if is_taken and not is_late:
                 wrong = f"{clip(now)} as {name}, and {clip(was)} before"
+                doubt = self._doubt_of(change.operation.label, name, now)
                 break
         expected = f"the members as they were before {change.label}"
         if made:
-            yield occasion.case(_KEPT, not wrong, expected, wrong, cause=f"{change.operation.label} refused")
+            cause = f"{change.operation.label} refused"
+            yield occasion.case(_KEPT, not wrong, expected, wrong, cause=cause, doubt=doubt)
+
+    def _doubt_of(self, label: str, name: str, now: Any) -> str:
+        """Return why a value that was refused may be the device's own; nothing once two different ones are there."""
+        doubts = self._doubts[label, f"{name} refused"]
+        doubts.add(str(now).encode())
+        is_own = len(str(now)) < _TELLING and len(doubts) < _SEEN
+        return f"it may have come to {clip(now)} by itself" if is_own else ""
 
     def _judge_patch(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge a JSON patch that was accepted."""
@@ -293,7 +309,7 @@ class Writes:
             if name in change.now and any(isinstance(part, dict) and flat(part).get("readOnly") for part in parts):
                 was, now = change.before.get(name), change.now[name]
                 is_taken = same(now, value) and not same(was, value) and name not in change.moving
-                if is_taken and len(str(value)) < 5:  # noqa: PLR2004 - characters: the device may come to it by itself
+                if is_taken and len(str(value)) < _TELLING:
                     self._doubts[change.operation.label, name].add(change.write.request.body)
                     is_taken = len(self._doubts[change.operation.label, name]) >= _SEEN
                 expected = f"{name}, which is readOnly, as the device gave it"
@@ -322,7 +338,8 @@ class Writes:
                 f"{clip(change.now[stamp])} as {stamp}, as before",
                 f"{change.operation.label} {stamp} stays",
             )
-            yield occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
+            doubt = "the member may count other changes than this one"
+            yield occasion.case(_READ, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
     def _values(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
@@ -332,14 +349,14 @@ class Writes:
             name, part, value, was, now = leaf
             if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
-            key, wrong = (change.operation.label, name), ""
+            key, wrong, doubt = (change.operation.label, name), "", ""
             yield from self._judge_same(occasion, item, change, leaf)
             if part.get("format") == "double" and _is_rounded(value, now):
                 self._doubts[key].add(str(value).encode())
                 is_sure = len(self._doubts[key]) >= _SEEN or same(
                     change.shown_members.get(leaf.top), change.now[leaf.top]
                 )
-                wrong = f"{clip(now)} as {name}" if is_sure else ""
+                wrong, doubt = f"{clip(now)} as {name}" if is_sure else "", _COARSE
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
@@ -350,19 +367,24 @@ class Writes:
                     and "integer" not in kinds_of(shape.get(name, {}))
                 ):
                     self._doubts[key].add(str(value).encode())
-                    wrong = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else ""
+                    wrong, doubt = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else "", _COARSE
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
             elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
                 wrong = f"{now} as {name}"
             elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
                 wrong = f"{clip(now)} as {name}" if _is_altered(value, now) else ""
+                doubt = _LINES if value.splitlines() == now.splitlines() else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
+                doubt = _SET if all(map(is_number, value)) else ""
             else:
                 continue
-            expected = f"{clip(value)} as {name}, as {change.label} wrote it"
-            yield occasion.case(_READ, not wrong, expected, wrong, cause=f"{change.operation.label} {name} value")
+            expected, cause = (
+                f"{clip(value)} as {name}, as {change.label} wrote it",
+                f"{change.operation.label} {name} value",
+            )
+            yield occasion.case(_READ, not wrong, expected, wrong, cause=cause, doubt=doubt)
 
     def _judge_same(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
         """Judge a value that a write left as it was: an empty one by PUT, or two by PATCH that PUT alone changes."""
@@ -376,7 +398,8 @@ class Writes:
             case = occasion.case(_READ, False, expected, found, cause=cause)  # noqa: FBT003
             is_open = "properties" in leaf.part or same(leaf.was, leaf.part.get("default"))
             if method == "PUT" and leaf.value in (None, [], {}) and not is_open:
-                yield case
+                doubt = "null may mean that the member is not to be changed" if leaf.value is None else ""
+                yield replace(case, doubt=doubt)
             part: Schema = {"properties": {last: leaf.part}}
             if method == "PATCH" and any(differences({last: leaf.value}, {last: leaf.now}, part, None, frozenset())):
                 self._ignored[key][change.write.request.body] = case
@@ -465,11 +488,14 @@ class Writes:
             default = flat(parts_of(item.shape).get(name) or {}).get("default", given.get("default"))
             is_reset = not same(was, now) and (now is None or same(now, default) or now in ("", [], {}, 0, False))
             if is_reset:
-                self._doubts[label, f"{name} reset"].add(change.write.request.body)
-                if len(self._doubts[label, f"{name} reset"]) >= _SEEN:
+                bodies = self._doubts[label, f"{name} reset"]
+                bodies.add(change.write.request.body)
+                if len(bodies) >= _SEEN:
                     expected = f"{clip(was)} as {name}, which {change.label} does not name"
                     found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
-                    yield occasion.case(_PATCH, False, expected, found, cause=cause)  # noqa: FBT003
+                    named = set.intersection(*(set(read_json(body).value) for body in bodies))
+                    doubt = f"{name} may follow {min(named)}" if named else ""
+                    yield occasion.case(_PATCH, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
 
 def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:

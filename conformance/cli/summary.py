@@ -156,12 +156,18 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
     said = said if len(said) <= _LINE else f"{said[:_LINE]}…"
     others = len(failure.get("operations", ())) - 1
     more = f" … and {count_of(others, 'more operation')}" if others > 0 else ""
-    click.echo(f"{cause['number']}. {requirement['verdict'].upper()} {requirement['id']}: {inert(said)}{more}")
+    click.echo(f"{cause['number']}. {_word(requirement, failure)} {requirement['id']}: {inert(said)}{more}")
+
+
+def _word(requirement: Mapping[str, Any], failure: Mapping[str, Any]) -> str:
+    """Return what a finding does: a doubtful one warns, even of a requirement that fails by another one."""
+    return "WARN" if "doubt" in failure else requirement["verdict"].upper()
 
 
 def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Path) -> None:
     """Print a finding, and the requirements that could not be tested because of it."""
-    head = f"{requirement['verdict'].upper()} {requirement['id']} ({requirement['level']}, {requirement['source']})"
+    failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
+    head = f"{_word(requirement, failure)} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}")
     click.echo(wrap(requirement["text"], "  "))
     click.echo(wrap(inert(cause["text"]), "  "))
@@ -170,7 +176,6 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
     blocks = cause["blocks"]
     if blocks:
         click.echo(f"  not tested because of it: {few_of(blocks, _SHOWN_BLOCKED)}")
-    failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     if failure["request"]:
         click.echo(f"  replay: {inert(_command(failure['request']['curl'], cause['number'], folder))}")
 

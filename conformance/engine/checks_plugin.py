@@ -203,7 +203,7 @@ class ChecksPlugin:
         musts = {
             id(finding): finding
             for finding in run.judge.met
-            if run.contract.ledger[finding.requirement].level is Level.MUST
+            if run.contract.ledger[finding.requirement].level is Level.MUST and not finding.doubt
         }
         new: list[Finding] = []
         for finding in musts.values():

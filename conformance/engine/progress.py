@@ -91,12 +91,17 @@ class Progress:
             # One cause counts as one finding, under the first requirement that reports it.
             self._failures = failures
             _, causes = by_cause(run.judge.evidence, run.contract.ledger, run.claims, run.scored_ids, run.beside)
-            broken = {cause.finding.requirement for cause in causes if run.selection.has(cause.finding.requirement)}
+            found = [cause.finding for cause in causes if run.selection.has(cause.finding.requirement)]
+            # A requirement fails if one of its findings is beyond doubt.
+            level_of = {finding.requirement: Level.SHOULD for finding in found}
+            level_of |= {
+                finding.requirement: run.contract.ledger[finding.requirement].level
+                for finding in found
+                if not finding.doubt
+            }
             levels = Counter(
-                Level.SHOULD
-                if run.scored_ids is not None and id_ not in run.scored_ids
-                else run.contract.ledger[id_].level
-                for id_ in broken
+                Level.SHOULD if run.scored_ids is not None and id_ not in run.scored_ids else level
+                for id_, level in level_of.items()
                 if run.contract.ledger[id_].class_ not in run.beside
             )
             self._found = "".join(f", {levels[level]} {word}" for level, word in _WORDS.items() if levels[level])

@@ -248,6 +248,7 @@ def _failure(finding: Finding) -> dict[str, Any]:
         "expected": finding.expected,
         "observed": finding.observed,
         "cause": finding.cause,
+        **({"doubt": finding.doubt} if finding.doubt else {}),
         "seen": finding.seen,
         **({"operations": _operations(finding)} if finding.operations else {}),
         "request": _request(finding.exchange) if finding.exchange else None,

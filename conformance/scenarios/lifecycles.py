@@ -16,7 +16,7 @@ from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, id_member, identifier_of, path_chosen
+from conformance.api.rest.things import collection_of, doubt_of_deletion, id_member, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
@@ -328,7 +328,8 @@ class _Cycle:
             lambda: self.writer.send(self.read, thing.path), lambda exchange: not is_done or not exchange.response.ok
         )
         thing.state = State.GONE if is_done and gone.response.status in ABSENT else State.UNKNOWN
-        thing.life = replace(thing.life, delete=delete.label, deleted=deleted, gone=gone)
+        doubt = doubt_of_deletion(delete)
+        thing.life = replace(thing.life, delete=delete.label, deleted=deleted, gone=gone, doubt=doubt)
         return deleted
 
     def _ids(self) -> set[str] | None:

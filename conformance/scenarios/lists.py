@@ -87,6 +87,7 @@ class Paged:
         found: the last request for a part.
         expected: what the part should have, as a noun phrase.
         fault: what it had instead; empty: what it should have.
+        is_said: whether only a sentence of the description demands it.
     """
 
     operation: str
@@ -94,6 +95,7 @@ class Paged:
     found: Exchange
     expected: str
     fault: str = ""
+    is_said: bool = False
 
 
 def lists_of(api: RestInterface) -> list[Listing]:
@@ -437,9 +439,8 @@ class _Parts:
         if part is None or later is None or len(part[1].items) != count:
             return None
         fault = f"{cursor.name} {following[:60]}, which leads to an empty page" if not later[1].items else ""
-        return self._page_case(
-            f"{limit.name} exactly", later[0], "no further page, as the description says of the last", fault
-        )
+        expected = "no further page, as the description says of the last"
+        return replace(self._page_case(f"{limit.name} exactly", later[0], expected, fault), is_said=True)
 
     def _read_shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""

@@ -87,6 +87,7 @@ class Life:
         found_id: what identifies it by the GET; empty if that does not say it.
         writes: what was written to it, the creation first.
         looks: what was seen later, of this thing and of others.
+        doubt: why it may be read although it was deleted; empty: it may not.
     """
 
     create: str
@@ -100,6 +101,7 @@ class Life:
     found_id: str = ""
     writes: tuple[Write, ...] = ()
     looks: tuple[Look, ...] = ()
+    doubt: str = ""
 
 
 class State(StrEnum):

@@ -73,7 +73,8 @@ def by_cause(
     def weight(finding: Finding) -> tuple[bool, bool, int]:
         requirement = judged[finding.requirement]
         uncounted = scored is not None and requirement.id not in scored
-        return requirement.class_ in beside, uncounted, _LEVELS.index(requirement.level)
+        level = max(_LEVELS.index(requirement.level), _LEVELS.index(Level.SHOULD) if finding.doubt else 0)
+        return requirement.class_ in beside, uncounted, level
 
     def first(finding: Finding) -> tuple[tuple[bool, bool, int], bool, bool, bool, int]:
         forbids = finding.cause in judged[finding.requirement].forbids

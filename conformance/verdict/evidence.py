@@ -46,6 +46,8 @@ _SILENT = {
     NoAnswer.CLOSED: "a response",
     NoAnswer.REFUSED: "a response",
 }
+#: Doubt about what only prose demands.
+SENTENCE: Final = "the description's sentence may mean something else"
 _SILENCES = frozenset({CauseKind.HANG, CauseKind.NO_RESPONSE})
 
 
@@ -62,6 +64,7 @@ class Case:
         subject: what was tested; empty: method and target of the request.
         operations: how each operation shows it, that of the exchange first, if not only that of the request.
         requirement: its id or an alias; empty where a rule is bound to one.
+        doubt: what a right device may do that looks the same, as a sentence; with it, a failed case only warns.
     """
 
     holds: bool
@@ -72,6 +75,7 @@ class Case:
     subject: str = ""
     operations: tuple[Showing, ...] = ()
     requirement: str = ""
+    doubt: str = ""
 
 
 def case(
@@ -234,6 +238,7 @@ class Judge:
         cause: str = "",
         subject: str = "",
         operations: Sequence[Showing] = (),
+        doubt: str = "",
     ) -> bool:
         """Record whether one case meets a requirement.
 
@@ -247,6 +252,7 @@ class Judge:
             subject: what was tested; by default method and target of the request.
             operations: the operations of a description that show it, that of ``exchange`` first; by default those
                 that its request concerns.
+            doubt: as in Case.
 
         Returns:
             ``holds``.
@@ -271,7 +277,9 @@ class Judge:
             subject = subject or subject_of(exchange, self.check_name)
             if not operations and exchange is not None:
                 operations = [Showing(label, 1, exchange.request) for label in self.concerned(exchange.request)]
-            self._add_failure(evidence, requirement, exchange, expected, found, cause, subject, operations, cases)
+            self._add_failure(
+                evidence, requirement, exchange, expected, found, cause, subject, operations, cases, doubt
+            )
             required, kind = self._ledger.get(requirement), kind_of(exchange, found)
             # A missing response breaks no SHOULD: it says only what should be in a response.
             if required and required.level is Level.MUST and kind in _SILENCES and kind not in required.forbids:
@@ -300,6 +308,7 @@ class Judge:
             cause=case.cause,
             subject=case.subject,
             operations=case.operations,
+            doubt=case.doubt,
         )
 
     def on_failure(self, requirement: str) -> None:
@@ -316,6 +325,7 @@ class Judge:
         subject: str,
         operations: Sequence[Showing],
         cases: int,
+        doubt: str,
     ) -> None:
         """Add a failed case to an existing finding of its cause, or as a new finding."""
         kind = self._kind(requirement, exchange, found)
@@ -323,7 +333,7 @@ class Judge:
         causes = causes_of(kind, exchange)
         # Only the fault counts, not its circumstances: a missing header is one cause, whatever the responses' status.
         said = _VALUES.sub("#", f"{expected}|{found or observed}")
-        key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), said))}"
+        key = f"{kind} {cause or ' '.join((_likeness(kind, exchange), said))} {doubt}"
         if key not in evidence.findings and len(evidence.findings) >= MAX_FINDINGS:
             key = _REST
         finding = evidence.findings.get(key)
@@ -351,6 +361,7 @@ class Judge:
             observed,
             exchange,
             kind,
+            doubt=doubt,
             causes=causes,
             rest=key == _REST,
             sequence=sequence if len(evidence.findings) < MAX_SEQUENCES else sequence[-1:],

@@ -76,6 +76,7 @@ class Finding:
         observed: what the suite got instead.
         exchange: the smallest failing request with its result, or None if none was sent.
         cause: the kind of cause.
+        doubt: what a right device may do that looks the same, as a sentence; such a finding only warns.
         causes: keys of its causes; findings with a common key have the same cause.
         operations: by label, how each operation of a description shows it; the first is that of the exchange.
         rest: whether it stands for all further causes, because the requirement has too many findings.
@@ -95,6 +96,7 @@ class Finding:
     observed: str
     exchange: Attempt | None
     cause: CauseKind = CauseKind.RULE
+    doubt: str = ""
     causes: set[str] = field(default_factory=set)
     operations: dict[str, Showing] = field(default_factory=dict)
     rest: bool = False
@@ -128,6 +130,8 @@ class Finding:
         rule = ", ".join(filter(None, (self.requirement, self.source)))
         did = f"Sent {_request_text(self.exchange.request)}." if self.exchange else f"Tested {self.subject}."
         parts = [did, f"Expected {_clause(self.expected)} ({rule}).", f"Got {_clause(self.observed)}."]
+        if self.doubt:
+            parts.append(f"This is a warning, because a right device may do the same: {self.doubt}.")
         if self.seen > 1:
             parts.append(f"Seen {self.seen} times.")
         others = [f"`{showing.operation}`" for showing in list(self.operations.values())[1:]]

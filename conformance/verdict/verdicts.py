@@ -1,7 +1,8 @@
 """The rules that turn evidence into verdicts; a baseline may change the verdicts afterwards.
 
-A failed MUST is a fail, a failed SHOULD a warning, a failed MAY information. Not tested outranks pass: a class with an
-untested MUST, or without any judged case, is inconclusive.
+A failed MUST is a fail, a failed SHOULD a warning, a failed MAY information. If a right device may do what each finding
+of a MUST shows, it is a warning too. Not tested outranks pass: a class with an untested MUST, or without any judged
+case, is inconclusive.
 """
 
 from collections.abc import Collection, Container, Iterable, Mapping
@@ -108,10 +109,11 @@ def verdict_of(
     if evidence.is_unseen or (optional and not evidence.cases and not evidence.errors):
         return verdict(Value.SKIP, "; ".join(unseen) or NOT_SEEN)
     if evidence.findings:
-        first = next(iter(evidence.findings.values()))
+        found = evidence.findings.values()
+        first = next((finding for finding in found if not finding.doubt), next(iter(found)))
         more = f" (and {len(evidence.findings) - 1} more)" if len(evidence.findings) > 1 else ""
         reason = f"{first.text}{more}"
-        value = {Level.MUST: Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
+        value = {Level.MUST: Value.WARN if first.doubt else Value.FAIL, Level.SHOULD: Value.WARN}.get(requirement.level)
         return verdict(value, reason) if value else verdict(Value.PASS, f"The requirement is optional. {reason}")
     because = evidence.because
     parts = evidence.parts.items()

@@ -30,6 +30,15 @@ _OWN: Final = re.compile(
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
+# Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
+# that end by themselves.
+_REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregister)", re.IGNORECASE)
+_HIDES: Final = re.compile(
+    r"\b(?:cancel|abort|archiv|deactivat|disabl|retir|soft|restor|undelet|revok|marke?[ds]? as)", re.IGNORECASE
+)
+_PASSES: Final = re.compile(
+    r"expir|lifetime|\bttl\b|valid[ _](?:until|to|for)|one[- ]time|\bonce\b|consum|temporar|short-lived", re.IGNORECASE
+)
 # Members that only one of several things can have, such as the default: setting it on one thing clears it on another.
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # Formats whose values are equal regardless of case and punctuation.
@@ -100,6 +109,19 @@ def is_marked_deleted(value: Any) -> bool:
         if plain in _ALIVE and one is False:
             return True
     return False
+
+
+def doubt_of_deletion(delete: Operation) -> str:
+    """Return why a thing may be there after a DELETE; nothing if the description says that it is removed."""
+    # Without an id of its own, an operation is named by its method.
+    is_sure = _REMOVES.search(f"{delete.id} {delete.text}") and not _HIDES.search(f"{delete.id} {delete.text}")
+    return "" if is_sure else "DELETE may end or archive a thing that can still be read"
+
+
+def doubt_of_life(*operations: Operation) -> str:
+    """Return why a created thing may be gone; nothing unless a description of it speaks of such an end."""
+    texts = [text for one in operations for text in (one.text, *map(str, parts_of(one.shape or {}).items()))]
+    return "the thing may have ended by itself" if any(map(_PASSES.search, texts)) else ""
 
 
 def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:

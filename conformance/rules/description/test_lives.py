@@ -21,9 +21,11 @@ from conformance.scenarios.safe_reads import Watched, safe_reads
 from conformance.scenarios.tables import Table, tables
 from conformance.scenarios.whole_list import read_items
 from conformance.scenarios.writing import Writer
-from conformance.verdict.evidence import Case
+from conformance.verdict.evidence import SENTENCE, Case
 
 _DONE = frozenset({HTTPStatus.OK, HTTPStatus.NO_CONTENT})
+# Ways to repeat a key that need no sentence of the description.
+_OF_KEYS = frozenset({"same request", "new key"})
 
 
 def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
@@ -63,7 +65,8 @@ def deleted_is_gone(trace: tuple[Life, ...]) -> Iterable[Outcome]:
             continue
         # A deleted thing that can be restored may still be read, if it is marked as deleted.
         if not is_marked_deleted(read_json(life.gone.response.body).value):
-            yield Case(not life.gone.response.ok, life.gone, f"status 404 or 410 after {life.delete}", cause=life.read)
+            expected, is_gone = f"status 404 or 410 after {life.delete}", not life.gone.response.ok
+            yield Case(is_gone, life.gone, expected, cause=life.read, doubt=life.doubt)
     yield from _looks(trace, Kind.GONE)
 
 
@@ -79,7 +82,8 @@ def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outc
     for deletion in trace:
         shown = deletion.deleted if deletion.fault else deletion.user
         expected = "a refusal with 409, as the description says of what is in use, or no reference to it any more"
-        yield Case(not deletion.fault, shown, expected, f"{shown.came}: {deletion.fault}", cause=deletion.operation)
+        found = f"{shown.came}: {deletion.fault}"
+        yield Case(not deletion.fault, shown, expected, found, cause=deletion.operation, doubt=SENTENCE)
 
 
 @rule("description/same-values", on=(lifecycles,))
@@ -111,6 +115,7 @@ def idempotency_key(trace: tuple[Keyed, ...]) -> Iterable[Outcome]:
             creation.expected,
             creation.fault,
             cause=f"{creation.operation} {creation.way}",
+            doubt="" if creation.way in _OF_KEYS else SENTENCE,
         )
 
 
@@ -125,7 +130,8 @@ def safe(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
 def settings_stay(trace: tuple[Watched, ...]) -> Iterable[Outcome]:
     """Judge whether settings stay as they were written while other things are created, changed and deleted."""
     for watch in (one for one in trace if not one.is_safe):
-        yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=f"{watch.operation} kept")
+        cause, doubt = f"{watch.operation} kept", "a setting may follow the things that there are"
+        yield Case(not watch.fault, watch.shown, watch.expected, watch.fault, cause=cause, doubt=doubt)
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,18 @@ def test_a_requirement_is_judged_by_its_level_and_evidence(level, evidence, expe
     assert verdict_of(_requirement(level), _evidence(**evidence), _CLAIMS).value == expected
 
 
+def test_what_a_right_device_may_do_only_warns_until_something_else_is_found():
+    judge = Judge({"http/x"})
+    judge.check("http/x", False, None, "status 404", found="status 200", doubt="it may archive the thing")
+    doubtful = verdict_of(_requirement(), judge.evidence["http/x"], _CLAIMS)
+    assert (doubtful.value, class_verdicts([doubtful], _CLAIMS)["http"][0]) == ("warn", "pass")
+    assert "a right device may do the same: it may archive the thing." in doubtful.reason
+    judge.check("http/x", False, None, "status 404", found="status 200")
+    sure = verdict_of(_requirement(), judge.evidence["http/x"], _CLAIMS)
+    assert (sure.value, len(sure.evidence.findings)) == ("fail", 2)
+    assert "may archive" not in sure.reason
+
+
 def test_what_needs_an_undeclared_figure_is_not_judged_and_holds_its_class_back():
     requirement = _requirement(needs=("motion", "hold"))
     undeclared = {"hold": "not judged: the statement declares no hold time"}

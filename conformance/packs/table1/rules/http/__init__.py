@@ -1,0 +1,1 @@
+"""Checks of the conformance class http that know the paper's robot."""
