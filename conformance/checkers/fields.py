@@ -45,15 +45,13 @@ def content_type(occasion: Occasion) -> Iterator[Case]:
     if answer.body:
         named = answer.header("content-type")
         found = f"{f'Content-Type: {named}' if named else 'no Content-Type'} with a body of {len(answer.body)} bytes"
-        expected = "a Content-Type header field with a media type"
-        yield occasion.case("http/content-type", "/" in answer.media_type, expected, found)
+        yield occasion.case("http/content-type", "/" in answer.media_type, "a Content-Type with a media type", found)
 
 
 def once(occasion: Occasion) -> Iterator[Case]:
     """Judge that no header field occurs twice unless its value is a list (RFC 9110 5.3)."""
     twice = occasion.response.repeated_name(*_SINGLE)
-    expected = "no header twice, unless its value is a list"
-    yield occasion.case("http/field-once", not twice, expected, f"{twice} several times")
+    yield occasion.case("http/field-once", not twice, "no header twice unless it is a list", f"{twice} several times")
 
 
 def date(occasion: Occasion) -> Iterator[Case]:

@@ -134,25 +134,19 @@ class Memory:
         reads = [
             operation for operation in operations if operation.method == "GET" and not operation.parameter("query")
         ]
-        self._items = {
-            operation.template.rstrip("/"): operation for operation in reads if collection_of(operation.template)
-        }
+        self._items = {read.template.rstrip("/"): read for read in reads if collection_of(read.template)}
         self._of_collections = {collection_of(template): one for template, one in self._items.items()}
         # Templates of things below another thing that may exist or not.
         self._items |= {
-            operation.template: operation
-            for operation in reads
-            if operation.template.rpartition("/")[0] in self._items
-            and {("PUT", operation.template), ("DELETE", operation.template)} <= methods
+            read.template: read
+            for read in reads
+            if read.template.rpartition("/")[0] in self._items
+            and {("PUT", read.template), ("DELETE", read.template)} <= methods
         }
-        self._actions = {
-            operation.template
-            for operation in operations
-            if not self._items.keys().isdisjoint(_above(operation.template))
-        }
-        self._single = {operation.template for operation in operations if operation.method == "GET"} - {
-            operation.template for operation in self._items.values()
-        }
+        templates = {operation.template for operation in operations}
+        self._actions = {path for path in templates if not self._items.keys().isdisjoint(_above(path))}
+        self._single = {path for path in templates if ("GET", path) in methods}
+        self._single -= {read.template for read in self._items.values()}
         self._collections = collections_of(operations)
         self._things: dict[str, _Thing] = {}
         self._own = {template: _read_only(one) for template, one in self._items.items()}
@@ -164,8 +158,9 @@ class Memory:
         # read shows late.
         self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._late: set[tuple[str, str]] = set()
-        # Paths that the run created. Below: collections in which another thing was deleted, and cases that wait for
-        # that.
+        # Templates of things that end by themselves, because an identifier came again.
+        self._ends: set[str] = set()
+        # Paths that the run created. Below: collections in which something was deleted, and cases that wait for that.
         self._made: set[str] = set()
         self._gone: set[str] = set()
         self._back: dict[str, list[Case]] = defaultdict(list)
@@ -283,6 +278,7 @@ class Memory:
             self._drop(lambda other: _is_below(other, path))
             return
         before = self._things.pop(target.casefold(), None)
+        self._ends |= {item.template} if before is not None and not before.gone else set()
         self._last.pop(target, None)
         if response.status == HTTPStatus.CREATED:
             yield from self._judge_location(occasion, path, target)
@@ -378,7 +374,7 @@ class Memory:
             return
         kept = item.template, ""
         if response.status in _ABSENT and thing.made:
-            if age_s > _SETTLES_S and not thing.replaced:
+            if age_s > _SETTLES_S and not thing.replaced and item.template not in self._ends:
                 expected = f"the thing that {thing.change} has created {age_s:.0f} s before"
                 case = self._case("created-is-there", occasion, expected, cause=item.label, doubt=doubt_of_life(item))
                 yield from self._differs(kept, age_s, "none", case)

@@ -17,7 +17,7 @@ from conformance.verdict.evidence import Case
 
 # URLs that are remembered.
 _MOST: Final = 1000
-_SPACE: Final = re.compile(r"\s+")
+_SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
 
 class _Write(NamedTuple):
@@ -74,11 +74,11 @@ class Texts:
             if not isinstance(seen, str) or seen == write.before.get(name):
                 continue
             expected = f"{name} {clip(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
-            label = occasion.operation.label if occasion.operation else ""
-            same = _plain(seen) in {_plain(text), _ascii(text)}
-            # A list may show only the beginning of a text.
+            # A device may add something to a text, or make a slug of it; a list may show only its beginning.
+            slug = _SEPARATOR.sub("-", _ascii(text)).strip("-")
+            same = _plain(text) in _plain(seen) or _plain(seen).replace("_", "-") in {_ascii(text), slug}
             same |= write.id is not None and _plain(text).startswith(_plain(seen.rstrip(". \u2026")))
-            cause = f"{label} {name} text"
+            cause = f"{occasion.operation.label if occasion.operation else ''} {name} text"
             yield occasion.case("description/written-is-read", same, expected, f"{name} {clip(seen)}", cause=cause)
 
 

@@ -17,14 +17,14 @@ from conformance.verdict.evidence import Case
 #: be wrong.
 SETTLES_S: Final = 3.0
 _OFTEN: Final = 2
-# _CUTS: multiples at which servers cut a list silently. _FEWEST_CUT: fewest items of such a list.
+# _CUTS: multiples at which servers cut a list silently. _FEWEST_CUT: its fewest items, with parameters or none.
 _CUTS: Final = (5, 16)
-_FEWEST_CUT: Final = 10
+_FEWEST_CUT: Final = 10, 20
 # Combinations of filters that are remembered.
 _MOST: Final = 1000
 # Phrases in a description which say that a total counts the filtered items.
 _FILTERED: Final = re.compile(r"\b(?:filter\w*|match\w*)\b(?![^.]*\b(?:ignor|regardless|whatever))", re.IGNORECASE)
-_CAP: Final = 50  # Also the fewest items at which a list without paging parameters counts as cut.
+_CAP: Final = 50
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class Totals:
             parameter is None for parameter in (listing.limit, listing.offset, listing.page, listing.cursor)
         )
         longest = self._longest[listing.operation.label]
-        return is_round and shown >= max(_FEWEST_CUT if has_parts else _CAP, longest)
+        return is_round and shown >= max(_FEWEST_CUT[not has_parts], longest)
 
 
 def says_filtered(listing: Listing) -> set[str]:

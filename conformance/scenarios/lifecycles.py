@@ -246,8 +246,7 @@ class _Cycle:
 
     def _create(self, turn: int) -> bool:
         """Create one thing and read it; return whether another one may be tried."""
-        path, before = "", self._ids()
-        things = self.living.things
+        path, before, things = "", self._ids(), self.living.things
         if self.create.method == "PUT":
             path = path_chosen(self.read, turn)
             if not path or self.writer.send(self.read, path).response.status not in ABSENT:

@@ -27,7 +27,7 @@ _OWN: Final = re.compile(
     r"|(?:created|updated|modified|changed|deleted|started|finished|completed)_?(?:at|by))$|^(?:at|by)$"
 )
 # _DELETED: states of things that are deleted and can still be read. _STATES: members that contain a state.
-_DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone")
+_DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone|cancell?ed|aborted|revoked")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
 # Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
@@ -100,15 +100,13 @@ def is_marked_deleted(value: Any) -> bool:
     if not isinstance(value, dict):
         return False
     inner = [item for item in value.values() if isinstance(item, dict)]
-    for name, one in [(name, one) for part in (value, *inner) for name, one in part.items()]:
-        plain = plain_name(name)
-        if _DELETED.search(plain) and one not in (None, False, 0, ""):
-            return True
-        if plain.endswith(_STATES) and isinstance(one, str) and _DELETED.search(plain_name(one)):
-            return True
-        if plain in _ALIVE and one is False:
-            return True
-    return False
+    pairs = ((plain_name(name), one) for part in (value, *inner) for name, one in part.items())
+    return any(
+        (_DELETED.search(name) and one not in (None, False, 0, ""))
+        or (name.endswith(_STATES) and isinstance(one, str) and _DELETED.search(plain_name(one)))
+        or (name in _ALIVE and one is False)
+        for name, one in pairs
+    )
 
 
 def doubt_of_deletion(delete: Operation) -> str:
@@ -146,15 +144,15 @@ def with_items(schema: Schema, body: Any, turn: int, collections: frozenset[str]
             made = [another(items, value[0], turn + number, collections) for number in range(_ITEMS)]
             made = [one for place, one in enumerate(made) if one not in (value[0], *made[:place])]
             longer = ([*made[:1], value[0], *made[1:]], [*made[:1], value[0]])
-            new = next((one for one in longer if len(one) > 1 and fits(schema, {**changed, name: one})), value)
-            changed[name] = new
+            changed[name] = next(
+                (one for one in longer if len(one) > 1 and fits(schema, {**changed, name: one})), value
+            )
     return changed
 
 
 def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) -> Iterator[Any]:
     """Yield other values of a member, another one first in each turn."""
-    given = flat(schema)
-    kinds, form = kinds_of(schema), str(given.get("format", ""))
+    given, kinds, form = flat(schema), kinds_of(schema), str(flat(schema).get("format", ""))
     found: list[Any] = list(given.get("enum", ()))
     if isinstance(value, dict):
         found = [another(schema, value, turn, collections)]
@@ -251,14 +249,13 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         schema: of what was sent.
     """
     parts = flat(schema).get("properties", {})
-    return {
-        name: answer[name] if _is_told(value, answer.get(name), before.get(name), flat(parts.get(name, {}))) else value
+    told = {
+        name: answer[name]
         for name, value in sent.items()
+        if isinstance(answer.get(name), str | int | float) and "enum" not in flat(parts.get(name, {}))
+        if answer[name] not in (value, before.get(name))
     }
-
-
-def _is_told(sent: Any, told: Any, before: Any, schema: Schema) -> bool:
-    return isinstance(told, str | int | float) and told not in (sent, before) and "enum" not in schema
+    return {**sent, **told}
 
 
 def parts_of(schema: Schema | None) -> dict[str, Any]:
@@ -280,12 +277,9 @@ def is_devices(name: str, part: Any, collections: frozenset[str]) -> bool:
     """Return whether a member is the device's: it sets, hides or checks it."""
     given = flat(part) if isinstance(part, dict) else {}
     marked = given.get("readOnly") or given.get("writeOnly") or given.get("format") in {"password", "byte", "binary"}
-    return bool(marked or "const" in given or _OWN.search(_snake(name)) or refers(name, given, collections))
-
-
-def _snake(name: str) -> str:
-    """Return a name in lower case with a line between its words: ``created_at`` for ``createdAt``."""
-    return re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    # In lower case with a line between its words: ``created_at`` for ``createdAt``.
+    snake = re.sub(r"[^A-Za-z0-9]+|(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    return bool(marked or "const" in given or _OWN.search(snake) or refers(name, given, collections))
 
 
 def is_shared(name: str) -> bool:

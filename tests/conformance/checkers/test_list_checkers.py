@@ -520,7 +520,7 @@ def _cut_by_server(seen):
 
 
 def test_a_list_without_parts_may_be_cut_at_many_items(tmp_path):
-    for size, blamed in ((50, set()), (15, {TOTAL})):
+    for size, blamed in ((20, set()), (15, {TOTAL})):
         seen = Seen(tmp_path / str(size), [_text("state", enum=_STATES)], _totalled("count"))
         items = [{"id": number} for number in range(size)]
         seen.read(items).write()

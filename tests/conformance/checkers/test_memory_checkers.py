@@ -319,7 +319,9 @@ RIGHT = {
     ],
     "deleted a moment ago": [_delete("1"), _get("1"), _get("1", 404)],
     "deleted, and always there": [_post("2"), _delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")],
-    "deleted, and marked so": [_delete("1"), 5.0, _get("1", deleted=True), _get("1", state="archived")],
+    "deleted, and marked so": [
+        *(_delete("1"), 5.0, _get("1", deleted=True), _get("1", state="archived"), _get("1", phase="cancelled")),
+    ],
     "deleted, and put again": [_delete("1"), _put("1", 201), 5.0, _get("1")],
     "deleted, and put in another case": [_delete("a"), _put("A", 201), 5.0, _get("a")],
     "deleted, and created again": [_delete("1"), _post("1"), 5.0, _get("1")],
@@ -333,6 +335,9 @@ RIGHT = {
     "deleted, and a request got lost": [_delete("1"), _LOST, 5.0, _get("1")],
     "a refused DELETE": [_delete("1", 409), 5.0, _get("1")],
     "a DELETE for later": [_delete("1", 202), 5.0, _get("1")],
+    "things that end, and whose identifiers come again": [
+        *[_post("8"), 9.0, _get("8"), _post("1"), 4.0, _post("1"), _post("2"), 4.0, _get("2", 404)],
+    ],
     "things that end": [_post("8"), _get("8"), _post("1"), 9.0, _get("1", 404)],
     "created, and replaced by another one of its name": [
         *[_post("8", name="b"), _post("1"), _post("2"), _post("3", name="c"), 4.0, _get("1", 404)],

@@ -206,8 +206,8 @@ def _wrote(seen, before="old", line="PUT /tubes/1 200"):
 
 @pytest.mark.parametrize(
     "seen",
-    [_TEXT, "old", "Zo\u00eb \u00e9 \U0001f916", f" {_TEXT.upper()}", "zoe e", None, 7],
-    ids=["same", "later", "composed", "case and space", "ASCII alone", "null", "a number"],
+    [_TEXT, "old", "Zo\u00eb \u00e9 \U0001f916", f" {_TEXT.upper()}", "zoe e", "zoe-e", f"{_TEXT} (2)", None, 7],
+    ids=["same", "later", "composed", "case and space", "ASCII alone", "slug", "not taken", "null", "a number"],
 )
 def test_texts_that_read_as_they_were_written(tmp_path, seen):
     assert "description/written-is-read" not in _all(tmp_path, _wrote(seen))
