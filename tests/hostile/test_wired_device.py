@@ -20,7 +20,7 @@ _RUNS = (
         "16th wrong": ("description/body-schema", "/log"),
         "texts without combining marks": ("description/written-is-read", "name"),
         "texts without emoji": ("description/written-is-read", "/jobs"),
-        "Allow of sub-resources": ("http/allow-agrees", "/label"),
+        "Allow of sub-resources": ("description/allow", "/label"),
     },
     {
         "OPTIONS of items 404": ("description/method-refused", "OPTIONS"),

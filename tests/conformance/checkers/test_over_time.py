@@ -195,6 +195,21 @@ def test_a_declared_405_is_judged_by_its_schema(tmp_path):
         assert _broken(tmp_path, [one("DELETE /config 405", body, allow="GET, PUT")]) == set()
 
 
+@pytest.mark.parametrize(
+    ("allow", "broken"),
+    [
+        ("GET, PUT", set()),
+        ("GET", {"description/allow"}),  # a router that looks at one of two routes
+        ("GET, PUT, MOVE", {"description/allow"}),
+        ("GET, PUT, DELETE", {"description/allow", "http/allow-agrees"}),
+        (None, {"http/allow"}),
+    ],
+)
+def test_allow_of_a_refusal_lists_the_methods_of_the_path(tmp_path, allow, broken):
+    found = _all(tmp_path, [one("DELETE /config 405", {"error": "no"}, **({"allow": allow} if allow else {}))])
+    assert found & {"description/allow", "http/allow", "http/allow-agrees"} == broken
+
+
 _TEXT = "Zo\u00eb e\u0301 \U0001f916"
 
 
