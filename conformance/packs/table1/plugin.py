@@ -153,8 +153,7 @@ class Device(device.Device):
         from conformance.packs.table1.checkers.interfaces import AcrossInterfaces  # noqa: PLC0415
         from conformance.packs.table1.checkers.lists import Lists  # noqa: PLC0415
         from conformance.packs.table1.checkers.plans import Plans  # noqa: PLC0415
-        from conformance.packs.table1.checkers.soap_poses import SoapPoses  # noqa: PLC0415
-        from conformance.packs.table1.checkers.soap_responses import SoapResponses  # noqa: PLC0415
+        from conformance.packs.table1.checkers.soap_responses import SoapPoses, SoapResponses  # noqa: PLC0415
         from conformance.packs.table1.checkers.state import State  # noqa: PLC0415
 
         validity = SoapResponses(services)

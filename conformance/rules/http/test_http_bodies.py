@@ -8,9 +8,9 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import applicable_operations, working_reads
+from conformance.api.rest.body_mutations import places, replaced, with_options
 from conformance.api.rest.calls import JSON, Call, example_call
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.json_mutations import places, replaced, with_options
 from conformance.api.rest.statuses import is_cut_off, is_taken
 from conformance.contract.classes import LIMIT_OCTETS, TAKEN_OCTETS
 from conformance.documents.json_schema import Schema

@@ -7,12 +7,11 @@ import pytest
 from conformance.api.expectation import expect
 from conformance.api.mutations import Mutation
 from conformance.api.rest.applicable import applicable_operations
+from conformance.api.rest.body_mutations import KINDS, mutations, xml_mutations
 from conformance.api.rest.calls import JSON, XML, Call, example_call, root_name
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.json_mutations import KINDS, mutations
 from conformance.api.rest.refusals import judge_refusal
 from conformance.api.rest.statuses import is_taken
-from conformance.api.rest.xml_mutations import xml_mutations
 from conformance.documents.openapi import Operation
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge

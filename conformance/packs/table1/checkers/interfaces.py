@@ -12,7 +12,7 @@ from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.goal import difference
 from conformance.packs.table1.robot.message_shapes import GOAL, TWIST
 from conformance.packs.table1.robot.robot import GOAL_PATH, VELOCITY, Velocity, is_near
-from conformance.packs.table1.robot.state_over_soap import value_in
+from conformance.packs.table1.robot.state_read import value_in
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 

@@ -7,12 +7,12 @@ from typing import Any, Final
 
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import from_element
-from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.message_shapes import MESSAGE_TYPE, SERVICE_TYPE, read_as
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.message_shapes import SERVICES as SERVICES_SHAPE
 from conformance.packs.table1.robot.robot import SENSORS, SERVICES
 from conformance.packs.table1.robot.soap_services import returns
+from conformance.packs.table1.robot.state_read import entries_of
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 

@@ -13,7 +13,7 @@ from conformance.packs.table1.robot.geometry import Pose, pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, read_as
 from conformance.packs.table1.robot.plan import START_OFF, Plan, plan_of
 from conformance.packs.table1.robot.robot import PLAN, POSE
-from conformance.packs.table1.robot.state_over_soap import value_in
+from conformance.packs.table1.robot.state_read import value_in
 from conformance.packs.table1.statement import Statement
 from conformance.transport.exchange import SAFE_METHODS, Attempt, Exchange, Response
 from conformance.verdict.evidence import Case, case

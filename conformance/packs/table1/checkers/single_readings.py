@@ -17,9 +17,9 @@ import msgspec
 
 from conformance.measures.samples import FARTHEST
 from conformance.packs.table1.limits import Limits
+from conformance.packs.table1.robot.drive_trace import LONGEST_SAMPLE_S
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case, case
 

@@ -1,10 +1,10 @@
-"""Judge every successful SOAP response of a run by the XSD, and whether its content is complete.
+"""Judge every successful SOAP response of a run by the XSD, whether its content is complete, and every pose in them.
 
 A response that is invalid now and then is found only if all are looked at.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from http import HTTPStatus
 from typing import Any, Final
 
@@ -13,9 +13,8 @@ from lxml import etree
 from conformance.api.soap.service import SoapService
 from conformance.checkers.soap import SOAP_12
 from conformance.documents.json_shape import Shape
-from conformance.documents.representation import from_element
+from conformance.documents.representation import from_element, projected
 from conformance.documents.xml import ENVELOPE, NotXmlError, clark, elements, local, parse
-from conformance.packs.table1.robot.agreement import entries_of
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import (
     GET_PLAN,
@@ -26,7 +25,10 @@ from conformance.packs.table1.robot.message_shapes import (
     SERVICE_TYPE,
     SERVICES,
     TWIST,
+    read_as,
 )
+from conformance.packs.table1.robot.robot import POSE
+from conformance.packs.table1.robot.state_read import contradiction, entries_of, stamp_of, value_in
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case
 
@@ -119,3 +121,74 @@ def _list_problem(entries: list[Any], shape: Shape, name: str) -> str:
     twice = next((one for one, two in itertools.pairwise(listed) if one == two), "")
     short = next((entry["type"] for entry in entries if _FULL_NAMES[name].problem(entry["type"])), "")
     return f"{twice} stands twice" if twice else f"type {short!r} is not named in full" if short else ""
+
+
+# How far one of the robot's processes may lag behind another, s.
+_BACK_S: Final = 1.0
+# How often a clock must go back: a single time, somebody may have set it.
+_SEVERAL: Final = 2
+
+
+class SoapPoses:
+    """Judges the poses over SOAP in all exchanges of one run.
+
+    Their stamps do not run backwards, and a message between two equal ones over REST with its stamp is the same
+    message.
+
+    Args:
+        url: returns the URL of a path.
+    """
+
+    def __init__(self, url: Callable[[str], str]) -> None:
+        self._url = url(POSE)
+        self._last: tuple[float, float] = (0.0, 0.0)
+        self._last_received_s = 0.0
+        self._backwards = 0
+        self._before: Any = None
+        self._between: list[tuple[Any, Exchange]] = []
+
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
+        """Take one exchange of the run; only poses count."""
+        if not isinstance(attempt, Exchange):
+            return
+        request, response = attempt.request, attempt.response
+        if request.method == "GET" and request.url == self._url and response.media_type == "application/json":
+            yield from self._over_rest(attempt)
+        elif request.method == "POST" and response.ok and b"GetPoseResponse" in response.body:
+            value, problem = value_in(attempt, ODOMETRY)
+            if not problem and not ODOMETRY.problem(value):
+                yield from self._in_order(value, attempt)
+                self._between.append((value, attempt))
+
+    def _over_rest(self, exchange: Exchange) -> Iterator[Case]:
+        value, problem = read_as(exchange.response, ODOMETRY)
+        if problem:
+            return
+        after, between, self._between = projected(value, ODOMETRY.schema), self._between, []
+        for message, one in between if self._before is not None else ():
+            found = contradiction(message, self._before, after)
+            yield case(
+                "equivalence/pose",
+                not found,
+                one,
+                f"the message with this stamp, as GET {POSE} gives it just before and after",
+                found=found,
+                cause="another message",
+            )
+        self._before = after
+
+    def _in_order(self, message: Any, exchange: Exchange) -> Iterator[Case]:
+        response, stamp = exchange.response, stamp_of(message)
+        if response.received_s - response.elapsed_ms / 1000 >= self._last_received_s:
+            back_s = self._last[0] - stamp[0] + (self._last[1] - stamp[1]) / 1e9
+            self._backwards += back_s > _BACK_S
+            yield case(
+                "equivalence/pose",
+                back_s <= _BACK_S or self._backwards < _SEVERAL,
+                exchange,
+                "stamps that do not run backwards, as in REST's responses",
+                found=f"a stamp {back_s:.3f} s earlier than in the previous response; {self._backwards} times so far",
+                cause="stamp",
+            )
+        self._last = stamp
+        self._last_received_s = max(self._last_received_s, response.received_s)

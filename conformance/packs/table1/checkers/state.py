@@ -16,10 +16,10 @@ from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.clock import Clock
+from conformance.packs.table1.robot.drive_trace import LONGEST_SAMPLE_S
 from conformance.packs.table1.robot.geometry import length_of
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.robot import LINEAR, POSE, VELOCITY, Velocity
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
 from conformance.transport.credentials import Credentials
 from conformance.transport.exchange import Attempt, Exchange
 from conformance.verdict.evidence import Case, case

@@ -7,11 +7,10 @@ from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.measures.samples import SEVERAL
-from conformance.packs.table1.robot import drive_rules, windows
+from conformance.packs.table1.robot import drive_rules, drive_trace
 from conformance.packs.table1.robot.drive_trace import ALL, COUNTED_ON_S, Command, Reach, Trace, Turn, certain_s
 from conformance.packs.table1.robot.motion_map import By
-from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.xml_commands import put_as_xml
+from conformance.packs.table1.robot.robot import ACCEPT_JSON, LINEAR, STILL, VELOCITY, Robot, Velocity, put_as_xml
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
@@ -199,7 +198,7 @@ class Drive:
             lapsed = limits.hold_s is not None and now > self.trace.last_sent_s + certain_s(limits.hold_s)
             # Do not repeat a command that had no effect within the settle time: that would hide the fault.
             if not lapsed and now > begun + limits.settle_s:
-                renews = renews and not windows.is_stuck(self.trace.turns[first:], wanted, part)
+                renews = renews and not drive_trace.is_stuck(self.trace.turns[first:], wanted, part)
             if renews and self.trace.commands and now > self.trace.last_sent_s + every:
                 self._renew()
                 if lapsed and lapses < _LAPSES:
@@ -209,14 +208,14 @@ class Drive:
             until = begun + patience
             self.look()
             turns = self.trace.turns[first:]
-            there = windows.is_shown(limits, turns, wanted, part=part, count=count)
+            there = drive_trace.is_shown(limits, turns, wanted, part=part, count=count)
             # Readings from before the suite was held up, while the robot still had time, are not held against it.
             settled = min(until, begun + limits.settle_s + self.robot.sample_s) if within is None else begun
             late = [turn for turn in turns if turn.at >= settled]
-            decided = windows.is_shown(limits, late, wanted, part=part, count=count) is not None
+            decided = drive_trace.is_shown(limits, late, wanted, part=part, count=count) is not None
             if there or (now > until and decided) or now > until + _LONGER_S:
                 break
-        counted = settled if not there and windows.newest(late) else begun
+        counted = settled if not there and drive_trace.newest(late) else begun
         if wanted == STILL:
             # After such a late response, the watchdog may have stopped the robot instead of the command.
             outlasted = bool(there) and within is not None and self.trace.last_answered_s > begun + patience
@@ -245,12 +244,12 @@ class Drive:
         while True:
             self.look()
             turns, now = self.trace.turns[first:], self.clock.now()
-            holds = windows.verdict(self.robot.limits, turns, wanted, factor, part)
+            holds = drive_trace.verdict(self.robot.limits, turns, wanted, factor, part)
             if not holds and now > until:
                 holds = None
             if holds is not None or now > min(until, last):
-                seen = windows.velocities(windows.newest(turns))
-                return holds, str(windows.middle(seen)) if seen else ""
+                seen = drive_trace.velocities(drive_trace.newest(turns))
+                return holds, str(drive_trace.middle(seen)) if seen else ""
 
     def keep(self, seconds: float) -> None:
         """Read pose and velocity repeatedly for the given time, s, without sending commands."""

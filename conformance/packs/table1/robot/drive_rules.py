@@ -8,11 +8,10 @@ from typing import Any, Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace
+from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace, is_shown, middle, newest, velocities
 from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.packs.table1.robot.windows import is_shown, middle, newest, velocities
 from conformance.scenarios.rule import NotTested, Outcome
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case

@@ -4,10 +4,9 @@ from collections.abc import Callable
 from typing import Any
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.robot.abilities import drivable
 from conformance.packs.table1.robot.geometry import Pose, quaternion_of
 from conformance.packs.table1.robot.plan import ask, reachable
-from conformance.packs.table1.robot.robot import Robot, Velocity
+from conformance.packs.table1.robot.robot import Robot, Velocity, drivable
 from conformance.packs.table1.statement import Statement
 
 # _FAR_M: far enough to be under way for a while, near enough for every room; the second where room is short.

@@ -12,9 +12,7 @@ import msgspec
 from conformance.api.rest.calls import XML
 from conformance.documents.representation import local_name, parse_xml
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.abilities import can_move
-from conformance.packs.table1.robot.robot import LINEAR, POSE, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.xml_commands import put_as_xml
+from conformance.packs.table1.robot.robot import LINEAR, POSE, STILL, VELOCITY, Robot, Velocity, can_move, put_as_xml
 from conformance.packs.table1.statement import Statement
 from conformance.statement.motion_map import MotionMap, Way
 

@@ -16,7 +16,7 @@ from conformance.packs.table1.robot import soap_services
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, read_as
 from conformance.packs.table1.robot.robot import PLAN, Robot
-from conformance.packs.table1.robot.state_over_soap import value_in
+from conformance.packs.table1.robot.state_read import value_in
 from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 

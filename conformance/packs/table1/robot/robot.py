@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from conformance.api.rest.calls import JSON
+from conformance.api.rest.calls import JSON, XML
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_shape import Shape
-from conformance.documents.representation import projected
+from conformance.documents.representation import UnreadableError, local_name, parse_xml, projected
+from conformance.documents.writing import xml_bytes
 from conformance.measures.samples import FARTHEST
 from conformance.observe.clock import WALL_CLOCK, Clock, Patience
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot import abilities
-from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GOAL, ODOMETRY, TWIST, VECTOR3, body_of, read_as
-from conformance.packs.table1.statement import said_of
+from conformance.packs.table1.statement import Motion, said_of
 from conformance.transport.exchange import Exchange
 
 POSE: Final = "/robot/pose/"
@@ -259,7 +258,7 @@ class Robot:
 
     def drivable(self, velocity: Velocity) -> Velocity:
         """Return this velocity, or the most similar one that the statement lets the robot drive."""
-        return Velocity(*abilities.drivable(self.limits, self.statement.motion, velocity))
+        return Velocity(*drivable(self.limits, self.statement.motion, velocity))
 
     def only(self, component: int, value: float) -> Velocity:
         """Return a velocity in one component, m/s or rad/s, with the other components it needs to drive."""
@@ -271,9 +270,105 @@ class Robot:
 
     def can_move(self, component: int) -> bool:
         """Return whether the statement declares that the robot can move in a component."""
-        return abilities.can_move(self.statement.motion, component)
+        return can_move(self.statement.motion, component)
 
     @property
     def reverses(self) -> bool:
         """Return whether the robot can drive back."""
         return self.limits.range_of(AHEAD)[0] < 0
+
+
+#: Indexes into Velocity of the components that a wheeled robot has: ahead, and about the vertical axis.
+AHEAD, ABOUT = 0, 5
+# Components of a velocity, the one that needs least room first.
+_BY_ROOM: Final = (ABOUT, AHEAD, 1, 2, 3, 4)
+# A circle this much wider than the narrowest is driveable despite rounding.
+_WIDER: Final = 1.02
+
+
+def drivable(limits: Limits, motion: Motion, velocity: Sequence[float]) -> tuple[float, ...]:
+    """Return the velocity (six components) that a robot can drive instead of one that it may be unable to drive.
+
+    A component that is not actuated becomes zero. A robot without a reverse gear drives ahead instead. A robot that
+    cannot turn on the spot turns in its narrowest circle. Where the speed of the wheels limits a curve, both parts
+    become smaller.
+    """
+    fitted = [_within(limits, motion, component, value) for component, value in enumerate(velocity)]
+    radius, separation = motion.min_radius_m, motion.wheel_separation_m
+    if radius and fitted[ABOUT] and abs(fitted[AHEAD]) < radius * abs(fitted[ABOUT]):
+        least = math.copysign(_WIDER * radius * abs(fitted[ABOUT]), fitted[AHEAD] or 1.0)
+        fitted[AHEAD] = _within(limits, motion, AHEAD, least)
+        fitted[ABOUT] = turn_beside(limits, motion, fitted[AHEAD], fitted[ABOUT])
+    if separation and fitted[AHEAD] and fitted[ABOUT]:
+        wheel = abs(fitted[AHEAD]) + abs(fitted[ABOUT]) * separation / 2
+        share = min(1.0, _wheels(limits) / wheel)
+        fitted[AHEAD], fitted[ABOUT] = share * fitted[AHEAD], share * fitted[ABOUT]
+    return tuple(fitted)
+
+
+def turn_beside(limits: Limits, motion: Motion, ahead: float, turn: float) -> float:
+    """Return the turning rate of ``turn`` or less, rad/s, that a robot can have while it drives at ``ahead``, m/s."""
+    most = abs(turn)
+    if motion.min_radius_m:
+        most = min(most, abs(ahead) / (_WIDER * motion.min_radius_m))
+    if motion.wheel_separation_m:
+        most = min(most, max(0.0, _wheels(limits) - abs(ahead)) * 2 / motion.wheel_separation_m)
+    return math.copysign(most, turn)
+
+
+def _wheels(limits: Limits) -> float:
+    """Return the greatest speed of a wheel, m/s."""
+    return max(map(abs, limits.range_of(AHEAD)))
+
+
+def can_move(motion: Motion, component: int) -> bool:
+    """Return whether a robot can move in a component (index into Velocity)."""
+    part, axis = divmod(component, len("xyz"))
+    return f"{('linear', 'angular')[part]}.{'xyz'[axis]}" in motion.actuated
+
+
+def handiest(motion: Motion) -> int:
+    """Return the component in which a robot can move with the least room."""
+    return next((component for component in _BY_ROOM if can_move(motion, component)), ABOUT)
+
+
+def _within(limits: Limits, motion: Motion, component: int, value: float) -> float:
+    """Return a component clipped to its range, or in the other direction if the robot has only that one."""
+    if not can_move(motion, component):
+        return 0.0
+    least, greatest = limits.range_of(component)
+    if (value < 0 and not least) or (value > 0 and not greatest):
+        value = -value
+    return max(least, min(greatest, value))
+
+
+def put_as_xml(
+    robot: Robot,
+    path: str,
+    value: Mapping[str, Any],
+    *,
+    accept: str = JSON,
+    before: Callable[[], object] = lambda: None,
+) -> Exchange | None:
+    """PUT a value as XML; return None if the robot sends no XML for that resource.
+
+    Args:
+        robot: the robot.
+        path: path of the resource.
+        value: the value, as JSON would have it.
+        accept: media type of the response.
+        before: called just before the PUT.
+
+    Raises:
+        NoAnswerError: there is no response.
+    """
+    answer = robot.rest.send("GET", path, headers=(("Accept", XML),)).response
+    if not answer.ok or answer.media_type != XML:
+        return None
+    try:
+        form = parse_xml(answer.body)
+    except UnreadableError:
+        return None
+    body = xml_bytes(value, local_name(form), form)
+    before()
+    return robot.rest.send("PUT", path, headers=(("Content-Type", XML), ("Accept", accept)), body=body)

@@ -5,10 +5,9 @@ import random
 from collections.abc import Iterator
 from typing import Final
 
-from conformance.packs.table1.robot.abilities import ABOUT, AHEAD, handiest, turn_beside
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.motion_map import By
-from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import ABOUT, AHEAD, STILL, Robot, Velocity, handiest, turn_beside
 
 # Share of the assumed figures that a robot may reach where it declares no limits.
 _UNDECLARED: Final = 0.6

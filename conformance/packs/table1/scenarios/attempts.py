@@ -4,21 +4,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
+from conformance.api.rest.body_mutations import near_misses
 from conformance.api.rest.calls import JSON
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.json_mutations import near_misses
 from conformance.documents.openapi import operations_of
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose
-from conformance.packs.table1.robot.goal import goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals
+from conformance.packs.table1.robot.goal import choose_goals, goal_body, put_goal
 from conformance.packs.table1.robot.message_shapes import body_of
-from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
+from conformance.packs.table1.robot.robot import (
+    GOAL_PATH,
+    JSON_BODY,
+    LINEAR,
+    STILL,
+    VELOCITY,
+    Robot,
+    Velocity,
+    put_as_xml,
+)
 from conformance.packs.table1.robot.stopping import await_rest
-from conformance.packs.table1.robot.taken import turned_goal
-from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.goal_life import await_motion, cancel, slow_turn
-from conformance.packs.table1.scenarios.not_acceptable import put_unacceptable
+from conformance.packs.table1.scenarios.not_acceptable import put_unacceptable, turned_goal
 from conformance.packs.table1.scenarios.plans import is_refused
 from conformance.scenarios.motion.attempts import send_in_parts, tried_at_rest
 from conformance.scenarios.motion.mapped import MappedDevice

@@ -12,9 +12,8 @@ from conformance.api.rest.validity import require_valid
 from conformance.measures.samples import SEVERAL
 from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.delivery import path_of
-from conformance.packs.table1.robot.goal import await_goal, await_none, difference, goal_body, is_there
+from conformance.packs.table1.robot.goal import await_goal, await_none, choose_goals, difference, goal_body, is_there
 from conformance.packs.table1.robot.goal_trace import ConcurrentGoal, GoalRead
-from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.motion_map import speeds_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, Robot

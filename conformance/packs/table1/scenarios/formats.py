@@ -16,12 +16,19 @@ from conformance.api.rest.formats import Disagreement, Found, disagreements, eac
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, is_there, put_goal
-from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
+from conformance.packs.table1.robot.goal import (
+    await_goal,
+    await_none,
+    choose_goals,
+    goal_body,
+    in_turn,
+    is_there,
+    make_room,
+    put_goal,
+)
 from conformance.packs.table1.robot.plan import reachable
-from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, put_as_xml
 from conformance.packs.table1.robot.velocity_range import there_and_back
-from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange

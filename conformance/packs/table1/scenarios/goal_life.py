@@ -13,13 +13,14 @@ from conformance.packs.table1.robot.goal import (
     REPEATED,
     await_goal,
     await_none,
+    choose_goals,
     difference,
     goal_body,
     is_there,
+    meanwhile,
     put_goal,
 )
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, NoGoal, Put
-from conformance.packs.table1.robot.goals import choose_goals, meanwhile
 from conformance.packs.table1.robot.robot import JSON_BODY, LINEAR, STILL, VELOCITY, Robot, Velocity
 from conformance.scenarios.scenario import partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage

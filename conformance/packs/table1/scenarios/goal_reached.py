@@ -11,16 +11,14 @@ from conformance.api.soap.service import SoapService
 from conformance.measures.samples import FARTHEST, SEVERAL
 from conformance.observe.clock import poll
 from conformance.packs.table1.robot import soap_services
-from conformance.packs.table1.robot.abilities import ABOUT
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import Command
 from conformance.packs.table1.robot.geometry import Pose, middle_of, wrapped
-from conformance.packs.table1.robot.goal import NEW, await_none, goal_body, put_goal
+from conformance.packs.table1.robot.goal import NEW, await_none, choose_goals, goal_body, put_goal
 from conformance.packs.table1.robot.goal_trace import GoalReached
-from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import ODOMETRY
 from conformance.packs.table1.robot.plan import ask, ask_over_soap, start_of
-from conformance.packs.table1.robot.robot import POSE, Robot
+from conformance.packs.table1.robot.robot import ABOUT, POSE, Robot
 from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.transport.exchange import Exchange

@@ -14,14 +14,29 @@ from typing import Any, Final
 from conformance.api.soap.service import SoapService
 from conformance.documents.representation import from_element, projected
 from conformance.observe.clock import poll
-from conformance.packs.table1.robot.agreement import Slack, disagreement
 from conformance.packs.table1.robot.drive import Drive
-from conformance.packs.table1.robot.goal import await_goal, await_none, goal_body, put_goal
-from conformance.packs.table1.robot.goals import choose_goals, in_turn, make_room
+from conformance.packs.table1.robot.goal import (
+    await_goal,
+    await_none,
+    choose_goals,
+    goal_body,
+    in_turn,
+    make_room,
+    put_goal,
+)
 from conformance.packs.table1.robot.message_shapes import GOAL_AND_STATUS
 from conformance.packs.table1.robot.robot import STILL, Robot
 from conformance.packs.table1.robot.soap_services import ask, returns
-from conformance.packs.table1.robot.state_over_soap import STATES, StateRead, best_of, compare, for_good, read_state
+from conformance.packs.table1.robot.state_read import (
+    STATES,
+    Slack,
+    StateRead,
+    best_of,
+    compare,
+    disagreement,
+    for_good,
+    read_state,
+)
 from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need

@@ -20,16 +20,23 @@ from conformance.packs.table1.robot.delivery_sender import DeliverySender
 from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose, length_of, wrapped
-from conformance.packs.table1.robot.goal import NEW, await_goal, await_none, difference, goal_body, is_there, put_goal
+from conformance.packs.table1.robot.goal import (
+    NEW,
+    await_goal,
+    await_none,
+    choose_goals,
+    difference,
+    goal_body,
+    is_there,
+    put_goal,
+)
 from conformance.packs.table1.robot.goal_trace import Put
-from conformance.packs.table1.robot.goals import choose_goals
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
 from conformance.packs.table1.robot.refused_requests import NO_FRAME, Refused, RefusedRequests, is_refused, send_known
-from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot
+from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, Robot, put_as_xml
 from conformance.packs.table1.robot.soap_services import send_delivery
 from conformance.packs.table1.robot.stopping import bring_to_rest
-from conformance.packs.table1.robot.xml_commands import put_as_xml
 from conformance.packs.table1.scenarios.attempts import GOAL, elsewhere
 from conformance.packs.table1.scenarios.goal_life import await_motion, put_new
 from conformance.papers_robot.delivery import COFFEE, COURIER

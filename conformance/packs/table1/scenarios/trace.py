@@ -6,8 +6,7 @@ from typing import Final
 
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive_rules import outcomes
-from conformance.packs.table1.robot.drive_trace import Trace, Turn
-from conformance.packs.table1.robot.windows import LONGEST_SAMPLE_S
+from conformance.packs.table1.robot.drive_trace import LONGEST_SAMPLE_S, Trace, Turn
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.motion.trace import Drive
 from conformance.scenarios.rule import Outcome, Rule, rule

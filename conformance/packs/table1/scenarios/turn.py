@@ -9,14 +9,19 @@ from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
-from conformance.packs.table1.robot.abilities import ABOUT, AHEAD
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, JUDGED, LINEAR_PART, Turn, certain_s
-from conformance.packs.table1.robot.goals import make_room
+from conformance.packs.table1.robot.goal import make_room
 from conformance.packs.table1.robot.motion_map import COMMANDS, By, speeds_of, way_of
-from conformance.packs.table1.robot.no_commands import no_commands, refuse_goal
-from conformance.packs.table1.robot.refused_requests import Refused, RefusedRequests, is_refused, send_known
-from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
+from conformance.packs.table1.robot.refused_requests import (
+    Refused,
+    RefusedRequests,
+    is_refused,
+    no_commands,
+    refuse_goal,
+    send_known,
+)
+from conformance.packs.table1.robot.robot import ABOUT, AHEAD, STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
 from conformance.packs.table1.robot.velocity_range import (
     along_arc,

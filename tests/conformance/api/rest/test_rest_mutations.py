@@ -1,9 +1,8 @@
 import pytest
 
-from conformance.api.rest.json_mutations import KINDS, is_invalid, mutations, near_misses
+from conformance.api.rest.body_mutations import KINDS, is_invalid, mutations, near_misses, xml_mutations
 from conformance.api.rest.parameters import wrong_texts
 from conformance.api.rest.samples import sample
-from conformance.api.rest.xml_mutations import xml_mutations
 from conformance.contract.pack import Contract
 from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import operations_of

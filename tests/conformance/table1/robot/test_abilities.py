@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conformance.packs.table1.limits import DeclaredLimits
-from conformance.packs.table1.robot.abilities import drivable, handiest, turn_beside
+from conformance.packs.table1.robot.robot import drivable, handiest, turn_beside
 from conformance.packs.table1.statement import Motion
 
 LIMITS = DeclaredLimits(linear_m_s=0.7, angular_rad_s=2.5).resolve()

@@ -5,8 +5,16 @@ import math
 import pytest
 from toy_messages import exchange
 
-from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
-from conformance.packs.table1.robot.state_over_soap import StateRead, best_of, contradiction, stamp_fault, usable
+from conformance.packs.table1.robot.state_read import (
+    Slack,
+    StateRead,
+    best_of,
+    contradiction,
+    disagreement,
+    stamp_fault,
+    unstamped,
+    usable,
+)
 
 _SLACK = Slack(0.02, 0.05)
 

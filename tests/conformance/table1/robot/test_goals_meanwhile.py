@@ -3,7 +3,7 @@
 from toy_body import interface_of
 from toy_messages import odometry
 
-from conformance.packs.table1.robot.goals import meanwhile
+from conformance.packs.table1.robot.goal import meanwhile
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, Robot
 
 

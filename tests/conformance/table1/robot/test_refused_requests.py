@@ -8,12 +8,11 @@ from driven_device import SimulatedClock
 from toy_body import interface_of
 
 from conformance.api.soap.callable_services import SoapServices
-from conformance.packs.table1.robot.no_commands import no_commands
-from conformance.packs.table1.robot.refused_requests import RefusedRequests, is_refused
+from conformance.packs.table1.robot.refused_requests import RefusedRequests, is_refused, no_commands
 from conformance.packs.table1.robot.robot import GOAL_PATH, JSON_BODY, VELOCITY, Robot
-from conformance.packs.table1.robot.walk import Walk
 from conformance.packs.table1.rules.strict_input import test_refused_state as rules
 from conformance.packs.table1.scenarios.refused_again import RefusedAgain, refused_again
+from conformance.packs.table1.scenarios.walks import Walk
 from conformance.transport.exchange import SAFE_METHODS, Exchange, Request, Response
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Case

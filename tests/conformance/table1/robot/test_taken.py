@@ -11,7 +11,7 @@ from toy_messages import header, odometry
 
 from conformance.packs.table1.robot.message_shapes import body_of
 from conformance.packs.table1.robot.robot import GOAL_PATH, STILL, VELOCITY, Robot, Velocity
-from conformance.packs.table1.robot.taken import goal_has_effect, velocity_has_effect
+from conformance.packs.table1.scenarios.not_acceptable import goal_has_effect, velocity_has_effect
 
 _SETTLE_S, _HOLD_S = 0.2, 0.25
 _WANTED = Velocity(linear_x=0.3)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits, Limits, Noise
-from conformance.packs.table1.robot import windows
+from conformance.packs.table1.robot import drive_trace
 from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import Pose, wrapped
 from conformance.packs.table1.robot.path import way_and_turn
@@ -54,7 +54,7 @@ def watched(true: list[Velocity], hz: float, seed: int | None = None) -> list[Tu
 
 
 def shown(turns: list[Turn], wanted: Velocity, limits: Limits = _LIMITS) -> bool | None:
-    return windows.is_shown(limits, turns, wanted, count=_ENOUGH)
+    return drive_trace.is_shown(limits, turns, wanted, count=_ENOUGH)
 
 
 @given(rates, seeds)
@@ -73,22 +73,22 @@ def test_one_sample_that_is_out_fails_nobody(hz, out, back):
     stamp = turns[-back].odometry.stamp
     bad = Velocity(linear_x=out, angular_z=out)
     seen = [turn(one.at, stamp, bad) if one.odometry.stamp == stamp else one for one in turns]
-    assert windows.is_shown(_LIMITS, seen, _FAST)
-    assert windows.verdict(_LIMITS, seen, _FAST)
+    assert drive_trace.is_shown(_LIMITS, seen, _FAST)
+    assert drive_trace.verdict(_LIMITS, seen, _FAST)
 
 
 @pytest.mark.parametrize("hz", [5, 50])
 def test_one_sample_that_fits_saves_nobody_from_the_median(hz):
     turns = watched([STILL] * 100, hz)
     last = turns[-1]
-    assert windows.is_shown(_LIMITS, [*turns, turn(last.at + 0.02, last.odometry.stamp + 1, _FAST)], _FAST) is False
+    assert drive_trace.is_shown(_LIMITS, [*turns, turn(last.at + 0.02, last.odometry.stamp + 1, _FAST)], _FAST) is False
 
 
 def test_samples_are_told_apart_by_their_stamps():
     turns = watched([_FAST] * 50, 10)
-    assert [one.odometry.stamp for one in windows.newest(turns)] == pytest.approx([0.7, 0.8, 0.9])
-    assert windows.newest(turns)[-1] is turns[-1]
-    assert len(windows.newest(turns, 99)) == 10
+    assert [one.odometry.stamp for one in drive_trace.newest(turns)] == pytest.approx([0.7, 0.8, 0.9])
+    assert drive_trace.newest(turns)[-1] is turns[-1]
+    assert len(drive_trace.newest(turns, 99)) == 10
 
 
 @pytest.mark.parametrize("readable", [True, False])
@@ -96,15 +96,15 @@ def test_without_stamps_that_advance_samples_are_told_apart_by_time(readable):
     turns = [turn(0.1 * index, 7.0, _FAST) for index in range(20)]
     if not readable:
         turns = [Turn(None, one.at, one.velocity, _EXCHANGE, None, _EXCHANGE) for one in turns]
-    assert len(windows.newest(turns, 99)) == 7
+    assert len(drive_trace.newest(turns, 99)) == 7
 
 
 def test_too_few_samples_say_nothing_but_one_that_fits_does():
     turns = watched([_FAST] * 9, 5)
-    assert windows.is_shown(_LIMITS, turns, STILL) is None
-    assert windows.verdict(_LIMITS, turns, STILL) is None
-    assert windows.verdict(_LIMITS, turns, _FAST) is True
-    assert windows.verdict(_LIMITS, [turn(0.0, 0.0, None)], _FAST) is None
+    assert drive_trace.is_shown(_LIMITS, turns, STILL) is None
+    assert drive_trace.verdict(_LIMITS, turns, STILL) is None
+    assert drive_trace.verdict(_LIMITS, turns, _FAST) is True
+    assert drive_trace.verdict(_LIMITS, [turn(0.0, 0.0, None)], _FAST) is None
 
 
 def way(factor: float, seed: int, *, jump: int | None = None, hz: float = 10) -> set[str]:

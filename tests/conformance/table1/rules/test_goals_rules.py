@@ -19,10 +19,7 @@ from conformance.packs.table1.robot.goal_trace import (
     SpecialGoal,
 )
 from conformance.packs.table1.robot.robot import GOAL_PATH
-from conformance.packs.table1.rules.rest_resources import test_goal_drives as drives
-from conformance.packs.table1.rules.rest_resources import test_goal_life as life
-from conformance.packs.table1.rules.rest_resources import test_goal_walk as walk
-from conformance.packs.table1.rules.rest_resources import test_special_goals as ids
+from conformance.packs.table1.rules.rest_resources import test_goals as rules
 from conformance.packs.table1.rules.strict_input import test_refused_state as refused
 from conformance.packs.table1.scenarios.refused_again import DuringGoal, RefusedAgain
 from conformance.packs.table1.statement import Statement
@@ -45,9 +42,9 @@ def _holds(rule, trace):
 )
 def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
     put = (SpecialGoal("a quaternion of length 2", exchange(status)),)
-    assert _holds(ids.goal_quaternion, RefusedGoals(not_unit=put)) == [refused]
-    assert _holds(ids.goal_frame, RefusedGoals(unknown_frames=put)) == [refused]
-    assert _holds(ids.goal_quaternion_taken, RefusedGoals(unit=put)) == [accepted]
+    assert _holds(rules.goal_quaternion, RefusedGoals(not_unit=put)) == [refused]
+    assert _holds(rules.goal_frame, RefusedGoals(unknown_frames=put)) == [refused]
+    assert _holds(rules.goal_quaternion_taken, RefusedGoals(unit=put)) == [accepted]
 
 
 @pytest.mark.parametrize(
@@ -61,7 +58,7 @@ def test_a_special_goal_is_refused_or_accepted(status, refused, accepted):
 )
 def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observed):
     far = FarGoal(exchange(status), None if read is None else exchange(read), 60.0)
-    (case,) = ids.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
+    (case,) = rules.goal_unreachable.outcomes(RefusedGoals(far=(far,)), {}.__getitem__)
     assert (case.holds, case.observed) == (holds, observed)
 
 
@@ -71,7 +68,7 @@ def test_a_goal_outside_every_map_is_refused_or_ends(status, read, holds, observ
 )
 def test_a_goal_is_put_back_without_effect(status, differs, holds):
     put = Put(exchange(status), {}, None, exchange(200), differs, ended=False)
-    assert _holds(life.goal_put_back, GoalLife(put_back=(put,))) == [holds]
+    assert _holds(rules.goal_put_back, GoalLife(put_back=(put,))) == [holds]
 
 
 @pytest.mark.parametrize(
@@ -89,13 +86,13 @@ def test_the_robot_fills_in_its_present_time(at_s, took_s, holds):
     shown = goal("of its own", at_s=99.0, shown_s=at_s)
     trace = GoalLife(second=Put(exchange(201), {}, shown, exchange(), "", ended=False))
     trace = replace(trace, now_s=None if at_s is None else 100.0, took_s=took_s)
-    assert [one.holds for one in life.goal_fills_in.outcomes(trace, _RUN.__getitem__)] == holds
+    assert [one.holds for one in rules.goal_fills_in.outcomes(trace, _RUN.__getitem__)] == holds
 
 
 @pytest.mark.parametrize(("status", "holds"), [(204, True), (409, True), (423, False)])
 def test_a_linear_velocity_is_driven_or_refused_while_a_goal_is_active(status, holds):
     trace = GoalLife(linear=exchange(status))
-    assert [one.holds for one in life.velocity_goal.outcomes(trace, _RUN.__getitem__)] == [holds]
+    assert [one.holds for one in rules.velocity_goal.outcomes(trace, _RUN.__getitem__)] == [holds]
 
 
 @pytest.mark.parametrize(
@@ -115,16 +112,22 @@ def test_a_linear_velocity_is_driven_or_refused_while_a_goal_is_active(status, h
 )
 def test_a_step_of_a_walk_is_judged_by_the_rule_of_its_kind(kind, status, differs, ended, holds):
     trace = (GoalStep(kind, exchange(status), differs, ended),)
-    assert _holds(getattr(walk, kind.replace("-", "_")), trace) == [holds]
-    assert not _holds(walk.goal_none, trace)
+    assert _holds(getattr(rules, f"{kind.replace('-', '_')}_in_walks"), trace) == [holds]
+    assert not _holds(rules.goal_none_in_walks, trace)
 
 
 def test_a_goal_is_accepted_and_shown_under_its_id_unless_it_has_ended():
     def put(status, differs="", *, ended=False):
         return Put(exchange(status), {"goal_id": {"id": "a"}}, None, exchange(200), differs, ended)
 
-    assert _holds(ids.goal_id, (put(201), put(400), put(202, "goal_id.id b for a"))) == [True, False, True, True, False]
-    assert _holds(ids.goal_preempt, (put(201, "status 404", ended=True), put(422), put(201))) == [True]
+    assert _holds(rules.special_goal_id, (put(201), put(400), put(202, "goal_id.id b for a"))) == [
+        True,
+        False,
+        True,
+        True,
+        False,
+    ]
+    assert _holds(rules.special_goal_preempt, (put(201, "status 404", ended=True), put(422), put(201))) == [True]
 
 
 @pytest.mark.parametrize(
@@ -142,15 +145,15 @@ def test_a_goal_is_reached_within_its_tolerances(left_m, off_rad, reached_rad, w
         exchange(201), Pose(1.0, 0.0, 0.0), way_m=way_m, has_to_m=0.15, left_m=left_m, reached_m=0.27, off_rad=off_rad
     )
     trace = replace(trace, reached_rad=reached_rad, read=exchange(404), ended=True)
-    assert _holds(drives.goal_drives, trace) == [holds]
-    assert _holds(drives.goal_drives, replace(trace, undecided=True)) == []
+    assert _holds(rules.goal_drives, trace) == [holds]
+    assert _holds(rules.goal_drives, replace(trace, undecided=True)) == []
 
 
 @pytest.mark.parametrize(("off_rad", "holds"), [(0.2, True), (2.0, False)])
 def test_a_goal_where_the_robot_is_turns_it(off_rad, holds):
     trace = GoalReached(exchange(201), Pose(1.0, 0.0, 0.0), way_m=1.0, has_to_m=0.2, reached_m=0.3, reached_rad=0.3)
     trace = replace(trace, read=exchange(404), ended=True, turned_off=(exchange(404), off_rad))
-    assert _holds(drives.goal_drives, trace) == [True, holds]
+    assert _holds(rules.goal_drives, trace) == [True, holds]
 
 
 @pytest.mark.parametrize(
@@ -193,5 +196,5 @@ def test_another_clients_goal_after_the_own_one_is_no_fault(left_m, drives_judge
         exchange(202), Pose(1.0, 0.0, 0.0), way_m=1.0, has_to_m=0.2, left_m=left_m, reached_m=0.3, read=exchange(200)
     )
     trace = replace(trace, other=True, undecided=not trace.is_near)
-    assert _holds(drives.goal_drives, trace) == drives_judged
-    assert _holds(drives.goal_ended, trace) == _holds(drives.goal_outcome, trace) == []
+    assert _holds(rules.goal_drives, trace) == drives_judged
+    assert _holds(rules.goal_ended, trace) == _holds(rules.goal_outcome_when_reached, trace) == []

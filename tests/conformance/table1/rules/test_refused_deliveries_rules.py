@@ -6,9 +6,9 @@ import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.rules.rest_delivery.test_delivery_list import Listed
-from conformance.packs.table1.rules.strict_input import test_refused_deliveries as rules
-from conformance.packs.table1.scenarios.counted_deliveries import NO_CREDENTIALS, CountedDeliveries, Rejected
+from conformance.packs.table1.rules.rest_delivery.test_delivery import Listed
+from conformance.packs.table1.rules.strict_input import test_refused_state as rules
+from conformance.packs.table1.scenarios.deliveries import NO_CREDENTIALS, CountedDeliveries, Rejected
 
 _SENT = [Delivery(3, *(float(number),) * 6) for number in range(60)]
 

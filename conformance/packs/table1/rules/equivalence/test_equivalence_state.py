@@ -1,29 +1,45 @@
-"""REST and SOAP must show the same state."""
+"""REST and SOAP must show the same state, also while the robot moves and when it has come to rest."""
 
 import itertools
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from functools import partial
+from operator import attrgetter
 from typing import Any, Final
 
 import pytest
 
 from conformance.api.rest.effects import steady
 from conformance.api.soap.service import SoapService
+from conformance.documents.json_shape import Shape
 from conformance.documents.representation import flattened, projected
-from conformance.packs.table1.checkers.single_readings import BesideOdometry
-from conformance.packs.table1.robot.agreement import Slack, disagreement, unstamped
+from conformance.packs.table1.checkers.single_readings import BesideOdometry, Place
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TWIST
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
-from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Robot, Velocity
+from conformance.packs.table1.robot.robot import POSE, SENSORS, SERVICES, STILL, Odometry, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask, outgoing, request
-from conformance.packs.table1.robot.state_over_soap import STATES, compare, value_in
-from conformance.scenarios.rule import record
+from conformance.packs.table1.robot.state_read import (
+    STATES,
+    Slack,
+    StateRead,
+    compare,
+    disagreement,
+    unstamped,
+    value_in,
+)
+from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
+from conformance.packs.table1.scenarios.trace import Driven
+from conformance.packs.table1.scenarios.turn import turn
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.rule import Outcome, Rule, record, rule
+from conformance.scenarios.scenario import Scenario
 from conformance.transport.exchange import Exchange
 from conformance.transport.parallel import MOST_CLIENTS, is_busy, send_together
 from conformance.verdict.effort import Effort
 from conformance.verdict.evidence import Judge
+from conformance.verdict.run import Run
 
 pytestmark = pytest.mark.needs("rest", "subscribers")
 _SAME: Final = Slack(0.0, 0.0)
@@ -63,12 +79,12 @@ def _event(robot: Robot, turn: int) -> None:
 @pytest.mark.requirement("equivalence/pose", "equivalence/velocity")
 def test_pose_and_velocity(robot: Robot, subscribers: SoapService, judge: Judge, effort: Effort) -> None:
     """Compare pose and velocity over REST and SOAP, whatever the robot is doing."""
-    for turn in range(effort.cases(_POSES)):
-        for name in STATES if turn < effort.cases(50) else ("pose",):
+    for number in range(effort.cases(_POSES)):
+        for name in STATES if number < effort.cases(50) else ("pose",):
             if (
                 evidence := judge.of(f"equivalence/{name}")
             ) is None or not evidence.findings:  # a failure costs three tries each time
-                found = compare(robot, subscribers, name, first=partial(_event, robot, turn))
+                found = compare(robot, subscribers, name, first=partial(_event, robot, number))
                 outcomes = (case for read in found for case in read.cases)
                 record(judge, f"equivalence/{name}", outcomes)
 
@@ -148,10 +164,10 @@ def test_single_velocities(robot: Robot, subscribers: SoapService, judge: Judge,
 @pytest.mark.requirement("equivalence/sensors", "equivalence/services")
 def test_lists(robot: Robot, subscribers: SoapService, effort: Effort) -> None:
     """Read the lists over REST, SOAP and REST; a checker compares their entries, in any order."""
-    for turn in range(effort.cases(50)):
+    for number in range(effort.cases(50)):
         for path, operation in ((SENSORS, "GetSensors"), (SERVICES, "GetNavigationServices")):
             robot.get(path)
-            _event(robot, turn)
+            _event(robot, number)
             ask(subscribers, operation)
             robot.get(path)
 
@@ -220,3 +236,52 @@ def _compare_plans(
         found=problem,
         cause=problem.split(" is ")[0].split("[")[0],
     )
+
+
+def _same(name: str, scenario: Scenario) -> Rule:
+    """Return a rule that judges whether both interfaces show the same state."""
+
+    def judge(trace: tuple[StateRead, ...]) -> Iterator[Outcome]:
+        return (case for read in trace if read.name == name for case in read.cases)
+
+    return rule(f"equivalence/{name}", on=(scenario,))(judge)
+
+
+pose = _same("pose", interfaces_in_motion)
+velocity = _same("velocity", interfaces_in_motion)
+goal = _same("goal", goals_over_soap)
+
+
+def _beside(operation: str, shape: Shape, over_soap: Callable[[Any], Any], of: Callable[[Odometry], Any]) -> Rule:
+    """Return a rule that compares a state over SOAP with the odometry around it, at every heading.
+
+    Args:
+        operation: the operation that returns the state.
+        shape: its shape.
+        over_soap: returns the value to compare.
+        of: returns that of an odometry.
+    """
+
+    def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
+        beside = BesideOdometry[Any](said_of(run).limits)
+        reads = deque(one for one in trace.over_soap if operation.encode() in one.request.body)
+        for odometry in trace.drive.odometry:
+            while reads and reads[0].response.received_s < odometry.received:
+                exchange = reads.popleft()
+                value, problem = value_in(exchange, shape)
+                # A value with a wrong shape is judged where whole states are compared.
+                if not problem and not shape.problem(value):
+                    beside.reading(over_soap(value), exchange, exchange.response.received_s)
+            yield from beside.odometry(odometry.stamp, of(odometry), odometry.received)
+
+    return rule(f"equivalence/{operation.removeprefix('Get').lower()}", on=(turn,))(judge)
+
+
+pose_turning = _beside(
+    "GetPose",
+    ODOMETRY,
+    lambda value: Place.of(pose_of(value["pose"]["pose"])),
+    lambda odometry: Place.of(odometry.pose),
+)
+twist_turning = _beside("GetPose", ODOMETRY, lambda value: Velocity.of(value["twist"]["twist"]), attrgetter("velocity"))
+velocity_turning = _beside("GetVelocity", TWIST, Velocity.of, attrgetter("velocity"))

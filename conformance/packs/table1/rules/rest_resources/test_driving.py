@@ -11,7 +11,7 @@ from conformance.packs.table1.robot.motion_map import velocity_of
 from conformance.packs.table1.robot.robot import STILL, is_near
 from conformance.packs.table1.scenarios.trace import Driven, rule_on
 from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
-from conformance.packs.table1.scenarios.velocity_walk import velocity_walk
+from conformance.packs.table1.scenarios.walks import velocity_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import NotClaimed, Outcome, rule
 from conformance.verdict.evidence import Case

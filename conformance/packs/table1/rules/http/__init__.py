@@ -1,1 +1,0 @@
-"""Checks of the conformance class http that know the paper's robot."""
