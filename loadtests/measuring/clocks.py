@@ -19,7 +19,7 @@ import gevent
 import msgspec
 from jsonpath import JSONPointer
 
-from loadtests.statistics.streams import Offset
+from loadtests.statistics.recorder import Offset
 
 #: Unix time from these numbers on is in nanoseconds, microseconds and milliseconds: as seconds it would lie after 5000.
 _UNITS = ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3))

@@ -28,9 +28,8 @@ from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import stage_figures
 from loadtests.statistics.overload import overload
-from loadtests.statistics.recorder import Recorder
+from loadtests.statistics.recorder import SHARED, Recorder
 from loadtests.statistics.rounds import between_runs
-from loadtests.statistics.streams import SHARED
 
 CLIENT_WORDS = {
     "wire": "our own HTTP/1.1 client on gevent and llhttp, the same for both interfaces; requests are built "

@@ -10,7 +10,7 @@ from array import array
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -23,6 +23,26 @@ _BUFFERED = 4096 * _FIELDS
 #: How many operations a plan may have.
 MOST_OPERATIONS = 1024
 _MAX_KINDS = 100  # error messages kept apart; further ones are counted under their kind's first
+
+
+class Offset(NamedTuple):
+    """Bounds on the robot's clock less ours, in s."""
+
+    low_s: float
+    high_s: float
+
+    @property
+    def middle_s(self) -> float:
+        """Return the middle."""
+        return (self.low_s + self.high_s) / 2
+
+    @property
+    def error_s(self) -> float:
+        """Return by how much the middle may be wrong."""
+        return (self.high_s - self.low_s) / 2
+
+
+SHARED = Offset(0.0, 0.0)
 
 
 @dataclass(slots=True)

@@ -1,36 +1,17 @@
 """From messages to figures: the streams of latency.json."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from loadtests.statistics.figures import rounded
 from loadtests.statistics.histogram import SHARES
 from loadtests.statistics.intervals import samples_for_point
+from loadtests.statistics.recorder import Offset
 
 _GAP = 2.0
 _ENOUGH = 3
-
-
-class Offset(NamedTuple):
-    """Bounds on the robot's clock less ours, in s."""
-
-    low_s: float
-    high_s: float
-
-    @property
-    def middle_s(self) -> float:
-        """Return the middle."""
-        return (self.low_s + self.high_s) / 2
-
-    @property
-    def error_s(self) -> float:
-        """Return by how much the middle may be wrong."""
-        return (self.high_s - self.low_s) / 2
-
-
-SHARED = Offset(0.0, 0.0)
 
 
 def stream_figures(
