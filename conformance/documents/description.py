@@ -173,8 +173,8 @@ def _parse(source: str, load: Load) -> Schema:
         document = None
     if not isinstance(document, dict):
         markup = octets.lstrip(_BLANK).startswith(b"<")
-        what = f", but {_markup(octets)}" if markup else ""
-        raise DescriptionError(f"{source} is no description: it holds no object{what}")
+        what = _markup(octets) if markup else "a value that is no object"
+        raise DescriptionError(f"{source} is no OpenAPI description, but {what}")
     if excess := crowd_in(document) or long_text_in(document):
         raise DescriptionError(f"{source} cannot be read: {excess}")
     return document

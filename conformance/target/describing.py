@@ -133,8 +133,8 @@ def fetch_description(
             return replace(found, elsewhere=(remark,))
         if "; are credentials missing" in str(error):
             raise
-        tried = f"; neither are {', '.join(usual[:2])} and {len(usual) - 2} other usual places" if usual else ""
-        raise DescriptionError(f"{error}{tried}. Name the URL or file of its OpenAPI description") from error
+        tried = f"{', '.join(usual[:2])} and {len(usual) - 2} other usual places have none either. " if usual else ""
+        raise DescriptionError(f"{error}. {tried}Name the URL or file of its OpenAPI description") from error
 
 
 def _check_server(source: str, base: str, endpoints: Endpoints, connection: Connection) -> None:

@@ -155,7 +155,7 @@ def _no_file(target: str) -> str:
     if found:
         return f"{target}: {scheme}:// is not read; give the address as http:// or https://"
     if _ADDRESS.fullmatch(target):
-        return f"{target} is no file, and no address without http:// or https:// before it: http://{target}"
+        return f"there is no file {target}; an address needs http:// or https:// before it: http://{target}"
     folder = Path(target).parent
     names = (str(path) for path in itertools.islice(folder.glob("*"), _MOST_NAMES) if path.is_file())
     near = difflib.get_close_matches(str(folder / Path(target).name), names, 1)

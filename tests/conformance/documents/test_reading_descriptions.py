@@ -65,13 +65,13 @@ def test_dates_of_yaml_are_texts():
     ("text", "why"),
     [
         ("{", "cannot be read"),
-        ("- a", "holds no object"),
+        ("- a", "a value that is no object"),
         ("a: [", "cannot be read"),
         ("? {a: b}\n: 1", "cannot be read"),
         ('{"paths": {}}', "neither 'openapi"),
         ('{"openapi": "3.1.0"}', "has no 'paths'"),
         ('{"swagger": "2.0", "paths": {"/a": {"get": 1}}}', "no usable Swagger"),
-        ("<html>", "holds no object"),
+        ("<html>", "no OpenAPI description, but HTML"),
     ],
 )
 def test_what_is_no_description_says_why(text, why):

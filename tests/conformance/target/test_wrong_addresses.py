@@ -66,10 +66,10 @@ def told(tmp_path, *words: str) -> tuple[int, str]:
 @pytest.mark.parametrize(
     ("kind", "path", "code", "said"),
     [
-        ("page", "/", 2, "an HTML page with the title 'Robot & Console'; neither are /openapi.json, /openapi.yaml"),
+        ("page", "/", 2, "an HTML page with the title 'Robot & Console'. /openapi.json, /openapi.yaml and "),
         ("page", "/a/b/c.json", 2, "title 'Robot & Console'. Name the URL or file of its OpenAPI description"),
         ("guarded", "/openapi.json", 2, "responded 401; are credentials missing, as by --token-file or --basic-file?"),
-        ("empty", "/", 2, "responded 404; neither are /openapi.json"),
+        ("empty", "/", 2, "responded 404. /openapi.json"),
         ("proxy", "/openapi.json", 2, "responded 502: a proxy answers, and the device behind it does not"),
     ],
 )
@@ -119,7 +119,7 @@ def test_a_proxy_in_the_environment_is_named_where_there_is_no_connection(tmp_pa
 @pytest.mark.parametrize(
     ("target", "said"),
     [
-        ("robot:8000/openapi.json", "no address without http:// or https:// before it: http://robot:8000/openapi.json"),
+        ("robot:8000/openapi.json", "an address needs http:// or https:// before it: http://robot:8000/openapi.json"),
         ("127.0.0.1:8000", "http://127.0.0.1:8000"),
         ("ftp://robot/x", "ftp:// is not read; give the address as http:// or https://"),
         ("robt.toml", "there is no file robt.toml; did you mean robot.toml?"),
