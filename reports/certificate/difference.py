@@ -4,7 +4,7 @@ A failure is a requirement that was judged and not met, whatever its level, and 
 So a change of the level or of the baseline does not count as a change of the robot.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -94,7 +94,7 @@ class Difference:
     Attributes:
         changes: the changed requirements, the worst kind of change first.
         circumstances: settings in which the two runs differ: name, value before, value now.
-        still_failing: number of requirements that failed before and fail now.
+        still_failing: number of requirements that failed before and fail now, without those beside the verdict.
     """
 
     old: Mapping[str, Any]
@@ -117,12 +117,12 @@ class Difference:
 
     @property
     def origin(self) -> str:
-        """Return in a sentence what changed between the runs: suite, statement, motion map, description or device."""
+        """Return in a sentence what changed between the runs: what judges, what was called, or the device."""
         changed = list(_changes(self.old, self.new))
         if not changed:
             return (
-                "Suite, statement, motion map and description are the same in both runs. A changed verdict comes from "
-                "the device, or from a fault that does not show in every run."
+                "Suite, statement, motion map, description, effort and the operations called are the same in both "
+                "runs. A changed verdict comes from the device, or from a fault that does not show in every run."
             )
         device = [one for one in changed if one.startswith("the device")]
         others = [one for one in changed if one not in device]
@@ -150,7 +150,8 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     ]
     order = list(Kind)
     changes.sort(key=lambda change: (order.index(change.kind), change.id))
-    still = sum(_has_failed(item) and id_ in now and _has_failed(now[id_]) for id_, item in before.items())
+    judged = {id_: item for id_, item in now.items() if not item.get("beside")}
+    still = sum(_has_failed(item) and id_ in judged and _has_failed(judged[id_]) for id_, item in before.items())
     return Difference(old, new, tuple(changes), tuple(_circumstances(old, new)), still)
 
 
@@ -239,9 +240,22 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
         if before != now and known:
             versions = [_at(item, version) for item in (old, new)] if version else []
             yield name + (f" ({' → '.join(versions)})" if len(set(versions)) > 1 else "")
+    called = [{each["operation"] for each in _operations(item) if each["called"]} for item in (old, new)]
+    if called[0] != called[1]:
+        yield f"the operations called ({len(called[0])} → {len(called[1])})"
+    for name, path in (("the effort", "effort"), ("the permission to move", "statement.motion_allowed")):
+        before, now = _at(old, path), _at(new, path)
+        if before != now:
+            yield f"{name} ({before} → {now})"
     robots = [_at(item, "statement.robot.version") for item in (old, new)]
     if robots[0] != robots[1]:
         yield f"the device ({' → '.join(robots)})"
+
+
+def _operations(result: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
+    """Return the operations of a described device, with whether each was called."""
+    found: Iterable[Mapping[str, Any]] = result.get("api", {}).get("operations", ())
+    return found
 
 
 def _circumstances(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

@@ -147,7 +147,7 @@ def test_what_is_beside_the_verdict_is_shown_and_no_regression(pair):
     assert not difference(old, {**new, "web_server": lost}).regressions
 
 
-SAME = "Suite, statement, motion map and description are the same in both runs."
+SAME = "Suite, statement, motion map, description, effort and the operations called are the same in both runs."
 
 
 @pytest.mark.parametrize(
@@ -160,6 +160,11 @@ SAME = "Suite, statement, motion map and description are the same in both runs."
         ),
         ({"digests": {"statement": "sha256:y", "map": "sha256:1"}}, "Changed between the runs: the statement. "),
         ({"digests": {"statement": "sha256:x", "map": "sha256:2"}}, "Changed between the runs: the motion map. "),
+        ({"effort": "deep"}, "Changed between the runs: the effort ("),
+        (
+            {"api": {"operations": [{"operation": "GET /x", "called": True}]}},
+            "Changed between the runs: the operations",
+        ),
     ],
 )
 def test_it_says_what_changed_the_suite_the_statement_the_map_or_the_device(pair, changes, told):
