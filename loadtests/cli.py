@@ -23,7 +23,6 @@ from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
 from conformance.papers_robot.statement import RobotStatement, load_robot_statement
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.load import LEVELS_INSTEAD
 from loadtests.clients.failures import CallError
 from loadtests.clients.payloads import CLIENTS, INTERFACES, MOVES
 from loadtests.described.device import DESCRIBED_ONLY, Named
@@ -60,7 +59,6 @@ Compare it with another device, or with another version:
   roaas load http://robot:8000/openapi.json --operation 'GET /state' --against http://old:8000"""
 # How often signals are looked for while a load test runs, s.
 _LOOKS_S = 0.2
-_DESCRIPTIONS = ("publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint")
 
 
 def _run_load(settings: Settings, written: Path, summary: IO[str], stopping: Iterable[Stopping]) -> CommandResult:
@@ -115,19 +113,12 @@ def _other_robot(given: dict[str, Any], own: RobotStatement) -> RobotStatement |
         TomlFileError: the other robot's statement cannot be used.
     """
     where = given.pop("against")
-    described = {name: given.pop(f"against_{name}") for name in _DESCRIPTIONS}
-    if where is not None and "://" not in where:
-        return load_robot_statement(Path(where))
-    if where is None and not any(described.values()):
+    if where is None:
         return None
+    if "://" not in where:
+        return load_robot_statement(Path(where))
     shared = {name: given[name] or getattr(own.endpoints, name) for name in ("token_file", "ca_file", "timeout_s")}
-    return RobotStatement(endpoints=Endpoints(rest=where, **described, **shared))
-
-
-def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> None:
-    """Refuse --thresholds, and name its replacement."""
-    if file is not None:
-        raise click.UsageError(f"--thresholds {file}: thresholds are service levels now: {LEVELS_INSTEAD}")
+    return RobotStatement(endpoints=Endpoints(rest=where, **shared))
 
 
 @click.command(cls=ResultCommand, start=_START)
@@ -222,23 +213,12 @@ def _levels_instead(_: click.Context, __: click.Parameter, file: str | None) -> 
 @click.option("--stamp-field", metavar="POINTER", help="Place of the time in a message, such as /header/stamp.")
 @click.option("--clock-field", metavar="POINTER", help="Place of the robot's time in the polled response: /now.")
 @options_of(Group.OUTPUT)
-@click.option("--thresholds", hidden=True, expose_value=False, callback=_levels_instead)
 @options_of(Group.CREDENTIALS)
 @click.option("--token-file", metavar="FILE", help="File with the robot's bearer token.")
 @click.option("--ca-file", metavar="FILE", help="Certificate authorities to trust.")
 @credential_options
 @options_of(Group.COMPARED)
 @click.option("--against", metavar="URL|STATEMENT", help="Compare with another robot or version; the two take turns.")
-@options_of(Group.COMPARED, rare=True)
-@click.option("--against-publishers-wsdl", metavar="URL|FILE", help="WSDL of the other robot's publishers service.")
-@click.option("--against-subscribers-wsdl", metavar="URL|FILE", help="WSDL of its subscribers service.")
-@click.option(
-    "--against-publishers-endpoint", metavar="URL", help="Address of its publishers service, if not its WSDL's."
-)
-@click.option(
-    "--against-subscribers-endpoint", metavar="URL", help="Address of its subscribers service, if not its WSDL's."
-)
-@options_of(Group.COMPARED)
 @click.option(
     "--tolerance", callback=SHARE, default="5%", help="How much slower than the other, or the baseline, it may be."
 )

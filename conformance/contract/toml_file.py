@@ -111,9 +111,7 @@ def _wrong_keys(heading: str, value: dict[str, Any], kind: inspect.StructType) -
     known = {field.encode_name: field for field in kind.fields}
     unknown = sorted(set(value) - set(known))
     if unknown:
-        instead = [text for name, text in getattr(kind.cls, "INSTEAD", {}).items() if name in unknown]
-        hint = "; ".join(instead or [f"known are {', '.join(sorted(known))}"])
-        return f"{heading}unknown key {', '.join(map(repr, unknown))}; {hint}"
+        return f"{heading}unknown key {', '.join(map(repr, unknown))}; known are {', '.join(sorted(known))}"
     missing = [name for name, field in known.items() if field.required and name not in value]
     return f"{heading}{', '.join(map(repr, missing))} is missing" if missing else ""
 

@@ -1,6 +1,6 @@
 """The statement's tables on load tests: limits of a test, operations to measure, and service levels."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
@@ -8,8 +8,6 @@ from msgspec import Meta
 from conformance.contract.toml_file import Positive, Text
 
 _MOST_WEIGHT = 1000
-#: What to write in place of the thresholds of earlier versions.
-LEVELS_INSTEAD = "write into the statement, for instance, [slo.pose] and below it p99_ms = 5"
 
 
 class Pair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,8 +31,6 @@ class Load(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         operations: what to measure of a device with a description: weight by operation, as in `"GET /state" = 3`.
         pairs: operations to compare over REST and SOAP, by the name that the result has for them.
     """
-
-    INSTEAD: ClassVar[dict[str, str]] = {"thresholds": f"service levels replace them: {LEVELS_INSTEAD}"}
 
     max_rate: Positive | None = None
     max_duration_s: Positive | None = None

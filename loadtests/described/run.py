@@ -22,8 +22,6 @@ from loadtests.settings.settle import settle
 
 _PAPERS_ONLY = (
     "publishers_wsdl", "subscribers_wsdl", "publishers_endpoint", "subscribers_endpoint", "rosbridge",
-    "against_publishers_wsdl", "against_subscribers_wsdl",
-    "against_publishers_endpoint", "against_subscribers_endpoint",
 )  # fmt: skip
 _DESCRIPTIONS = (".json", ".yaml", ".yml", ".wsdl")
 

@@ -24,7 +24,6 @@ from loadtests.engine.watching import Progress, Watch, follow_parent, show_web_u
 from loadtests.measuring.distributed_executor import DistributedExecutor, Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.measuring.executor import REPORT_S, LocalExecutor, busiest
-from loadtests.measuring.pauses import after_pauses
 from loadtests.measuring.preflight import preflight, reach
 from loadtests.measuring.rising_load import RisingLoad
 from loadtests.measuring.robot_process import RobotProcess, start_anew
@@ -162,24 +161,9 @@ class Run:
             plan = self._repeat(plan, executor)
             if self._over:
                 return
-            if settings.scenario is None:
-                self._pause(plan)
             self.outcome.heard = hear(self.robots[0], settings, lambda: self._over, self.progress.say)
             if settings.steps.has_searches and not self._over:
                 self._load_more(plan, executor)
-
-    def _pause(self, plan: Plan) -> None:
-        """Measure requests after a pause."""
-        self.progress.say("measuring requests after a pause")
-        settings = self.settings
-        self.outcome.paused = after_pauses(
-            self.robots[0],
-            plan.series_names(),
-            settings.load.seed,
-            settings.load.duration_s,
-            settings.limits.max_rate,
-            lambda: self.outcome.interrupted,
-        )
 
     def _load_more(self, plan: Plan, executor: Executor) -> None:
         """Search the knee."""

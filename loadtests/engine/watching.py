@@ -38,7 +38,8 @@ def tell_plan(plan: Plan, pacing: str, tell: Callable[[str], None]) -> None:
         needed = samples_for_point(SHARES["p99"])
         if number < needed:
             longer_s = math.ceil(plan.load.duration_s * needed / number)
-            tell(f"p99 needs {needed:,} requests, and {name} gets {number:,}: --duration {longer_s} is long enough")
+            enough = f"stages of {longer_s} s in all are" if plan.load.stages else f"--duration {longer_s} is"
+            tell(f"p99 needs {needed:,} requests, and {name} gets {number:,}: {enough} long enough")
 
 
 def _fewest(plan: Plan) -> tuple[int, str] | None:
@@ -97,7 +98,7 @@ class Progress:
         self._silent, self._every_s = mode == "none", _SELDOM_S if mode == "auto" else _OFTEN_S
         self._renews = mode == "auto" and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
         self._open = False
-        self._due = 0.0
+        self._due = time.monotonic() + _OFTEN_S
         self._before = (0.0, 0)  # when the last line was written, and how many requests were answered by then
 
     def say(self, message: str) -> None:

@@ -13,7 +13,6 @@ from conformance.commandline.secrecy import SECRETS
 from loadtests.clients.payloads import CATALOGUE, LIBRARY
 from loadtests.measuring.executor import Member
 from loadtests.measuring.machine import Moment, conditions
-from loadtests.measuring.pauses import PAUSE_S, Paused
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import describe, same_machine
 from loadtests.result.files import FORMAT
@@ -24,7 +23,6 @@ from loadtests.statistics import counts, figures, modes, over_time, service_leve
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
 from loadtests.statistics.headline import Found, headline
-from loadtests.statistics.intervals import order_interval_ms
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import stage_figures
 from loadtests.statistics.overload import overload
@@ -164,9 +162,9 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     code = _code(outcome, aborted, Reasons(reasons, undecided), kept, compared)
     series = figures.series(measured, outcome.findings.sizes)
     for entry in series:
-        entry.after_pause = _after_pause(outcome.paused.get(entry.name))
         entry.modes = modes.modes(measured.total(entry.name, "duel").service)
     grown = over_time.add_growth(measured, series)
+    grown = [] if overloaded else grown  # its queue grows, and the headline says so
     found = Found(
         measured.plan,
         settings.limits.max_rate,
@@ -178,6 +176,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         undecided,
         kept,
         overloaded,
+        outcome.knee_searches,
         interrupted=outcome.interrupted and len(reasons) == 1 and bool(counted.answered),
     )
     document = {
@@ -221,22 +220,6 @@ def _why_undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     levels = [settings.slo.get(name) for name in settings.selection.operations]
     judged = all(level is not None and level.error_rate is not None for level in levels)
     return [] if judged else verdict.failures(counted)
-
-
-def _after_pause(paused: Paused | None) -> dict[str, Any] | None:
-    """Return the service times after a pause and without one, for latency.json; None if they were not measured."""
-    if paused is None:
-        return None
-    found: dict[str, Any] = {
-        "pause_s": PAUSE_S,
-        "spacing_s": figures.rounded(paused.spacing_s),
-        "failed": paused.failed,
-    }
-    for name, histogram in (("cold", paused.cold), ("warm", paused.warm)):
-        found[f"{name}_count"] = histogram.total
-        found[f"{name}_ms"] = figures.plain_quantiles(histogram)
-        found[f"{name}_ci95_ms"] = figures.rounded_interval(order_interval_ms(histogram, 0.5))
-    return found
 
 
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:

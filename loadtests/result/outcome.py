@@ -7,11 +7,10 @@ from conformance.commandline.endings import Started
 from loadtests.clients.robot import Robot
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.machine import Moment
-from loadtests.measuring.pauses import Paused
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import RobotProcess
 from loadtests.measuring.streams import Heard
-from loadtests.schedule.plan import Plan, SeriesName
+from loadtests.schedule.plan import Plan
 from loadtests.settings.settings import Settings
 
 
@@ -41,7 +40,6 @@ class Outcome:
         notes: worth knowing; invalid: reasons why the figures are worthless.
         interrupted: by Ctrl-C; dead_at: when the robot fell silent, in seconds from the plan's start.
         carried: each repeat's plan, and how many seconds of it were carried out.
-        paused: what requests cost after a pause and right behind one another, by series.
         before: the machine when the run began.
         robot_process: the process at the robot's address before the comparison, where that is known.
         cpu_share: the busiest worker's share of a core in the comparison.
@@ -59,7 +57,6 @@ class Outcome:
     dead_at: float | None = None
     executor: Executor | None = None
     carried: list[Carried] = field(default_factory=list)
-    paused: dict[SeriesName, Paused] = field(default_factory=dict)
     before: Moment = field(default_factory=Moment.now)
     robot_process: RobotProcess | None = None
     cpu_share: float | None = None

@@ -37,11 +37,10 @@ def summary(document: dict[str, Any]) -> str:
             f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
             f"{_ms(response['p99'])}"
         )
-    lines += _counts(document["counts"], document["plan"])
+    lines += _counts(document["counts"], document["plan"], in_stages=bool(document["stages"]))
     lines += _stages(document["stages"])
     lines += _medians(document)
     lines += _against(document.get("against"))
-    lines += _knees(document)
     lines += _streams(document["streams"])
     lines += [
         f"service level {entry['outcome']}: {entry['operation']} over {entry['interface']}, {entry['limit']} at most "
@@ -55,12 +54,12 @@ def summary(document: dict[str, Any]) -> str:
     return "\n".join(map(inert, lines)) + "\n"
 
 
-def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any]) -> list[str]:
+def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any], *, in_stages: bool) -> list[str]:
     """Return the numbers of requests by their outcome, as a table."""
     offered, achieved, seconds = counts["asked_rate"], counts["achieved_rate"] or 0.0, counts["seconds"]
     kinds = ", ".join(f"{number:,} {kind}" for kind, number in counts["failed"].items())
     asked = f"{offered:,.1f}/s for {seconds:.1f} s" if offered else "by users that wait"
-    if offered and plan["rate"] and offered < 0.99 * plan["rate"]:
+    if offered and plan["rate"] and not in_stages and offered < 0.99 * plan["rate"]:
         asked += f": nothing was due in the gaps between {plan['blocks']:,} blocks"
     late = f", {counts['waiting_at_end']:,} of them when the time was over" if counts["waiting_at_end"] else ""
     rows = [
@@ -110,21 +109,6 @@ def _medians(document: dict[str, Any]) -> list[str]:
         if entry["quantile"] == "p50" and entry["ratio"] is not None
     ]
     return soap + further
-
-
-def _knees(document: dict[str, Any]) -> list[str]:
-    """Return the rates at which the robot breaks down, by steps and by bisection."""
-    lines = []
-    for entry in document["knee_search"]:
-        if entry["rate"] is not None:
-            low, high = entry["interval"]
-            found = f"breaks down at {entry['rate']:.0f}/s ({low:.0f} to {high:.0f}, {entry['searches']} searches)"
-        elif entry["held_up_to"] is not None:
-            found = f"did not break down up to {entry['held_up_to']:.0f}/s"
-        else:
-            found = "no rate meets the criterion"
-        lines.append(f"{entry['interface']}: {found}")
-    return lines
 
 
 def _against(compared: dict[str, Any] | None) -> list[str]:

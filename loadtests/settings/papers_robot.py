@@ -57,8 +57,8 @@ def _shared_interfaces(other: Endpoints, interfaces: tuple[str, ...]) -> tuple[s
     shared = tuple(name for name in interfaces if there[name])
     if not shared:
         raise SettingsError(
-            f"--against names a robot without {' or '.join(interfaces)}: there is nothing to compare (name its SOAP "
-            "services with --against-publishers-wsdl and --against-subscribers-wsdl)"
+            f"--against names a robot without {' or '.join(interfaces)}: there is nothing to compare (a "
+            "statement names its SOAP services: --against other.toml)"
         )
     return shared
 

@@ -44,7 +44,6 @@ class Series(msgspec.Struct, kw_only=True):
     response_histogram: str
     failed_histogram: str | None
     failed_response_histogram: str | None
-    after_pause: dict[str, Any] | None = None
     modes: dict[str, Any] | None = None
     growth: dict[str, Any] | None = None
 

@@ -3,8 +3,9 @@
 Terminal, page and Markdown all show this sentence.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
@@ -39,6 +40,7 @@ class Found:
         undecided: why the run has nothing to compare; service levels are judged all the same.
         levels: outcomes of the service levels.
         overload: how the robot was overloaded, if it was.
+        knees: the `knee_search` of latency.json.
         interrupted: by Ctrl-C, and valid until then.
     """
 
@@ -52,23 +54,54 @@ class Found:
     undecided: Sequence[str] = field(default=())
     levels: Sequence[str] = ()
     overload: Overload | None = None
+    knees: Sequence[Mapping[str, Any]] = ()
     interrupted: bool = False
 
 
 def headline(found: Found) -> dict[str, str]:
     """Return the `headline` of latency.json: a few `words`, and a `sentence` that stands alone."""
+    words, sentence = _verdict(found)
+    if knees := list(_knees(found.knees)):
+        said = f"{'. '.join(knees)}."
+        if found.interrupted or found.worthless or found.overload is not None or found.undecided:
+            sentence = f"{sentence} {said}"
+        else:
+            words, sentence = words if found.levels else knees[0], f"{said} {sentence}"
+    return {"words": words, "sentence": sentence}
+
+
+def _verdict(found: Found) -> tuple[str, str]:
+    """Return words and sentence of a run without its search for a knee."""
     if found.interrupted:
-        return {"words": _INTERRUPTED, "sentence": f"{_INTERRUPTED}; until then: {_result_words(found)[1]}"}
+        return _INTERRUPTED, f"{_INTERRUPTED}; until then: {_result_words(found)[1]}"
     if found.worthless:
-        return {"words": _WORTHLESS, "sentence": f"{_WORTHLESS}, because {'; '.join(found.worthless)}."}
+        return _WORTHLESS, f"{_WORTHLESS}, because {'; '.join(found.worthless)}."
     judged = _levels(found.levels)
     if found.overload is not None:
-        sentence = found.overload.sentence()
-        return {"words": judged or _OVERLOADED, "sentence": f"{_OVERLOADED}: {sentence}.{_answered_text(found)}"}
+        return judged or _OVERLOADED, f"{_OVERLOADED}: {found.overload.sentence()}.{_answered_text(found)}"
     if found.undecided:
-        return {"words": judged or _UNDECIDED, "sentence": f"{_UNDECIDED}, because {'; '.join(found.undecided)}."}
+        return judged or _UNDECIDED, f"{_UNDECIDED}, because {'; '.join(found.undecided)}."
     words, sentence = _result_words(found)
-    return {"words": judged or words, "sentence": sentence + _two_modes(found.series)}
+    return judged or words, sentence + _two_modes(found.series)
+
+
+def _knees(searches: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield for each interface the rate at which the robot breaks down, as a sentence without its full stop."""
+    for knee in searches:
+        name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
+        if knee["rate"] is None:
+            held = knee["held_up_to"]
+            up_to = f"did not break down up to {held:,.0f} requests/s" if held else "met the criterion at no rate"
+            yield f"{name} {up_to}"
+            continue
+        low, high = knee["interval"]
+        first = knee["errors_from"]
+        yield (
+            f"{name} breaks down at {knee['rate']:,.0f} requests/s ({low:,.0f} to {high:,.0f} in {knee['searches']} "
+            f"search{'' if knee['searches'] == 1 else 'es'})"
+            + ("" if first is None else f"; requests failed from {first:,.0f} requests/s on")
+            + ("; the generator, not the robot, was the limit" if knee["limited_by"] == "generator" else "")
+        )
 
 
 def _answered_text(found: Found) -> str:
@@ -77,10 +110,9 @@ def _answered_text(found: Found) -> str:
     if not series:
         return ""
     entry = min(series, key=_rank)
-    return (
-        f" Half of the {entry.operation} requests took {_ms(entry.response_ms[DECIDING])} ms or longer from when they "
-        f"were due, and {_ms(entry.service_ms[DECIDING])} ms or longer from when they were sent."
-    )
+    due, sent = _ms(entry.response_ms[DECIDING]), _ms(entry.service_ms[DECIDING])
+    since_sent = "" if due == sent else f", and {sent} ms or longer from when they were sent"
+    return f" Half of the {entry.operation} requests took {due} ms or longer from when they were due{since_sent}."
 
 
 def _levels(outcomes: Sequence[str]) -> str | None:

@@ -129,8 +129,8 @@ def add_growth(measured: Measured, entries: Sequence[Series]) -> list[str]:
         if low > 0 or high < 0:
             said.append(
                 f"{entry.operation} over {entry.interface.upper()}: its median {'grew' if low > 0 else 'fell'} by "
-                f"{abs(found['over_run_ms']):.3g} ms over the run ({found['ms_per_hour']:.3g} ms per hour, 99 % "
-                f"interval {low:.3g} to {high:.3g}); a longer run shows whether it goes on"
+                f"{abs(found['over_run_ms']):,.1f} ms over the run ({found['ms_per_hour']:,.0f} ms per hour, 99 % "
+                f"interval {low:,.0f} to {high:,.0f}); a longer run shows whether it goes on"
             )
     return said
 

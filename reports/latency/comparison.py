@@ -298,14 +298,7 @@ def _remarks(
     before, after = (_failed_share(series) for series in (old_series, new_series))
     if after > before:
         yield f"More requests failed: {after:.2%} now, {before:.2%} before."
-    yield from _uncounted_notes(old_series, new_series)
     yield from _knees(old, new)
-
-
-def _uncounted_notes(old_series: AllSeries, new_series: AllSeries) -> Iterator[str]:
-    for word, series in (("old", old_series), ("new", new_series)):
-        if any(one.data["errors"] and "counted" not in one.data for one in series.values()):
-            yield f"The {word} result is of an earlier version: its times do not include failed requests."
 
 
 def _failed_share(series: AllSeries) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 from reports.latency import against
 from reports.latency.distributions import AllSeries
 from reports.latency.figures.timeline import Stall, stalls
-from reports.latency.numbers import interval, ms, rate, share
+from reports.latency.numbers import interval, ms, share
 from reports.pages.page import counted, opened
 
 _MANY_FAR = 0.01
@@ -51,18 +51,13 @@ def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
 
 
 def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
-    """Return further observations, a sentence each: stalls, knees, failed requests, and the run's own notes.
-
-    A knee is the highest request rate at which the robot still meets the latency criterion.
-    """
+    """Return further observations, a sentence each: stalls, failed requests, and the run's own notes."""
     return [
         *work(series),
-        *cold(series),
         *repeat_text(series),
         *_further(result),
         *_stall_text(result),
         *_two_modes(series),
-        *_knee_text(result),
         *_failure_text(result, series),
         *_note_text(result),
     ]
@@ -119,35 +114,15 @@ def _two_modes(series: AllSeries) -> Iterator[str]:
         yield f"Requests over five times the median: {', '.join(far)}."
 
 
-def _knee_text(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a sentence on the knee (highest sustainable rate) of each interface that was searched by bisection."""
-    for knee in result.get("knee_search", []):
-        name = "REST and SOAP at once" if knee["interface"] == "both" else knee["interface"].upper()
-        if knee["rate"] is None:
-            held = knee.get("held_up_to")
-            yield f"{name}: no knee up to {rate(held)} requests/s." if held else f"{name}: no knee was found."
-            continue
-        low, high = knee["interval"]
-        limit = " The generator, not the robot, was the limit." if knee.get("limited_by") == "generator" else ""
-        first = knee.get("errors_from")
-        failing = "" if first is None else f" Requests failed from {rate(first)} requests/s on."
-        yield (
-            f"{name}: the knee is at {rate(knee['rate'])} requests/s ({rate(low)} to {rate(high)}, "
-            f"{knee['searches']} searches).{failing}{limit}"
-        )
-
-
 def _failure_text(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
     errors = sum(one.data["errors"] for one in series.values())
     if not errors and not result.get("errors"):
         return
     answered = sum(one.data["count"] for one in series.values())
-    told = (
-        "each counts with at least the time until it was given up"
-        if all("counted" in one.data for one in series.values())
-        else "the times do not include them"
+    yield (
+        f"{counted(errors, 'request')} of {errors + answered:,} failed; each counts with at least the time until it "
+        "was given up."
     )
-    yield f"{counted(errors, 'request')} of {errors + answered:,} failed; {told}."
 
 
 def _note_text(result: Mapping[str, Any]) -> Iterator[str]:
@@ -171,28 +146,6 @@ def work(series: AllSeries) -> Iterator[str]:
                 f"{operation.capitalize()}: by its Server-Timing header the robot itself works for {ms(spent[0])} ms "
                 f"over REST and {ms(spent[1])} ms over SOAP at the median. That is not the same work."
             )
-
-
-def cold(series: AllSeries) -> Iterator[str]:
-    """Yield one sentence that compares median times of requests after a pause with those without a pause."""
-    text, after, behind = [], "", ""
-    for one in series.values():
-        pause = one.data.get("after_pause")
-        if pause and pause["cold_ms"]["p50"] is not None and pause["warm_ms"]["p50"] is not None:
-            bounds = pause["cold_ci95_ms"]
-            sure = f" ({interval(bounds)})" if bounds else ""
-            after, behind = f"after a pause of {pause['pause_s']:g} s", _behind(pause["spacing_s"])
-            text.append(f"{one.name} {ms(pause['cold_ms']['p50'])} ms{sure} and {ms(pause['warm_ms']['p50'])} ms")
-    if text:
-        yield f"Medians {after}, and {behind}: {'; '.join(text)}."
-
-
-def _behind(spacing_s: float) -> str:
-    """Return words for the time between successive requests without a pause; `spacing_s` is in seconds, 0 for none."""
-    if not spacing_s:
-        return "right behind another request"
-    limit = f"the limit of {rate(1 / spacing_s)} requests/s allows no less"
-    return f"{spacing_s * 1e3:g} ms after the start of the one before ({limit})"
 
 
 def repeat_text(series: AllSeries) -> Iterator[str]:

@@ -60,7 +60,7 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
             f"{name}: a person notices {delay} each time. Half of the responses take {ms(half)} ms or more, and "
             f"{_BEYOND[quantile]} takes {ms(slow)} ms or more."
         )
-    if slow > 0 and quantile != "p50":
+    if slow > 0 and quantile != "p50" and not result.get("overload"):
         yield (
             f"A program that waits for each response of {name} can repeat that about {rate(_round(1000 / slow))} times "
             f"a second and is late in {_BEYOND[quantile]} cases."

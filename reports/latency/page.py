@@ -10,7 +10,7 @@ from reports.latency.figures.canvas import COLOUR, INK, Picture
 from reports.latency.figures.load import load
 from reports.latency.figures.ratios import SPANS, Ratio, means, ratios, spans
 from reports.latency.figures.spectrum import spectrum
-from reports.latency.figures.timeline import blocks, heat, timeline
+from reports.latency.figures.timeline import heat, timeline
 from reports.latency.findings import PAPER, remarks, verdict
 from reports.latency.noticed import sentences
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
@@ -138,7 +138,6 @@ def _pictures(result: Mapping[str, Any], series: AllSeries) -> dict[str, Picture
         "ratios": _ratio_picture(result),
         "spectrum": spectrum(series),
         "heat": heat(result),
-        "blocks": blocks(result),
         "spans": spans(series),
         "timeline": timeline(result),
         "load": load(result),

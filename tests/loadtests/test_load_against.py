@@ -1,7 +1,5 @@
 """Two robots in one duel: which of them is slower, or whether that can be told at all."""
 
-import re
-
 import pytest
 from click.testing import CliRunner
 
@@ -14,11 +12,13 @@ FAST = "--rate 150 --duration 3.2 --warmup 0.2 --client wire"
 DELAY_S = 0.25
 
 
-def against(other):
-    """Options that name the other robot's interfaces."""
-    words = other.both()
-    words[0] = "--against"
-    return [re.sub("^--(publishers|subscribers)", r"--against-\1", word) for word in words]
+def against(other, folder):
+    """Options that name the other robot's interfaces, by a statement."""
+    words, statement = other.both(), folder / "other.toml"
+    keys = [word.strip("-").replace("-", "_") for word in words[::2]]
+    lines = [f'{key} = "{value}"' for key, value in zip(keys, words[1::2], strict=True)]
+    statement.write_text("\n".join(["[endpoints]", *lines]))
+    return ["--against", str(statement)]
 
 
 def change(result, interface, quantile="p50"):
@@ -29,10 +29,10 @@ def change(result, interface, quantile="p50"):
     )
 
 
-def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
+def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load, tmp_path):
     quick, slow = toy(), toy("--delay", DELAY_S)
     for _ in range(8):
-        run = load(*slow.both(), *against(quick), FAST, "--tolerance 50%")
+        run = load(*slow.both(), *against(quick, tmp_path), FAST, "--tolerance 50%")
         result = run.result
         verdicts = {change(result, interface)["verdict"] for interface in ("rest", "soap")}
         if "unclear" not in verdicts | {result["against"]["verdict"]}:
@@ -49,9 +49,10 @@ def test_a_robot_that_is_slower_than_another_is_told_from_it(toy, load):
     assert all(entry["count"] for entry in (*result["series"], *result["against"]["series"]))
 
 
-def test_what_cannot_be_told_is_not_said(toy, load):
+def test_what_cannot_be_told_is_not_said(toy, load, tmp_path):
     robot = toy()
-    run = load(*robot.both(), *against(robot), "--rate 60 --duration 0.6 --warmup 0.1 --client wire --tolerance 0.001%")
+    other = against(robot, tmp_path)
+    run = load(*robot.both(), *other, "--rate 60 --duration 0.6 --warmup 0.1 --client wire --tolerance 0.001%")
     assert (run.code, run.result["against"]["verdict"]) == (ExitCode.INCONCLUSIVE, "unclear")
 
 

@@ -236,7 +236,6 @@ def test_the_closed_model(toy, load):
     ("options", "message"),
     [
         ("--operation delivery", "--allow-motion"),
-        ("--thresholds none.toml", "thresholds are service levels now: write into the statement"),
         ("none.toml", "there is no file none.toml"),
         ("--stages 1,x", "not a list of stages"),
     ],

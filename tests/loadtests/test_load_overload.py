@@ -112,12 +112,13 @@ def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load):
         "--operation 'GET /state' --rate 50 --duration 1 --warmup 0.1 --knee --knee-searches 3 --step-duration 1.5",
     )
     (search,) = run.result["knee_search"]
+    assert search["rate"] == pytest.approx(capacity, rel=0.2), run.err
     estimates = [(kept * missed) ** 0.5 for kept, missed in search["brackets"]]
     assert len(estimates) == 3, run.err
     assert max(estimates) <= 1.2 * min(estimates)
-    assert search["rate"] == pytest.approx(capacity, rel=0.2)
     missed = [point["offered_rate"] for point in search["curve"] if not point["meets"]]
     assert all(missed.count(rate) >= 2 for _, rate in search["brackets"]), "what ends a branch was tried twice"
     over = [point["achieved_rate"] for point in search["curve"] if point["offered_rate"] > 1.3 * capacity]
     assert over == pytest.approx([capacity] * len(over), rel=0.2), "an overloaded robot goes on at its capacity"
+    assert run.result["headline"]["words"].startswith("REST breaks down at ")
     assert "Where it breaks" in latency_html(run.result)

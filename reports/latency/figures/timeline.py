@@ -195,35 +195,3 @@ def heat(result: Mapping[str, Any]) -> Iterator[Panel]:
         log_time_axis(panel.axes, "service time, ms")
         panel.axes.set_xlabel("seconds since the start")
         yield panel
-
-
-@picture("blocks", "The median of each short block of one interface. The confidence intervals come from their scatter.")
-def blocks(result: Mapping[str, Any]) -> Iterator[Panel]:
-    """Yield a panel for each client and operation: the median latency of each block over the run.
-
-    The confidence intervals are computed from these medians.
-    """
-    found = leading([block for block in result.get("blocks", []) if block["phase"] == "duel"])
-    kinds = ((block["client"], operation) for block in found for operation in block["p50_ms"])
-    for client, operation in dict.fromkeys(kinds):
-        panel = Panel(f"{operation}, {client} client", f"Medians of the blocks of {operation}, {client} client.")
-        for interface in (name for name in COLOUR if any(block["interface"] == name for block in found)):
-            points = [
-                (block["t_s"], block["p50_ms"][operation])
-                for block in found
-                if (block["interface"], block["client"]) == (interface, client)
-                and block["p50_ms"].get(operation) is not None
-            ]
-            panel.axes.plot(
-                [time for time, _ in points],
-                [median for _, median in points],
-                MARK[interface],
-                color=COLOUR[interface],
-                markersize=3.5,
-                alpha=0.7,
-                label=interface.upper(),
-            )
-        log_time_axis(panel.axes, "median of a block, ms")
-        panel.axes.set_xlabel("seconds since the start")
-        panel.legend()
-        yield panel

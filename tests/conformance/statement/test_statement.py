@@ -119,10 +119,6 @@ def test_a_full_statement(tmp_path):
             "[load] unknown key 'max_rates'; known are max_duration_s, max_rate, operations, pairs",
         ),
         ("[load]\nmax_rate = 'fast'", "[load] max_rate = 'fast' must be a positive number"),
-        (
-            "[[load.thresholds]]\noperation = 'pose'",
-            "[load] unknown key 'thresholds'; service levels replace them: write into the statement",
-        ),
         ("claims = 'full'", "claims = 'full' must be a table: [claims]"),
         ("[[", "is no TOML"),
     ],

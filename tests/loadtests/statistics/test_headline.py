@@ -115,3 +115,15 @@ def test_a_cap_on_a_closed_model_is_part_of_its_figures():
     plan = replace(PLAN, load=replace(PLAN.load, rate=None, users=4))
     found = headline(replace(FOUND, series=[series()], plan=plan))
     assert "4 users under a cap of 500 requests/s, which is part of the figures" in found["sentence"]
+
+
+def test_the_knee_leads_a_run_that_searched_for_it():
+    knee = {"interface": "rest", "rate": 315, "interval": [308, 322], "searches": 1, "errors_from": None}
+    none = {"interface": "soap", "rate": None, "held_up_to": 2000}
+    run = replace(FOUND, series=[series()], knees=[knee | {"limited_by": "robot"}, none])
+    said = (
+        "REST breaks down at 315 requests/s (308 to 322 in 1 search). SOAP did not break down up to 2,000 requests/s."
+    )
+    assert headline(run)["words"] == "REST breaks down at 315 requests/s (308 to 322 in 1 search)"
+    assert headline(run)["sentence"].startswith(f"{said} Half of the ")
+    assert headline(replace(run, undecided=["9 failed"]))["sentence"].endswith(f"because 9 failed. {said}")

@@ -32,7 +32,7 @@ def without_an_answer(latency):
         one.update(dict.fromkeys(("soap_minus_rest_ms", "ratio", "ci95", "ci95_difference_ms")), judgement="none")
     for one in latency["series"]:
         one.update(count=0, service_ms=QUANTILES, response_ms=QUANTILES, histogram="", response_histogram="")
-        one.update(request_bytes=None, response_bytes=None, after_pause=None, modes=None, reasons={"p50": "0 samples"})
+        one.update(request_bytes=None, response_bytes=None, modes=None, reasons={"p50": "0 samples"})
         one.update(ci95_ms={"p50": None, "p99": None}, spans_ms=dict.fromkeys(("build", "wire", "server", "parse")))
 
 

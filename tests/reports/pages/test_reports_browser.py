@@ -60,8 +60,8 @@ EACH = pytest.mark.parametrize("page", [f"{name} {width}" for name in PAGES for 
 @EACH
 def test_every_figure_is_drawn(seen, page):
     found = seen[page]
-    assert found["figures"] == {"certificate": 0, "described": 0, "latency": 7, "compare": 2}[page.split()[0]]
-    assert len(found["drawings"]) == {"certificate": 0, "described": 0, "latency": 20, "compare": 9}[page.split()[0]]
+    assert found["figures"] == {"certificate": 0, "described": 0, "latency": 6, "compare": 2}[page.split()[0]]
+    assert len(found["drawings"]) == {"certificate": 0, "described": 0, "latency": 18, "compare": 9}[page.split()[0]]
     for drawing in found["drawings"]:
         assert drawing["box"][2] > 250, drawing["name"]
         assert drawing["box"][3] > 100, drawing["name"]
