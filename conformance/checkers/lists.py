@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from datetime import datetime
 from itertools import combinations
 from typing import Any, Final
@@ -24,6 +25,8 @@ from conformance.verdict.evidence import Case
 _REMEMBERED: Final = 50_000
 _ASKED: Final = 1000
 _COMPARED: Final = 60
+# _LEAST: a list of no more items may be shorter than the least limit to which a device raises others.
+_LEAST: Final = 10
 # Kinds of items that a sorted list may have: all items of one kind may come before those of another.
 _KINDS: Final = 2
 #: LEVELS: parameters that ask for a level or higher, as log filters do. _INCLUDING: boolean parameters that ask for
@@ -108,26 +111,25 @@ class Lists:
         longest, self._longest[key] = self._longest[key], max(self._longest[key], count)
         if most <= 0:
             return
-        by = "asks for" if listing.limit.name in sent else "has as its default"
+        waiting, is_sent = self._raised[key], listing.limit.name in sent
+        by = "asks for" if is_sent else "has as its default"
         expected = f"at most {most} items, which the parameter {listing.limit.name} {by}"
         case = occasion.case("description/list-limit", count <= most, expected, f"{count} items", cause=cause)
-        waiting, is_sent = self._raised[key], listing.limit.name in sent
         yield from waiting.pop(most, []) if is_sent and count > most else ()
         if is_sent and count == most:
             waiting.pop(most, None)
         is_cut = page.goes_on or max([longest, *page.totals.values()]) > count
         total, short = max(page.totals.values(), default=0), self._short.get(key)
-        is_first = not any(
-            parameter is not None and parameter.name in sent
-            for parameter in (listing.offset, listing.page, listing.cursor)
-        )
-        if not is_sent and is_first and count < most and total > count:
+        places = [one.name for one in (listing.offset, listing.page, listing.cursor) if one is not None]
+        if not is_sent and sent.keys().isdisjoint(places) and count < most and total > count:
             expected = f"{min(most, total)} of {total} items, by the default of {listing.limit.name}"
             case = occasion.case("description/list-limit", False, expected, f"{count} items", cause=cause)  # noqa: FBT003
             self._short[key] = count, total, case
         elif is_sent and short is not None and short[0] < count <= most <= listing.most({}) and total == short[1]:
             yield self._short.pop(key)[2]
             return
+        if is_sent and not is_cut and count <= _LEAST:
+            case = replace(case, doubt="it may raise the limit to its least one")
         if case.holds or not (is_sent and is_cut):
             yield from [case] if key not in self._short or is_sent else ()
         else:
@@ -143,13 +145,9 @@ class Lists:
             wrong = self._wrong(listing, name, asked, values)
             if wrong is None:
                 continue
-            yield occasion.case(
-                "description/list-filter",
-                not wrong,
-                f"items with {text}, which the parameter {parameter.name} asks for",
-                f"an item with {', '.join(wrong)}",
-                cause=f"{listing.operation.label} {parameter.name}",
-            )
+            expected = f"items with {text}, which the parameter {parameter.name} asks for"
+            found, cause = f"an item with {', '.join(wrong)}", f"{listing.operation.label} {parameter.name}"
+            yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
 
     def _bounds(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge bounds of members; an undescribed parameter is one if earlier lists show its effect."""

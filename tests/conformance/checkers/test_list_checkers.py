@@ -151,6 +151,12 @@ def test_a_limit_that_is_raised(raised, limits, blamed, tmp_path):
     assert (_served(raised)(Seen(tmp_path, [_whole("limit")]), *limits) == {LIMIT}) == blamed
 
 
+def test_a_short_list_may_be_shorter_than_the_least_limit(tmp_path):
+    for count, doubts in ((4, [True]), (12, [False])):
+        seen = Seen(tmp_path / str(count), [_whole("limit")]).read([{"id": one} for one in range(count)], limit=1)
+        assert [bool(one.doubt) for one in seen.cases if not one.holds] == doubts
+
+
 def test_a_default_that_is_not_applied(tmp_path):
     for default, blamed in ((4, {LIMIT}), (2, set())):
         seen = Seen(tmp_path / str(default), [_whole("limit", default=default)])
