@@ -9,7 +9,6 @@ from typing import Final
 from urllib.parse import unquote
 
 from conformance.api.rest.applicable import callable_operations
-from conformance.api.rest.calls import value_text
 from conformance.api.rest.inputs import Inputs, parameter_verdict, request_of, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
@@ -20,7 +19,7 @@ from conformance.checkers.untouched import ALONE, OFTEN, keeps_all
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
-from conformance.documents.writing import path_text
+from conformance.documents.writing import json_text, path_text
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import NoAnswerError, Outgoing
 from conformance.verdict.time_limit import TimeIsOverError
@@ -85,7 +84,8 @@ class Reaching:
         # A value of an enumeration names something, and so does one that is known.
         if "enum" in flat(parameter.schema) or unquote(part) in map(str, found):
             return part
-        return path_text(value_text(parameter, found[0]), parameter.style) if found else part
+        texts = map(json_text, found) if is_json(parameter.media_type) else found
+        return next((path_text(text, parameter.style) for text in texts), part)
 
     def _current(self, operation: Operation, request: Outgoing) -> Outgoing:
         """Return a request with the entity tag of its resource if it has or needs If-Match.

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final
 
 from conformance.api.rest.applicable import allows
-from conformance.api.rest.calls import Call, value_text
+from conformance.api.rest.calls import Call
 from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import unacceptable, undeclared_types
@@ -343,11 +343,7 @@ class Surveyor:
     def _note_working(self, operation: Operation, inputs: Inputs, exchange: Exchange) -> None:
         """Keep a request that was answered 2xx for other checks, if it needs no header or cookie of its own."""
         if not inputs.headers and not inputs.cookies:
-            values = {**inputs.path, **inputs.query}
-            texts = {
-                item.name: value_text(item, values[item.name]) for item in operation.parameters if item.name in values
-            }
-            self.api.working[operation.label] = Call(operation, texts)
+            self.api.working[operation.label] = Call(operation, inputs).bare
             self.api.first.setdefault(operation.label, exchange)
 
     def explore(self, operation: Operation) -> Iterator[None]:

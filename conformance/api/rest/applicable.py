@@ -24,7 +24,7 @@ def reads(api: RestInterface, most: int = _READS) -> list[Call]:
     """
     found = [item for item in operations_of(api.run.contract) if item.method == "GET" and allows(api, item)]
     if own := _wsdl_path(api):
-        return [Call(Operation("the WSDL", "GET", own), {})]
+        return [Call(Operation("the WSDL", "GET", own))]
     ranked = sorted(
         (item for item in found if item.label not in api.streams),
         key=lambda item: (item.optional, item.label not in api.working, item.label in api.slow, len(item.parameters)),

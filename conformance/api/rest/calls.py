@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
-from urllib.parse import quote
 
+from conformance.api.rest.inputs import NOTHING, Inputs, request_of
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import sample
 from conformance.api.rest.validity import require_valid
 from conformance.documents.files import file_of, is_made
 from conformance.documents.json_schema import Schema
-from conformance.documents.openapi import SAFE, Operation, is_json
-from conformance.documents.parameters import Parameter
-from conformance.documents.writing import json_text, path_text, query_pairs, query_text, text_of, xml_bytes
-from conformance.transport.exchange import Exchange
+from conformance.documents.openapi import SAFE, Operation
+from conformance.transport.exchange import Exchange, Outgoing
 
 JSON = "application/json"
 XML = "application/xml"
@@ -29,40 +28,53 @@ class Call:
 
     Attributes:
         operation: the operation.
-        values: of path and query parameters by name, not percent-encoded: texts, lists and objects.
-        media_type: of the body; empty without one.
-        body: bytes.
-        value: the value in the body, or None.
+        inputs: its values.
+        octets: bytes that are sent in place of the body's value; None: the value is sent.
     """
 
     operation: Operation
-    values: dict[str, Any]
-    media_type: str = ""
-    body: bytes = b""
-    value: Any = None
+    inputs: Inputs = field(default_factory=Inputs)
+    octets: bytes | None = None
+
+    @cached_property
+    def made(self) -> Outgoing:
+        """The request as it is sent."""
+        inputs = self.inputs if self.octets is None else replace(self.inputs, body=self.octets)
+        return request_of(self.operation, inputs)
 
     @property
     def path(self) -> str:
         """The request target below the base URL, with its query."""
-        path = self.operation.template
-        for item in self.operation.parameter("path"):
-            text = path_text(self.values.get(item.name, ""), item.style, item.name, explode=item.explode)
-            path = path.replace(f"{{{item.name}}}", text)
-        query = "&".join(
-            _query_of(item, self.values[item.name])
-            for item in self.operation.parameter("query")
-            if item.name in self.values
-        )
-        return f"{path}?{query}" if query else path
+        return self.made.target
+
+    @property
+    def media_type(self) -> str:
+        """The media type of the body; empty without one."""
+        return self.made.content_type
+
+    @property
+    def body(self) -> bytes:
+        """The bytes of the body."""
+        return self.made.body
+
+    @property
+    def value(self) -> Any:
+        """The value in the body, or None."""
+        return None if self.inputs.body is NOTHING else self.inputs.body
+
+    @property
+    def bare(self) -> Call:
+        """The request without a body."""
+        return Call(self.operation, replace(self.inputs, body=NOTHING, media_type=""))
 
     def having(self, name: str, text: str | None) -> Call:
         """Return the request with another text for a parameter, or without the parameter."""
-        values = {key: item for key, item in self.values.items() if key != name}
-        return replace(self, values=values if text is None else {**values, name: text})
+        where = "path" if name in {item.name for item in self.operation.parameter("path")} else "query"
+        return replace(self, inputs=self.inputs.having(where, name, NOTHING if text is None else text))
 
     def carrying(self, body: bytes) -> Call:
         """Return the request with another body, valid or not."""
-        return replace(self, body=body)
+        return replace(self, octets=body)
 
     def rewritten(self, api: RestInterface, body: bytes) -> Call:
         """Return the request with another valid body.
@@ -71,7 +83,7 @@ class Call:
             HarnessError: the body is invalid by the contract.
         """
         require_valid(api.run.contract, self.operation.method, self.path, self.media_type, body)
-        return replace(self, body=body)
+        return self.carrying(body)
 
     def send(
         self, api: RestInterface, *headers: tuple[str, str], method: str | None = None, fresh: bool = False
@@ -96,20 +108,6 @@ class Call:
         return api.client.send(asked, self.path, headers=sent, body=self.body, fresh=fresh)
 
 
-def _query_of(item: Parameter, value: Any) -> str:
-    """Return a query parameter, percent-encoded."""
-    if isinstance(value, list | dict):
-        return query_text(query_pairs(item.name, value, item.style, explode=item.explode))
-    return f"{quote(item.name, safe='')}={quote(value, safe='')}"
-
-
-def value_text(item: Parameter, value: Any) -> Any:
-    """Return a parameter's value as a call has it: JSON for a parameter with content, else as text."""
-    if is_json(item.media_type):
-        return json_text(value)
-    return value if isinstance(value, list | dict) else text_of(value)
-
-
 def example_call(api: RestInterface, operation: Operation, media_type: str = JSON) -> Call:
     """Return a valid request for an operation, made from the contract's examples.
 
@@ -123,32 +121,25 @@ def example_call(api: RestInterface, operation: Operation, media_type: str = JSO
     Raises:
         HarnessError: the generated request is invalid by the contract.
     """
-    call = _example(api, operation, media_type)
+    items = [item for where in ("path", "query") for item in operation.parameter(where)]
+    given = {
+        item.name: item.examples[0] if item.examples else sample(item.schema)
+        for item in items
+        if item.required or item.examples
+    }
+    given = _fit(api, operation, given) if given else {}
+    inputs = Inputs()
+    for item in items:
+        inputs = inputs.having(item.where, item.name, given[item.name]) if item.name in given else inputs
+    if media_type in operation.bodies:
+        body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
+        plain = [item for item in body.examples if not isinstance(item, str)]
+        value = _fit(api, operation, plain[0] if plain else sample(body.schema))
+        value = file_of(media_type) if is_made(media_type) else value
+        inputs = replace(inputs, media_type=media_type, body=value)
+    call = Call(operation, inputs)
     require_valid(api.run.contract, operation.method, call.path, call.media_type, call.body)
     return call
-
-
-def _example(api: RestInterface, operation: Operation, media_type: str) -> Call:
-    given: dict[str, Any] = {}
-    for item in operation.parameters:
-        if item.where in {"path", "query"} and (item.required or item.examples):
-            given[item.name] = item.examples[0] if item.examples else sample(item.schema)
-    if given:
-        given = _fit(api, operation, given)
-    by_name = {item.name: item for item in operation.parameters if item.where in {"path", "query"}}
-    call = Call(operation, {name: value_text(by_name[name], value) for name, value in given.items()})
-    if media_type not in operation.bodies:
-        return call
-    body = operation.bodies.get(JSON) or next(iter(operation.bodies.values()))
-    plain = [item for item in body.examples if not isinstance(item, str)]
-    value = _fit(api, operation, plain[0] if plain else sample(body.schema))
-    if is_made(media_type):
-        octets = file_of(media_type)
-    elif media_type == XML:
-        octets = xml_bytes(value, root_name(operation.bodies[XML].schema) or "value")
-    else:
-        octets = json_text(value).encode()
-    return replace(call, media_type=media_type, body=octets, value=value)
 
 
 def root_name(schema: Schema) -> str:

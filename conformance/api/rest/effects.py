@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from http import HTTPStatus
 from typing import Any
 
@@ -91,7 +92,11 @@ def reader_of(api: RestInterface, call: Call) -> Call | None:
     for operation in operations_of(api.run.contract):
         if operation.method == "GET" and operation.template == call.operation.template:
             read = example_call(api, operation)
-            return Call(operation, {**read.values, **call.values})
+            for item in operation.parameters:
+                if item.name in call.inputs.at(item.where):
+                    value = call.inputs.at(item.where)[item.name]
+                    read = replace(read, inputs=read.inputs.having(item.where, item.name, value))
+            return read
     return None
 
 

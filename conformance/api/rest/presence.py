@@ -36,7 +36,7 @@ def judge_there(api: RestInterface, requirement: str, call: Call, *, known: bool
         exchange = call.send(api)
         there = _by_itself(call, exchange)
     if there is None:
-        exchange = Call(operation, call.values).send(api, method="OPTIONS")
+        exchange = call.bare.send(api, method="OPTIONS")
         there = _by_options(call, exchange)
         is_open = there is None or exchange.response.status == HTTPStatus.NOT_FOUND
         refused = _to_be_refused(call)
@@ -58,7 +58,7 @@ def _to_be_refused(call: Call) -> Call | None:
     if operation.safe:
         return None
     if operation.bodies:
-        return replace(call, media_type=_NOT_TAKEN, body=b"roaas")
+        return replace(call, inputs=replace(call.inputs, media_type=_NOT_TAKEN, body=b"roaas"))
     wrong = [item for parameter in operation.parameter("path") for item in wrong_texts(parameter) if item.text]
     return call.having(wrong[0].name, wrong[0].text) if wrong else None
 

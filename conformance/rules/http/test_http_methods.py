@@ -9,6 +9,7 @@ from conformance.api.permission import permitted_methods
 from conformance.api.rest import by_hand
 from conformance.api.rest.applicable import allows, reads
 from conformance.api.rest.calls import JSON, Call, example_call
+from conformance.api.rest.inputs import Inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import SAFE, Resource, resources_of
 from conformance.transport import raw
@@ -37,7 +38,7 @@ def _resources(api: RestInterface) -> list[tuple[Resource, Call]]:
             continue
         first = _find_call(api, resource) or example_call(api, next(iter(resource.operations.values())))
         # Only the address is used: a request with a body, or one that moves the robot, is never sent from here.
-        call = Call(first.operation, first.values)
+        call = first.bare
         if resource.optional:
             answer = call.send(api, method="GET").response
             if answer.status == 404:
@@ -56,7 +57,7 @@ def _find_call(api: RestInterface, resource: Resource) -> Call | None:
     for call in api.working.values() if names else ():
         known = {item.name for item in call.operation.parameter("path")}
         if names <= known and resource.template.startswith(call.operation.template.rstrip("/")):
-            return Call(first, {name: call.values[name] for name in names})
+            return Call(first, Inputs(path={name: call.inputs.path[name] for name in names}))
     return None
 
 

@@ -58,9 +58,9 @@ def test_xml_is_taken(api: RestInterface, judge: Judge) -> None:
             judge.note(_ID, f"not tried on {operation.id}: a valid request for it as JSON got {plain.came}")
             continue
         api.device.bring_to_rest(api)
-        call = replace(call, value=api.device.mark(operation.id, call.value))
+        call = replace(call, inputs=replace(call.inputs, body=api.device.mark(operation.id, call.value)))
         like = _sent_form(api, call)
-        body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "value", like)
+        body = xml_bytes(call.value, root_name(operation.bodies[XML].schema) or "root", like)
         echoes: list[dict[str, Any]] = []
         for accept in (JSON, XML):
             call = call.rewritten(api, body)

@@ -105,7 +105,7 @@ def test_xml_mutations_are_refused(api: RestInterface, judge: Judge) -> None:
             continue
         taken += 1
         schema = operation.bodies[XML].schema
-        made = xml_mutations(call.value, schema, root_name(schema) or "value")
+        made = xml_mutations(call.value, schema, root_name(schema) or "root")
         drawn = api.run.effort.draw(made, _EACH_XML, f"{api.run.seed}/{operation.id}")
         for item in api.run.effort.alternatives(drawn, 3):
             wrong = call.carrying(item.made)

@@ -7,6 +7,7 @@ import pytest
 
 from conformance.api.rest.applicable import applicable_operations, readable
 from conformance.api.rest.calls import JSON, XML, Call, example_call
+from conformance.api.rest.inputs import Inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.parameters import Wrong, wrong_texts
 from conformance.api.rest.refusals import judge_refusal
@@ -57,7 +58,7 @@ def test_missing_query_parameters(api: RestInterface) -> None:
             if item.required:
                 lacking, what = call.having(item.name, None), f"no parameter {item.name}"
                 judge_refusal(api, partial(lacking.send, api), _MISSING, what, field=item.name, json=False)
-        bare = Call(operation, {item.name: call.values[item.name] for item in operation.parameter("path")})
+        bare = Call(operation, Inputs(path=call.inputs.path))
         judge_refusal(api, partial(bare.send, api), _MISSING, "no parameter at all", json=False)
 
 

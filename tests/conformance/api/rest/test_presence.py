@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from conformance.api.rest.calls import Call
+from conformance.api.rest.inputs import Inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.presence import judge_there
 from conformance.contract.pack import Contract
@@ -30,7 +31,9 @@ def _judged(method, template, answers, *, known, responses=(), moving=False, all
     operation = Operation(
         "x", method, template, parameters, bodies, responses={key: {} for key in responses}, motion=moving
     )
-    judge_there(RestInterface(run, SimpleNamespace(send=send)), _ID, Call(operation, {"id": "a"}), known=known)
+    judge_there(
+        RestInterface(run, SimpleNamespace(send=send)), _ID, Call(operation, Inputs(path={"id": "a"})), known=known
+    )
     evidence = run.judge.evidence[_ID]
     return not evidence.findings if evidence.cases else None
 

@@ -16,7 +16,7 @@ from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.run import Run
 
 _CONTRACT = Contract.load()
-_POSE = Call(next(item for item in operations_of(_CONTRACT) if item.id == "getPose"), {})
+_POSE = Call(next(item for item in operations_of(_CONTRACT) if item.id == "getPose"))
 
 
 @pytest.fixture(name="slept")
