@@ -150,8 +150,7 @@ class Device(device.Device):
         # Imported here: see the class.
         from conformance.packs.table1.checkers.deliveries import Deliveries  # noqa: PLC0415
         from conformance.packs.table1.checkers.goals import Goals  # noqa: PLC0415
-        from conformance.packs.table1.checkers.interfaces import AcrossInterfaces  # noqa: PLC0415
-        from conformance.packs.table1.checkers.lists import Lists  # noqa: PLC0415
+        from conformance.packs.table1.checkers.interfaces import AcrossInterfaces, Lists  # noqa: PLC0415
         from conformance.packs.table1.checkers.plans import Plans  # noqa: PLC0415
         from conformance.packs.table1.checkers.soap_responses import SoapPoses, SoapResponses  # noqa: PLC0415
         from conformance.packs.table1.checkers.state import State  # noqa: PLC0415

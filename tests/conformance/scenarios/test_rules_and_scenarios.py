@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from conformance.packs.table1.scenarios.trace import rule_on
+from conformance.packs.table1.robot.drive_rules import rule_on
 from conformance.scenarios.collecting import is_imported
 from conformance.scenarios.plan import Step, order_steps, plan_lines
 from conformance.scenarios.rule import Note, NotTested, record, rule

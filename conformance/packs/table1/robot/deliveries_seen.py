@@ -5,8 +5,7 @@ from typing import Any, Final, Protocol
 from conformance.api.rest.interface import RestInterface
 from conformance.observe.clock import WALL_CLOCK, Clock, Patience, poll, poll_for
 from conformance.packs.table1.checkers.deliveries import Deliveries
-from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_trace import Seen
+from conformance.packs.table1.robot.delivery import Delivery, Seen
 from conformance.packs.table1.robot.message_shapes import DELIVERIES as LIST
 from conformance.packs.table1.robot.message_shapes import read_as
 from conformance.packs.table1.robot.probe import ARRIVES_S, Probe, ProbeError, RosProbe

@@ -12,8 +12,7 @@ from conformance.api.soap.service import SoapService
 from conformance.api.soap.xml_style import XmlStyle, value_styles
 from conformance.observe.clock import WALL_CLOCK
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver
-from conformance.packs.table1.robot.delivery import Delivery, path_of
-from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Seen, Sent, key_of
+from conformance.packs.table1.robot.delivery import Batch, Deliveries, Delivery, Seen, Sent, key_of, path_of
 from conformance.packs.table1.robot.soap_services import delivery_outgoing, send_delivery
 from conformance.papers_robot.delivery import COFFEE
 from conformance.transport.client import HttpClient

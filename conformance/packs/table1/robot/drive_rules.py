@@ -1,20 +1,35 @@
-"""Judge the trace of a drive. No function here sends anything to the robot."""
+"""Records of scenarios that drive a robot, and what judges them. No function here sends anything to the robot."""
 
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.packs.table1.limits import Limits
-from conformance.packs.table1.robot.drive_trace import Command, Reach, Trace, is_shown, middle, newest, velocities
+from conformance.packs.table1.robot.drive_trace import (
+    LONGEST_SAMPLE_S,
+    Command,
+    Reach,
+    Trace,
+    Turn,
+    is_shown,
+    middle,
+    newest,
+    velocities,
+)
 from conformance.packs.table1.robot.message_shapes import TWIST, VECTOR3, read_as
 from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Velocity, is_near
-from conformance.scenarios.rule import NotTested, Outcome
+from conformance.packs.table1.statement import said_of
+from conformance.scenarios.motion.trace import Drive
+from conformance.scenarios.rule import NotTested, Outcome, Rule, rule
+from conformance.scenarios.scenario import Scenario
 from conformance.transport.exchange import Exchange
 from conformance.verdict.evidence import Case
+from conformance.verdict.run import Run
 
 # Readings that agree for this long are steady, so that two resources can be compared, s.
 _STEADY_S: Final = 0.3
@@ -210,3 +225,41 @@ def arrival(trace: Trace, reach: Reach, limits: Limits) -> Case:
 def rounded(velocity: Velocity) -> Velocity:
     """Return a velocity rounded for display."""
     return Velocity(*(round(value, 4) for value in velocity))
+
+
+# Share of the hold time by which a velocity may hold longer.
+_LONGER: Final = 0.4
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A drive, and the velocities in it that were not renewed.
+
+    Attributes:
+        drive: all commands and readings.
+        let_go: the velocities that were not renewed.
+        paused: two looks at the robot at rest after each of them, the first ones of the velocity after a pause.
+        over_soap: readings of pose and velocity over SOAP, beside the looks.
+    """
+
+    drive: Trace
+    let_go: tuple[Drive, ...] = ()
+    paused: tuple[tuple[Turn, Turn], ...] = ()
+    over_soap: tuple[Exchange, ...] = ()
+
+
+def longer_s(limits: Limits) -> float:
+    """Return for how long after its hold time a velocity may be seen at most, s.
+
+    Commands and odometry are delayed by part of the settle time; half as long again is no such delay.
+    """
+    return max(_LONGER * (limits.hold_s or 0.0), 0.5 * limits.settle_s, LONGEST_SAMPLE_S)
+
+
+def rule_on(requirement: str, *scenarios: Scenario) -> Rule:
+    """Return a rule that judges one requirement by the traces of these scenarios."""
+
+    def judge(trace: Driven, run: Run) -> Iterator[Outcome]:
+        return outcomes(requirement, trace.drive, said_of(run).limits)
+
+    return rule(requirement, on=scenarios)(judge)

@@ -16,9 +16,8 @@ from conformance.api.soap.service import MEDIA_TYPE, SoapService
 from conformance.api.soap.xml_style import TEXTS
 from conformance.documents.xml import ENVELOPE, Node, clark
 from conformance.packs.table1.robot.deliveries_seen import DeliveryObserver, NoObserverError, observer_of
-from conformance.packs.table1.robot.delivery import Delivery, lexical_deliveries, path_of, put_delivery
+from conformance.packs.table1.robot.delivery import Deliveries, Delivery, lexical_deliveries, path_of, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
-from conformance.packs.table1.robot.delivery_trace import Deliveries
 from conformance.packs.table1.robot.probe import ProbeError, RosProbe
 from conformance.packs.table1.robot.soap_services import request, send_delivery
 from conformance.papers_robot.delivery import COFFEE, COURIER

@@ -15,7 +15,7 @@ from conformance.api.rest.calls import JSON, XML, Call
 from conformance.api.rest.formats import Disagreement, Found, disagreements, each_after, one_turn
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
-from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive import Drive, there_and_back
 from conformance.packs.table1.robot.goal import (
     await_goal,
     await_none,
@@ -28,7 +28,6 @@ from conformance.packs.table1.robot.goal import (
 )
 from conformance.packs.table1.robot.plan import reachable
 from conformance.packs.table1.robot.robot import GOAL_PATH, LINEAR, PLAN, POSE, STILL, VELOCITY, Robot, put_as_xml
-from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange

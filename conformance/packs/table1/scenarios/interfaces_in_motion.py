@@ -14,7 +14,7 @@ from typing import Any, Final
 from conformance.api.soap.service import SoapService
 from conformance.documents.representation import from_element, projected
 from conformance.observe.clock import poll
-from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive import Drive, there_and_back
 from conformance.packs.table1.robot.goal import (
     await_goal,
     await_none,
@@ -37,7 +37,6 @@ from conformance.packs.table1.robot.state_read import (
     for_good,
     read_state,
 )
-from conformance.packs.table1.robot.velocity_range import there_and_back
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.stage import Need
 from conformance.verdict.effort import Effort

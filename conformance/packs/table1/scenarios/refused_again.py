@@ -15,9 +15,8 @@ from conformance.api.soap.callable_services import SoapServices
 from conformance.documents.json_text import read_json
 from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.deliveries_seen import QUIET_S, DeliveryObserver, NoObserverError, observer_of
-from conformance.packs.table1.robot.delivery import Delivery, put_delivery
+from conformance.packs.table1.robot.delivery import Delivery, key_of, put_delivery
 from conformance.packs.table1.robot.delivery_sender import DeliverySender
-from conformance.packs.table1.robot.delivery_trace import key_of
 from conformance.packs.table1.robot.drive import Drive
 from conformance.packs.table1.robot.geometry import Pose, length_of, wrapped
 from conformance.packs.table1.robot.goal import (

@@ -9,7 +9,20 @@ from typing import Final
 
 from conformance.api.soap.callable_services import SoapServices
 from conformance.api.soap.service import SoapService
-from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive import (
+    Drive,
+    along_arc,
+    both,
+    direction,
+    fastest,
+    handy,
+    reach,
+    slow,
+    slowest,
+    slowest_along,
+    unrenewed_velocities,
+)
+from conformance.packs.table1.robot.drive_rules import Driven, longer_s
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, JUDGED, LINEAR_PART, Turn, certain_s
 from conformance.packs.table1.robot.goal import make_room
 from conformance.packs.table1.robot.motion_map import COMMANDS, By, speeds_of, way_of
@@ -23,19 +36,6 @@ from conformance.packs.table1.robot.refused_requests import (
 )
 from conformance.packs.table1.robot.robot import ABOUT, AHEAD, STILL, Robot, Velocity
 from conformance.packs.table1.robot.soap_services import ask
-from conformance.packs.table1.robot.velocity_range import (
-    along_arc,
-    both,
-    direction,
-    fastest,
-    handy,
-    reach,
-    slow,
-    slowest,
-    slowest_along,
-    unrenewed_velocities,
-)
-from conformance.packs.table1.scenarios.trace import Driven, longer_s
 from conformance.rules.motion.test_velocities import fails, judge_hold
 from conformance.scenarios.motion import trace as generic
 from conformance.scenarios.motion.mapped import MappedDevice

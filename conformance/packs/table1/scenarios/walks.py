@@ -12,6 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 from conformance.api.soap.callable_services import SoapServices
 from conformance.packs.table1.limits import Limits
 from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive_rules import Driven
 from conformance.packs.table1.robot.drive_trace import ANGULAR_PART, LINEAR_PART, Trace
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal import (
@@ -29,7 +30,6 @@ from conformance.packs.table1.robot.goal import (
 from conformance.packs.table1.robot.goal_trace import GoalStep
 from conformance.packs.table1.robot.refused_requests import no_commands
 from conformance.packs.table1.robot.robot import STILL, Robot, Velocity
-from conformance.packs.table1.scenarios.trace import Driven
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need
 from conformance.transport.exchange import Exchange, NoAnswerError

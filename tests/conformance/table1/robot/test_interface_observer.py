@@ -7,8 +7,7 @@ import pytest
 from toy_messages import STILL, ZERO, goal, header, odometry, pose
 
 from conformance.documents.writing import xml_bytes
-from conformance.packs.table1.checkers.interfaces import AcrossInterfaces
-from conformance.packs.table1.checkers.lists import Lists
+from conformance.packs.table1.checkers.interfaces import AcrossInterfaces, Lists
 from conformance.packs.table1.checkers.plans import Plans
 from conformance.packs.table1.robot.robot import GOAL_PATH, PLAN, POSE, SENSORS, VELOCITY
 from conformance.packs.table1.robot.soap_services import NAMESPACE

@@ -5,9 +5,8 @@ from toy_server import serving
 
 from conformance.api.rest.interface import RestInterface
 from conformance.packs.table1.limits import DeclaredLimits
-from conformance.packs.table1.robot.drive import Drive
+from conformance.packs.table1.robot.drive import Drive, unrenewed_velocities
 from conformance.packs.table1.robot.robot import LINEAR, Robot, Velocity
-from conformance.packs.table1.robot.velocity_range import unrenewed_velocities
 from conformance.packs.table1.statement import Statement
 from conformance.transport.client import Connection, HttpClient
 from conformance.verdict.run import Run

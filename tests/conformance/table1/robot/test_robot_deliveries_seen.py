@@ -12,9 +12,8 @@ from lxml import etree
 from conformance.contract.classes import CauseKind
 from conformance.documents.wsdl import read_file
 from conformance.packs.table1.robot.deliveries_seen import QUIET_S, ProbeObserver
-from conformance.packs.table1.robot.delivery import Delivery, deliveries, doubles, notations, path_of
+from conformance.packs.table1.robot.delivery import Delivery, Seen, deliveries, doubles, notations, path_of
 from conformance.packs.table1.robot.delivery_sender import DeliverySender, Order
-from conformance.packs.table1.robot.delivery_trace import Seen
 from conformance.packs.table1.rules.equivalence import test_equivalence_delivery as rules
 from conformance.papers_robot.statement import CONTRACT_DIR
 from conformance.scenarios.rule import Rule, record

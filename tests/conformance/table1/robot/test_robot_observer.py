@@ -6,7 +6,7 @@ import pytest
 from toy_messages import STILL, ZERO, odometry
 
 from conformance.api.rest.interface import RestInterface
-from conformance.packs.table1.checkers.lists import Lists
+from conformance.packs.table1.checkers.interfaces import Lists
 from conformance.packs.table1.checkers.state import State
 from conformance.packs.table1.limits import DeclaredLimits
 from conformance.packs.table1.robot.clock import Clock

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy_messages import exchange, odometry
 
-from conformance.packs.table1.checkers.single_readings import BesideOdometry, OneSample, Place
+from conformance.packs.table1.checkers.state import BesideOdometry, OneSample, Place
 from conformance.packs.table1.limits import DeclaredLimits, Noise
 from conformance.packs.table1.robot.clock import Clock
 from conformance.packs.table1.robot.geometry import Pose

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits, Noise
+from conformance.packs.table1.robot.drive_rules import Driven
 from conformance.packs.table1.robot.drive_trace import Trace, Turn
 from conformance.packs.table1.robot.geometry import Pose
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 from conformance.packs.table1.rules.rest_resources import test_driving as driving
 from conformance.packs.table1.rules.safety import test_driving as rules
-from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.statement import Statement
 from conformance.scenarios.motion.trace import Command, Drive, Reading
 from conformance.transport.exchange import Exchange

@@ -6,8 +6,7 @@ from http import HTTPStatus
 from itertools import chain
 from typing import Final
 
-from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_trace import Batch, Deliveries, Sent
+from conformance.packs.table1.robot.delivery import Batch, Deliveries, Delivery, Sent
 from conformance.packs.table1.scenarios.deliveries import (
     CountedDeliveries,
     Keyed,

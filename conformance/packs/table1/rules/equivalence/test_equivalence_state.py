@@ -14,7 +14,8 @@ from conformance.api.rest.effects import steady
 from conformance.api.soap.service import SoapService
 from conformance.documents.json_shape import Shape
 from conformance.documents.representation import flattened, projected
-from conformance.packs.table1.checkers.single_readings import BesideOdometry, Place
+from conformance.packs.table1.checkers.state import BesideOdometry, Place
+from conformance.packs.table1.robot.drive_rules import Driven
 from conformance.packs.table1.robot.geometry import Pose, pose_of
 from conformance.packs.table1.robot.message_shapes import GET_PLAN, ODOMETRY, TWIST
 from conformance.packs.table1.robot.plan import plan_of, query, reachable
@@ -30,7 +31,6 @@ from conformance.packs.table1.robot.state_read import (
     value_in,
 )
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
-from conformance.packs.table1.scenarios.trace import Driven
 from conformance.packs.table1.scenarios.turn import turn
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, Rule, record, rule

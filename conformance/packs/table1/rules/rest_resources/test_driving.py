@@ -4,12 +4,11 @@ from collections.abc import Iterator
 from typing import Final
 
 from conformance.measures.samples import FARTHEST
-from conformance.packs.table1.robot.drive_rules import outcomes
+from conformance.packs.table1.robot.drive_rules import Driven, outcomes, rule_on
 from conformance.packs.table1.robot.geometry import pose_of, wrapped
 from conformance.packs.table1.robot.message_shapes import ODOMETRY, read_as
 from conformance.packs.table1.robot.motion_map import velocity_of
 from conformance.packs.table1.robot.robot import STILL, is_near
-from conformance.packs.table1.scenarios.trace import Driven, rule_on
 from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.walks import velocity_walk
 from conformance.packs.table1.statement import said_of

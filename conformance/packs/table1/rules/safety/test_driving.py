@@ -1,20 +1,22 @@
-"""Rules on safety: of drives, and of requests that must not move a robot at rest.
+"""Rules on safety: of drives, of requests that must not move a robot at rest, and of clients that vanish.
 
 A velocity holds for its time, ends by itself, and can be renewed and stopped.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from typing import Final
 
-from conformance.packs.table1.robot.drive_rules import outcomes
+import pytest
+
+from conformance.packs.table1.robot.drive_rules import Driven, longer_s, outcomes, rule_on
 from conformance.packs.table1.robot.drive_trace import JUDGED, LONGEST_SAMPLE_S
 from conformance.packs.table1.robot.goal_trace import Cancelled, GoalLife, GoalReached
 from conformance.packs.table1.robot.motion_map import motion_map_of, velocity_of
-from conformance.packs.table1.robot.robot import STILL, is_near
+from conformance.packs.table1.robot.robot import GOAL_PATH, POSE, STILL, VELOCITY, Robot, is_near
 from conformance.packs.table1.scenarios.attempts import attempts
 from conformance.packs.table1.scenarios.goal_life import goal_life
 from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.trace import Driven, longer_s, rule_on
 from conformance.packs.table1.scenarios.turn import further_axes, straight, turn
 from conformance.packs.table1.scenarios.walks import velocity_walk
 from conformance.packs.table1.statement import said_of
@@ -24,8 +26,10 @@ from conformance.rules.motion.test_motion_attempts import incomplete_still, judg
 from conformance.rules.motion.test_velocities import fails, judge_hold
 from conformance.scenarios.motion.trace import Drive, Quiet
 from conformance.scenarios.rule import NotClaimed, Note, NotTested, Outcome, rule
-from conformance.transport.exchange import Exchange
-from conformance.verdict.evidence import Case
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import Attempt, Exchange, NoAnswer, NoAnswerError, Unanswered
+from conformance.transport.raw import PartialRequest
+from conformance.verdict.evidence import Case, Judge
 from conformance.verdict.run import Run
 
 # _ANSWERED_S: time beyond the settle time in which a stop must be answered, s: a robot may wait until it rests. _USUAL:
@@ -225,3 +229,48 @@ def _nothing_moved(trace: Quiet, run: Run, kind: str) -> Iterator[Outcome]:
         yield from nothing_moved(trace, motion_map_of(said_of(run)), kind)
     else:
         yield Note(f"no attempt of this kind was made: {kind}")
+
+
+# Least usual response time to assume, s: scheduling on a busy machine is no failure.
+_PATIENT_S: Final = 1.0
+# Tries: a network may delay one response, but a robot that waits for other requests never responds to the third.
+_TRIES: Final = 3
+
+
+@pytest.mark.needs("rest")
+@pytest.mark.phase("reading")
+@pytest.mark.requirement("safety/half-request")
+def test_half_requests(robot: Robot, rest: HttpClient, judge: Judge) -> None:
+    """Send other requests while three requests are incomplete: the robot must respond within the usual time."""
+    patience_s = max(_PATIENT_S, 20 * robot.usual_s)
+    judge.at_risk = ("safety/half-request",)
+    with (
+        PartialRequest(rest, "GET", POSE, head_only=20),
+        PartialRequest(rest, "GET", POSE, head_only=-2),
+        PartialRequest(rest, "OPTIONS", GOAL_PATH, sent=b"{", promised=100),
+    ):
+        expected = f"a response within {patience_s:g} s while three other requests are incomplete"
+        for path in (POSE, VELOCITY, POSE):
+            attempt = _send(rest, path, patience_s)
+            answered = isinstance(attempt, Exchange)
+            if not judge.check("safety/half-request", answered, attempt, expected):
+                return
+
+
+def _send(client: HttpClient, path: str, patience_s: float) -> Attempt:
+    """Send a GET, again if its response does not come in time, and return the last attempt."""
+    attempt = _send_once(client, path, patience_s)
+    for _ in range(_TRIES - 1):
+        if isinstance(attempt, Unanswered) and attempt.kind is NoAnswer.TIMEOUT:
+            attempt = _send_once(client, path, patience_s)
+    return attempt
+
+
+def _send_once(client: HttpClient, path: str, patience_s: float) -> Attempt:
+    # A new client, because a hang here says nothing about later requests. A new connection, because an open one may be
+    # served by its own thread.
+    with closing(HttpClient(client.base_url, client.connection)) as other:
+        try:
+            return other.send("GET", path, fresh=True, timeout_s=patience_s)
+        except NoAnswerError as none:
+            return none.unanswered

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterator
 from http import HTTPStatus
 
-from conformance.packs.table1.robot.delivery import Delivery
-from conformance.packs.table1.robot.delivery_trace import key_of
+from conformance.packs.table1.robot.delivery import Delivery, key_of
 from conformance.packs.table1.robot.goal import CANCELED, NEW, outcome_fault
 from conformance.packs.table1.robot.robot import GOAL_PATH
 from conformance.packs.table1.scenarios.attempts import GOAL
