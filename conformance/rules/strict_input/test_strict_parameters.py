@@ -105,14 +105,7 @@ def _choose_wrong(api: RestInterface, operation: Operation, where: str) -> list[
 
 
 def _try(api: RestInterface, call: Call, item: Wrong, requirement: str) -> None:
-    refused = judge_refusal(
-        api,
-        partial(call.having(item.name, item.text).send, api),
-        requirement,
-        item.what,
-        field=item.name,
-        shown=item.shown,
-        json=False,
-    )
+    send = partial(call.having(item.name, item.text).send, api)
+    refused = judge_refusal(api, send, requirement, item.what, field=item.name, shown=item.shown, json=False)
     if not refused and call.operation.motion:
         api.device.halt(api)
