@@ -37,7 +37,7 @@ class Call:
     octets: bytes | None = None
 
     @cached_property
-    def made(self) -> Outgoing:
+    def outgoing(self) -> Outgoing:
         """The request as it is sent."""
         inputs = self.inputs if self.octets is None else replace(self.inputs, body=self.octets)
         return request_of(self.operation, inputs)
@@ -45,17 +45,17 @@ class Call:
     @property
     def path(self) -> str:
         """The request target below the base URL, with its query."""
-        return self.made.target
+        return self.outgoing.target
 
     @property
     def media_type(self) -> str:
         """The media type of the body; empty without one."""
-        return self.made.content_type
+        return self.outgoing.content_type
 
     @property
     def body(self) -> bytes:
         """The bytes of the body."""
-        return self.made.body
+        return self.outgoing.body
 
     @property
     def value(self) -> Any:
