@@ -32,12 +32,10 @@ _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 _MOST, _LARGEST = 200, 1 << 20
 # _START: octets by which a file of a media type is known. _WITHIN: some of an image's pixels, behind its header.
 _START, _WITHIN = 4, slice(60, 76)
-_RANGE, _DIGESTS, _READ, _TAGS = (
-    "http/range",
-    "description/digest",
-    "description/written-is-read",
-    "description/entity-tag",
-)
+_RANGE = "http/range"
+_DIGESTS = "description/digest"
+_READ = "description/written-is-read"
+_TAGS = "description/entity-tag"
 _ASKED: Final = re.compile(r"bytes=(\d*)-(\d*)")
 # Phrases in a description which say that a text is stored byte for byte; otherwise line ends may change.
 _KEEPS: Final = re.compile(

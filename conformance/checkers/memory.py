@@ -131,9 +131,7 @@ class Memory:
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
         methods = {(operation.method, operation.template) for operation in operations}
-        reads = [
-            operation for operation in operations if operation.method == "GET" and not operation.parameter("query")
-        ]
+        reads = [read for read in operations if read.method == "GET" and not read.parameter("query")]
         self._items = {read.template.rstrip("/"): read for read in reads if collection_of(read.template)}
         self._of_collections = {collection_of(template): one for template, one in self._items.items()}
         # Templates of things below another thing that may exist or not.
@@ -331,10 +329,11 @@ class Memory:
             if other:
                 self._undefaulted[key] = now[name]
             if not other or before == now[name]:
-                expected = f"the declared default of what {operation.label} left out"
-                yield occasion.case(
-                    "description/defaults", not other, expected, other, cause=f"{operation.label} {name}"
+                expected, cause = (
+                    f"the declared default of what {operation.label} left out",
+                    f"{operation.label} {name}",
                 )
+                yield occasion.case("description/defaults", not other, expected, other, cause=cause)
 
     def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         """Judge whether a request has written members that the device sets, or members that never change."""
@@ -350,9 +349,8 @@ class Memory:
             is_taken = name in sent and sent[name] == now[name] != before.get(name)
             # A word or a boolean may also be the device's own value.
             is_taken = is_taken and not isinstance(now[name], bool) and len(str(now[name])) >= _TELLING
-            is_other = (
-                name in before and before[name] != now[name] and _FOR_EVER.fullmatch(plain_name(name)) is not None
-            )
+            is_for_ever = _FOR_EVER.fullmatch(plain_name(name)) is not None
+            is_other = is_for_ever and name in before and before[name] != now[name]
             expected = f"{name}, which is readOnly, as the device gave it"
             found = f"{clip(now[name])} as {name}" + (f", and {clip(before[name])} before" if name in before else "")
             holds, cause = not (is_taken or is_other), f"{item.label} {name}"
@@ -419,12 +417,9 @@ class Memory:
             thing = gone.get(f"{path}/{identifier_of(value, item)}".casefold()) if isinstance(value, dict) else None
             age_s = occasion.sent_s - thing.changed_s if thing is not None else 0.0
             if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
-                expected = (
-                    f"a list without what {thing.change} has deleted {age_s:.0f} s before, which a GET does not find"
-                )
-                yield self._case(
-                    "deleted-is-gone", occasion, expected, "a list with it", cause=f"{operation.label} listed"
-                )
+                expected = f"a list without what {thing.change} has deleted {age_s:.0f} s before, which no GET finds"
+                cause = f"{operation.label} listed"
+                yield self._case("deleted-is-gone", occasion, expected, "a list with it", cause=cause)
 
     def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
         """Record how long a value has stayed the same; yield waiting cases that must have lasted as long."""

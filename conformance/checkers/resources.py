@@ -121,11 +121,9 @@ class Resources:
 
     def _method(self, occasion: Occasion) -> Iterator[Case]:
         """Judge a method that the description does not declare for an existing path."""
-        path, method, status = (
-            occasion.context.target.split("?", 1)[0],
-            occasion.request.method,
-            occasion.response.status,
-        )
+        path = occasion.context.target.split("?", 1)[0]
+        method = occasion.request.method
+        status = occasion.response.status
         if occasion.operation is not None:
             yield from self._take_declared(occasion, path)
             return

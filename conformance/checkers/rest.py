@@ -1,9 +1,12 @@
 """All checkers of REST, over the exchanges of a run one after another."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import chain
 from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.things import doubt_of_write
 from conformance.checkers import declared, fields, problem
 from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
@@ -18,6 +21,7 @@ from conformance.checkers.texts import Texts
 from conformance.checkers.untouched import Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
+from conformance.documents.openapi import resource_at
 from conformance.transport.exchange import Attempt, NoAnswer, Unanswered
 from conformance.verdict.evidence import Case
 
@@ -27,6 +31,9 @@ _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
     declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
 )  # fmt: skip
+
+# What a device may show later, or as what is in effect, if its description says so.
+_STORED: Final = frozenset(f"description/{name}" for name in ("written-is-read", "patch", "defaults"))
 
 
 class RestCheckers:
@@ -76,7 +83,10 @@ class RestCheckers:
         yield from self._codings(occasion)
         if not attempt.response.content.is_plain:
             return  # the remaining checkers read the content
-        for checker in self._over_time:
-            yield from checker(occasion)
+        for case in chain.from_iterable(checker(occasion) for checker in self._over_time):
+            is_stored = not case.holds and case.requirement in _STORED
+            resource = resource_at(self._contract, context.target.partition("?")[0]) if is_stored else None
+            late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
+            yield replace(case, doubt=case.doubt or late)
         for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
             yield from check(occasion)

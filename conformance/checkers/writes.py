@@ -202,18 +202,15 @@ class Writes:
         sent_s, late = occasion.sent_s, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:
             names = {*now, *state.members}
-            is_same = all(same(now.get(one), state.members.get(one)) for one in names)
-            if not writes:
-                self._moving |= {
-                    (item.template, one) for one in names if not same(now.get(one), state.members.get(one))
-                }
-            write = writes[0] if len(writes) == 1 else late if not writes and is_same else None
+            changed = [name for name in names if not same(now.get(name), state.members.get(name))]
+            self._moving |= {(item.template, name) for name in changed if not writes}
+            write = writes[0] if len(writes) == 1 else late if not writes and not changed else None
             if write is not None and (state.at_s <= write.sent_s or write is late):
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
                 is_old = sent_s - write.response.received_s > _SETTLES_S
                 if is_old or write is not late:
                     yield from self._judge_write(occasion, item, write, _Sandwich(state.members, now, moving, is_old))
-                if write.response.ok and is_same and not is_old:
+                if write.response.ok and not changed and not is_old:
                     # A device may act later: a later read is compared as well.
                     self._late[path] = write
         if len(self._states) < _MOST:
@@ -325,19 +322,16 @@ class Writes:
         if not stamp:
             return
         then, now = _moment(change.now.get(stamp)), _moment(change.write.response.header("date"))
-        is_record = any(text.startswith("created") for text in names) and same(
-            change.before.get(stamp), change.now[stamp]
-        )
+        is_same = same(change.before.get(stamp), change.now[stamp])
+        is_record = is_same and any(text.startswith("created") for text in names)
         if not (is_record and is_changed and then and now) or (now - then).total_seconds() <= _SETTLES_S:
             return
         doubts = self._doubts[change.operation.label, f"{stamp} stays"]
         doubts.add(change.write.request.body)
         if len(doubts) >= _SEEN:
             expected = f"the time of {change.label} as {stamp}, {now:%H:%M:%S} by the Date of its response"
-            found, cause = (
-                f"{clip(change.now[stamp])} as {stamp}, as before",
-                f"{change.operation.label} {stamp} stays",
-            )
+            found = f"{clip(change.now[stamp])} as {stamp}, as before"
+            cause = f"{change.operation.label} {stamp} stays"
             doubt = "the member may count other changes than this one"
             yield occasion.case(_READ, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
@@ -353,19 +347,14 @@ class Writes:
             yield from self._judge_same(occasion, item, change, leaf)
             if part.get("format") == "double" and _is_rounded(value, now):
                 self._doubts[key].add(str(value).encode())
-                is_sure = len(self._doubts[key]) >= _SEEN or same(
-                    change.shown_members.get(leaf.top), change.now[leaf.top]
-                )
+                is_told = same(change.shown_members.get(leaf.top), change.now[leaf.top])
+                is_sure = is_told or len(self._doubts[key]) >= _SEEN
                 wrong, doubt = f"{clip(now)} as {name}" if is_sure else "", _COARSE
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
-                if (
-                    not kept
-                    and abs(now - value) < 1
-                    and key not in self._precise
-                    and "integer" not in kinds_of(shape.get(name, {}))
-                ):
+                is_lost = not kept and abs(now - value) < 1 and key not in self._precise
+                if is_lost and "integer" not in kinds_of(shape.get(name, {})):
                     self._doubts[key].add(str(value).encode())
                     wrong, doubt = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else "", _COARSE
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
@@ -380,10 +369,8 @@ class Writes:
                 doubt = _SET if all(map(is_number, value)) else ""
             else:
                 continue
-            expected, cause = (
-                f"{clip(value)} as {name}, as {change.label} wrote it",
-                f"{change.operation.label} {name} value",
-            )
+            expected = f"{clip(value)} as {name}, as {change.label} wrote it"
+            cause = f"{change.operation.label} {name} value"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=cause, doubt=doubt)
 
     def _judge_same(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
@@ -554,10 +541,8 @@ def _leaves(
     for name in sent.keys() & now.keys():
         part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
         if value and isinstance(value, dict) and isinstance(seen, dict):
-            inner, entries = (
-                was if isinstance(was, dict) else {},
-                "" if entry_of(part) is None else f"an entry of {name}",
-            )
+            inner = was if isinstance(was, dict) else {}
+            entries = "" if entry_of(part) is None else f"an entry of {name}"
             yield from _leaves(members_in(part, value), value, inner, seen, f"{of or above + name}.", entries)
         else:
             yield _Leaf(of or f"{above}{name}", part, value, was, seen)

@@ -217,10 +217,8 @@ class Reader:
         target = self.path + "".join(request.target.partition("?")[1:]) if self.path else request.target
         headers = (*request.headers, *([("Accept-Encoding", "gzip")] if is_odd else []))
         found, limit = self.api.send(replace(request, target=target, headers=headers), fresh=is_odd), self.listing.limit
-        page, most = (
-            page_of(found.response, self.listing.operation),
-            inputs.query.get(limit.name) if limit is not None else None,
-        )
+        page = page_of(found.response, self.listing.operation)
+        most = inputs.query.get(limit.name) if limit is not None else None
         if limit is not None and page is not None and isinstance(most, int) and 0 < most < len(page.items):
             # A device that raises the limit shows as many items for the raised one.
             raised = request_of(self.listing.operation, inputs.having("query", limit.name, len(page.items)))
@@ -261,11 +259,9 @@ def _reread_totals(reader: Reader, doubted: list[dict[str, Any]]) -> None:
         doubted: queries by which a total was not the number of items.
     """
     listing, first = reader.listing, reader.api.first.get(reader.listing.operation.label)
-    before, now, query = (
-        page_of(first.response, listing.operation) if first is not None else None,
-        reader.page(),
-        dict[str, Any](),
-    )
+    before = page_of(first.response, listing.operation) if first is not None else None
+    now = reader.page()
+    query = dict[str, Any]()
     if now is not None and listing.limit is not None and 0 < listing.most({}) <= len(now.items):
         most = max(now.totals.values(), default=0) + _FEWEST
         query = {listing.limit.name: most} if fitting(listing.limit, most) else {}

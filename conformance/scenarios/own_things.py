@@ -439,10 +439,8 @@ class _Thing:
             return
         for change in changes:
             parts = flat(change.bodies[next(iter(change.bodies))].schema).get("properties", {}) if change.bodies else {}
-            own, theirs = (
-                members(self.last, parts) if self.last else {},
-                members(other.last, parts) if other.last else {},
-            )
+            own = members(self.last, parts) if self.last else {}
+            theirs = members(other.last, parts) if other.last else {}
             taken = {name: theirs[name] for name in unique.names(create) if name in theirs and name in parts}
             kept = {name: one for name, one in own.items() if name in parts and not parts[name].get("readOnly")}
             if taken:

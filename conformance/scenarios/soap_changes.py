@@ -374,10 +374,8 @@ class _Changes:
         """Yield a message that reads something else, if the device accepts it."""
         if declared is None or node is None:
             return
-        made, known = (
-            _with_others(node, [leaf for leaf in simple_leaves(declared, node) if leaf[0]], 1),
-            self.caller.known_values(act),
-        )
+        made = _with_others(node, [leaf for leaf in simple_leaves(declared, node) if leaf[0]], 1)
+        known = self.caller.known_values(act)
         for path, _ in simple_leaves(declared, node):
             others = [text for text in known.get(node.at(path).name.lower(), ()) if text != node.at(path).text]
             made = with_text(made, path, others[0]) if others else made

@@ -314,10 +314,8 @@ def _patches(
         apart = alike_and_apart(parts[name])[1] or [None]
         # A value that is already there would show nothing.
         *rest, last_item = apart[::-1] if same(first.get(name), apart) else apart
-        whole, added = (
-            {"op": "add", "path": _pointer(name), "value": rest},
-            {"op": "add", "path": f"{_pointer(name)}/-", "value": last_item},
-        )
+        whole = {"op": "add", "path": _pointer(name), "value": rest}
+        added = {"op": "add", "path": f"{_pointer(name)}/-", "value": last_item}
         if rest and fits(parts[name], [*rest, last_item]) and not flat(parts[name]).get("readOnly"):
             makers.append(lambda whole=whole, added=added: [whole, added])  # type: ignore[misc] # bound in its round
             break

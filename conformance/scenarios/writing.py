@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from conformance.api.rest.inputs import request_of, usual_inputs, whole_body, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, as_answered, differences, object_in, with_items
+from conformance.api.rest.things import another, as_answered, differences, doubt_of_write, object_in, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -39,6 +39,7 @@ class Write:
         sent: the request that wrote.
         found: the GET after it.
         other: what reads in another way than it was written, as noun phrases.
+        doubt: why it may, by the descriptions of the operations; empty: it may not.
     """
 
     operation: str
@@ -46,6 +47,7 @@ class Write:
     sent: Exchange
     found: Exchange
     other: tuple[str, ...] = ()
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -177,7 +179,8 @@ class Writer:
             lambda: self.send(read, path, fresh=fresh),
             lambda exchange: self.differing(operation, read, sent, exchange, before),
         )
-        return Write(operation.label, read.label, sent, found.exchange, found.wrong)
+        doubt = doubt_of_write(operation, read)
+        return Write(operation.label, read.label, sent, found.exchange, found.wrong, doubt)
 
     def differing(
         self, operation: Operation, read: Operation, sent: Exchange, found: Exchange, before: Exchange | None = None

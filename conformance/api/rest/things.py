@@ -36,6 +36,15 @@ _REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregi
 _HIDES: Final = re.compile(
     r"\b(?:cancel|abort|archiv|deactivat|disabl|retir|soft|restor|undelet|revok|marke?[ds]? as)", re.IGNORECASE
 )
+# Phrases in a description: a write has no effect yet or GET shows the effect; a device converts a value to store it.
+_LATE: Final = re.compile(
+    r"\bdraft|\bpublish|\bstaged?\b|\bcandidate\b|takes? effect|\bin(?:to)? (?:force|effect)\b|\bmeasured?\b|\bactual"
+    r"|(?:next|after (?:a|the)) (?:re)?(?:start|boot|cycle)\b", re.IGNORECASE
+)  # fmt: skip
+_CONVERTED: Final = re.compile(
+    r"\b(?:round|truncat|cut\b|shorten|clamp|snap|normali[sz]|adjust|convert|trim|steps? of|nearest|first \d+ char"
+    r"|(?:upper|lower)[ -]?case|capital)", re.IGNORECASE
+)  # fmt: skip
 _PASSES: Final = re.compile(
     r"expir|lifetime|\bttl\b|valid[ _](?:until|to|for)|one[- ]time|\bonce\b|consum|temporar|short-lived", re.IGNORECASE
 )
@@ -114,6 +123,11 @@ def doubt_of_deletion(delete: Operation) -> str:
     # Without an id of its own, an operation is named by its method.
     is_sure = _REMOVES.search(f"{delete.id} {delete.text}") and not _HIDES.search(f"{delete.id} {delete.text}")
     return "" if is_sure else "DELETE may end or archive a thing that can still be read"
+
+
+def doubt_of_write(*operations: Operation) -> str:
+    """Return why a GET may not show what was written; nothing unless a description speaks of that."""
+    return "GET may show what is in effect" if any(_LATE.search(one.text) for one in operations) else ""
 
 
 def doubt_of_life(*operations: Operation) -> str:
@@ -195,8 +209,13 @@ def differences(
         elif _are_objects(value) and _are_objects(other):
             items = [flat(one).get("items", {}) for one in (part, shared.get(name, {}))]
             yield from (f"{text} in {name}" for text in _of_items(value, other, items[0], items[1], collections))
-        elif not _alike(value, other, flat(part)):
+        elif not (_alike(value, other, flat(part)) or any(map(_is_converted, (part, shared.get(name))))):
             yield f"{clip(other)} as {name} instead of {clip(value)}"
+
+
+def _is_converted(part: Any) -> bool:
+    """Return whether the description of a member says that the device changes what is written."""
+    return isinstance(part, dict) and bool(_CONVERTED.search(str(flat(part).get("description"))))
 
 
 def _are_objects(value: Any) -> TypeGuard[list[dict[str, Any]]]:

@@ -53,7 +53,8 @@ def written_is_read(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     """Judge whether written values are read again, also later."""
     for write in (write for life in trace for write in life.writes):
         expected = f"what {write.operation} wrote with status {write.sent.response.status}"
-        yield Case(not write.other, write.found, expected, "; ".join(write.other), cause=write.operation)
+        found, cause = "; ".join(write.other), write.operation
+        yield Case(not write.other, write.found, expected, found, cause=cause, doubt=write.doubt)
     yield from _looks(trace, Kind.KEPT)
 
 

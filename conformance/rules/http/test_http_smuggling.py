@@ -18,12 +18,10 @@ from conformance.transport.exchange import Attempt, Exchange, NoAnswer, Unanswer
 from conformance.verdict.evidence import Judge
 
 pytestmark = [pytest.mark.phase("input"), pytest.mark.needs("rest")]
-_BOTH, _CLOSED, _LINES, _COLON = (
-    "web-server/length-and-chunks",
-    "web-server/length-and-chunks-closed",
-    "web-server/header-lines",
-    "web-server/space-before-colon",
-)
+_BOTH = "web-server/length-and-chunks"
+_CLOSED = "web-server/length-and-chunks-closed"
+_LINES = "web-server/header-lines"
+_COLON = "web-server/space-before-colon"
 _CHUNKED, _CHUNKS = "Transfer-Encoding: chunked", raw.chunked(b"abcde", 5)
 # A length shorter than the chunks and the next request: a server that uses it reads garbage as the next request.
 _SHORT = "Content-Length: 3"

@@ -69,6 +69,11 @@ _PATHS = {
         "get": {"summary": "Read a note; its `rank` never falls.", "responses": _OK},
         "patch": {"requestBody": {"content": {"application/merge-patch+json": {"schema": _JOB}}}, "responses": _OK},
     },
+    "/drafts/{id}": {
+        "parameters": [_ID],
+        "get": {"summary": "The published job.", "responses": _OK},
+        "put": {"requestBody": _BODY, "responses": _OK},
+    },
     "/reset": {"post": {"responses": _OK}},
     "/mode": {"get": {"responses": _OK}, "put": {"requestBody": _BODY, "responses": _OK}},
 }
@@ -412,6 +417,23 @@ def _broken(contract, steps):
         )
         broken |= {case.requirement for case in checkers(attempt) if not case.holds}
     return broken & {GONE, THERE, READ, DEFAULTS, KEEPS, PATCH, OWN, STATES}
+
+
+def test_what_is_published_later_is_a_doubt(contract):
+    told = dict[str, set[bool]]()
+    for path in ("drafts", "jobs"):
+        checkers = RestCheckers(contract, BASE)
+        for now, method, rank in ((0, "PUT", 7), (5, "GET", 1), (6, "GET", 1), (9, "PUT", 3), (20, "GET", 3)):
+            sent = json.dumps({"name": "a", "rank": rank}).encode() if method == "PUT" else b""
+            fields = (("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else []))
+            body = json.dumps(_job("1", rank=rank)).encode() if not sent else b""
+            response = Response(
+                200 if body else 204, (("Content-Type", "application/json"),), body, 1.0, received_s=now
+            )
+            exchange = Exchange(Request(method, f"{BASE}/{path}/1", fields, sent), response)
+            cases = [case for case in checkers(exchange) if case.requirement == READ and not case.holds]
+            told.setdefault(path, set()).update(bool(case.doubt) for case in cases)
+    assert told == {"drafts": {True}, "jobs": {False}}
 
 
 @pytest.mark.parametrize("name", BROKEN)
