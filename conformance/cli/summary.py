@@ -74,9 +74,9 @@ def print_summary(outcome: Certification) -> None:
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
     not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
-    counts[not_claimed] = counts.pop("not-claimed", 0)
-    # In the order of the pages, and with their words.
-    order = ("fail", "error", "warn", "skip", "pass", not_claimed)
+    counts[not_claimed], counts["inconclusive"] = counts["not-claimed"], counts["error"]
+    # In the order of the pages, and with the words of the classes.
+    order = ("fail", "inconclusive", "warn", "skip", "pass", not_claimed)
     told = ", ".join(f"{counts[value]} {value}" for value in order if counts[value])
     if "api" in document:
         _print_unshown(document["api"]["operations"])

@@ -54,6 +54,7 @@ def test_what_failed_is_judged_again_and_the_run_ends_at_the_first(device, tmp_p
     first = certified(device, tmp_path / "first", "-x")
     assert first.exit_code == 1
     assert first.result["requests"] < whole.result["requests"]
+    assert re.search(r", \d+ inconclusive[,;]", first.text), first.text
     assert any("the run ended at its first finding (-x)" in one["reason"] for one in first.result["requirements"])
 
 
