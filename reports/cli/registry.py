@@ -79,7 +79,7 @@ def build(
         click.echo(f"refused: {on_a_line(refusal.detail, 400)}", err=True)
     counting = sum(history.current.stands for history in found)
     have = "robot has" if len(found) == 1 else "robots have"
-    click.echo(f"{counting} of {len(found)} {have} a certificate that counts; {len(refused)} refused")
+    click.echo(f"{counting} of {len(found)} {have} a valid certificate; {len(refused)} refused")
     click.echo(f"site: {out / INDEX}")
     if refused:
         raise SystemExit(EXIT_REFUSED)

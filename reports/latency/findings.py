@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reports.latency import against
 from reports.latency.distributions import AllSeries
 from reports.latency.figures.timeline import Stall, stalls
 from reports.latency.numbers import interval, ms, share
@@ -13,6 +12,9 @@ from reports.pages.page import counted, opened
 _MANY_FAR = 0.01
 PAPER = {"rest_ms": 1.5, "soap_ms": 2.5, "ratio": 1.67}
 """The paper's mean response times on localhost, and their ratio; it gives neither spread nor method."""
+
+AGAINST = {"slower": ("bad", "✗"), "not slower": ("good", "✓"), "unclear": ("warning", "?")}
+"""Tone and sign of the verdicts of `roaas load --against`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,7 @@ def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:
     if "not known" in outcomes or not any(one.data["count"] for one in series.values()):
         return "warning", "?"
     if following is not None:
-        return against.TAGS[following]
+        return AGAINST[following]
     return ("good" if outcomes else "quiet"), "✓"
 
 

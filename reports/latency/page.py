@@ -4,14 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from reports.latency import against
 from reports.latency.distributions import AllSeries, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
 from reports.latency.figures.load import load
 from reports.latency.figures.ratios import SPANS, Ratio, means, ratios, spans
 from reports.latency.figures.spectrum import spectrum
 from reports.latency.figures.timeline import heat, timeline
-from reports.latency.findings import PAPER, remarks, verdict
+from reports.latency.findings import AGAINST, PAPER, remarks, verdict
 from reports.latency.noticed import sentences
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
 from reports.pages.page import html_page, markdown_page
@@ -87,7 +86,7 @@ def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
         "share": share,
         "interval": interval,
         "dash": NONE,
-        "tag": against.tag,
+        "tag": lambda change: AGAINST.get(change["verdict"]),
     }
 
 
@@ -134,7 +133,7 @@ def paper_rows(result: Mapping[str, Any], series: AllSeries) -> list[PaperRow]:
 
 def _pictures(result: Mapping[str, Any], series: AllSeries) -> dict[str, Picture | None]:
     return {
-        "against": against.picture(result),
+        "against": _against_picture(result),
         "ratios": _ratio_picture(result),
         "spectrum": spectrum(series),
         "heat": heat(result),
@@ -164,4 +163,32 @@ def _ratio_picture(result: Mapping[str, Any]) -> Picture | None:
         "SOAP's service time divided by REST's, at the median (50 %) and at the 99th percentile, with 95 % intervals. "
         f"Right of 1 SOAP is slower.{'' if mark is None else line}",
         mark=mark,
+    )
+
+
+def _against_picture(result: Mapping[str, Any]) -> Picture | None:
+    """Return a figure of the ratios of service times of both robots, or None without a second robot.
+
+    Each ratio has its 95 % interval; a dashed line marks the tolerance.
+    """
+    compared = result.get("against")
+    if compared is None:
+        return None
+    rows = [
+        Ratio(
+            f"{change['operation']}, {change['interface'].upper()}, {QUANTILE_WORDS[change['quantile']]}",
+            change["ratio"],
+            (change["ci95"][0], change["ci95"][1]) if change["ci95"] else None,
+            COLOUR[change["interface"]],
+        )
+        for change in compared["changes"]
+        if change["ratio"] is not None and change["verdict"] is not None
+    ]
+    return ratios(
+        "against",
+        "this robot over the other",
+        rows,
+        "Service time on this robot divided by service time on the other one, with 95 % intervals. Right of 1 this "
+        "robot is slower. The dashed line is the tolerance.",
+        mark=(1 + compared["tolerance"], f"tolerance, {share(compared['tolerance'])}"),
     )

@@ -52,7 +52,7 @@ def test_a_site_shows_what_a_trusted_vendor_wrote_and_runs_none_of_it(vendor, tm
     vendor.forge(conformant(), hostile_facts)
     trusted(tmp_path, vendor)
     done = registry(tmp_path, vendor.envelope)
-    assert done.stdout.startswith("0 of 1 robot has a certificate that counts; 0 refused"), done.output
+    assert done.stdout.startswith("0 of 1 robot has a valid certificate; 0 refused"), done.output
     pages = sorted((tmp_path / "site").rglob("*.html"))
     assert len(pages) == 2
     for path in pages:
@@ -73,7 +73,7 @@ def test_a_certificate_of_the_future_supersedes_none(vendor, tmp_path):
     future.forge(conformant(), run(finished="2099-01-01T00:00:00Z"))
     assert now.sign(conformant()).exit_code == 0
     done = registry(tmp_path, *folders)
-    assert done.stdout.startswith("1 of 1 robot has a certificate that counts"), done.output
+    assert done.stdout.startswith("1 of 1 robot has a valid certificate"), done.output
 
 
 def test_a_registry_says_that_two_keys_signed_for_one_robot(vendor, honest, tmp_path):
@@ -87,7 +87,7 @@ def test_a_registry_does_not_count_one_requirement_of_all(vendor, tmp_path):
     trusted(tmp_path, vendor)
     vendor.forge(conformant(), outcomes(dropped))
     done = registry(tmp_path, vendor.folder)
-    assert done.stdout.startswith("0 of 1 robot has a certificate that counts"), done.output
+    assert done.stdout.startswith("0 of 1 robot has a valid certificate"), done.output
     assert "not the requirements of the suite" in (tmp_path / "site" / "index.html").read_text()
 
 

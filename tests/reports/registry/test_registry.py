@@ -54,7 +54,7 @@ def greens(site):
 def test_a_robot_has_a_row_and_a_page(host):
     host.sign("one")
     done = host.build()
-    assert (done.exit_code, done.stdout.splitlines()[0]) == (0, "1 of 1 robot has a certificate that counts; 0 refused")
+    assert (done.exit_code, done.stdout.splitlines()[0]) == (0, "1 of 1 robot has a valid certificate; 0 refused")
     assert index(host) == {"Courier 7": ("conformant", {"http": "good", "safety": "good", "describe": "quiet"})}
     row = page_of(host.site / "index.html").xpath("//tbody/tr")[0]
     text = row.text_content()
@@ -334,7 +334,7 @@ def test_bad_entries_are_told_and_left_out(host, given):
     assert (done.exit_code, len(refused)) == (1, len(bad) + 1), done.output
     for path in (host.folder / "nothing", *bad):
         assert [line for line in refused if line.startswith(f"refused: {path}: ")], path
-    assert done.stdout.startswith(f"1 of 1 robot has a certificate that counts; {len(refused)} refused")
+    assert done.stdout.startswith(f"1 of 1 robot has a valid certificate; {len(refused)} refused")
     assert list(index(host)) == ["Courier 7"]
     assert str(host.folder) not in host.text()
 
