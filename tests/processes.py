@@ -1,5 +1,6 @@
 """Commands that tests run to their end."""
 
+import os
 import secrets
 import socket
 import subprocess
@@ -47,7 +48,8 @@ def ended(
     """Run a command to its end; return what it wrote, as text.
 
     Args:
-        command: its words. `python -m roaas` and `LOAD` run in a process that imported their modules before.
+        command: its words. `python -m roaas` and `LOAD` run in a process that imported their modules before, and so
+            does the process that measures.
         check: raise an error if the exit code is not 0.
         peak_mb: the file for its peak memory.
         fresh: start Python anew for them as well, as an environment of its own (`env`) always does.
@@ -57,6 +59,8 @@ def ended(
     weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
     anew = fresh or peak_mb or not {"env", "preexec_fn"}.isdisjoint(options)
     if command[:3] in _WARM and not anew:
+        if command[:3] == LOAD or "load" in command:
+            os.environ[warm_commands.MEASURING] = warm_commands.beginning("measuring")[-1]
         command = (*warm_commands.beginning(), *command[1:])
     return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
 

@@ -5,23 +5,30 @@ each command. The second process runs the command; the first waits for it. The c
 directory, the environment and the streams of its client, and the client ends with its exit code.
 """
 
+import _socket
 import gc
 import json
 import os
 import runpy
 import secrets
-import select
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
-import threading
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
+from os import close, fork, waitpid
 from pathlib import Path
 from pkgutil import walk_packages
+from select import select
+from signal import signal as set_signal
+
+from conformance.commandline.endings import PARENT_VARIABLE
+
+#: The environment variable with the name of the server for the process of `roaas load` that measures.
+MEASURING = "ROAAS_TESTS_MEASURING"
 
 _IMPORTED = (
     "anyio", "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "h2.connection",
@@ -47,14 +54,18 @@ sys.exit(code)
 
 
 @cache
-def beginning() -> tuple[str, ...]:
-    """Return the words that stand for `python` before `-m roaas` or `-c ...`; start the server for them."""
+def beginning(kind: str = "commands") -> tuple[str, ...]:
+    """Return the words that stand for `python` before `-m roaas` or `-c ...`; start the server for them.
+
+    Args:
+        kind: "commands", or "measuring" for the process of `roaas load` that measures, which imports Locust.
+    """
     if sys.platform != "linux":
         return (sys.executable,)
     name = f"roaas-tests-{os.getpid()}-{secrets.token_hex(8)}"
     # The server ends when this process does, which holds the other end of its stdin.
     server = subprocess.Popen(
-        (sys.executable, __file__, name),
+        (sys.executable, __file__, name, kind),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
@@ -68,9 +79,7 @@ def beginning() -> tuple[str, ...]:
 _SERVERS: list[subprocess.Popen[bytes]] = []
 
 
-def _serve(name: str) -> None:
-    """Serve clients until the process that started this one has closed its stdin."""
-    del sys.path[0]  # the folder of this file
+def _import_commands() -> None:
     for package in _IMPORTED:
         with suppress(ModuleNotFoundError):  # of an extra that is not installed
             import_module(package)
@@ -81,58 +90,79 @@ def _serve(name: str) -> None:
             if not module.name.startswith(_NOT_IMPORTED):
                 import_module(module.name)
     import_module("loadtests.described.run")  # what `roaas load` needs before it starts the process that measures
+
+
+def _serve(name: str, kind: str) -> None:
+    """Serve clients until the process that started this one has closed its stdin.
+
+    Sockets, forks and signals are those of Python itself, because Locust replaces them when it is imported.
+    """
+    del sys.path[0]  # the folder of this file
+    if kind == "measuring":
+        import_module("loadtests.engine.run")
+    else:
+        _import_commands()
     assert len(list(Path("/proc/self/task").iterdir())) == 1  # a process with threads must not fork
     gc.collect()
     gc.freeze()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind("\0" + name)
-        listener.listen(64)
-        print("ready", flush=True)  # noqa: T201 - its starter waits for that
-        while select.select([listener, sys.stdin], [], [])[0] == [listener]:
-            connection, _ = listener.accept()
-            with connection:
-                if os.fork() == 0:
-                    listener.close()
-                    _attend(connection)
+    set_signal(signal.SIGCHLD, signal.SIG_IGN)
+    listener = _socket.socket(_socket.AF_UNIX)
+    listener.bind("\0" + name)
+    listener.listen(64)
+    print("ready", flush=True)  # noqa: T201 - its starter waits for that
+    while select([listener, sys.stdin], [], [])[0] == [listener]:
+        descriptor, _ = listener._accept()  # noqa: SLF001 - what accept() is made of, without a socket of gevent
+        if fork() == 0:
+            listener.close()
+            _attend(_socket.socket(fileno=descriptor))
+        close(descriptor)
 
 
-def _attend(connection: socket.socket) -> None:
+def _attend(connection: _socket.socket) -> None:
     """Run the command of a client in a process of its own; send its exit code, or kill it when the client is gone."""
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    set_signal(signal.SIGCHLD, signal.SIG_DFL)
     head, streams, _, _ = socket.recv_fds(connection, 20, 3)
-    with connection.makefile("rb") as stream:
-        words, folder, environment = json.loads(stream.read(int(head)))
-    command = os.fork()
+    text = connection.recv(int(head), socket.MSG_WAITALL)
+    command = fork()
     if command == 0:
         connection.close()
-        _run(words, folder, environment, streams)
+        _run(*json.loads(text), streams)
     for stream in (0, 1, 2, *streams):
-        os.close(stream)
-    threading.Thread(target=_kill_without, args=(connection, command), daemon=True).start()
-    _, status = os.waitpid(command, 0)
+        close(stream)
+    ended = os.pidfd_open(command)
+    if ended not in select([connection, ended], [], [])[0]:
+        os.kill(command, signal.SIGKILL)
+    _, status = waitpid(command, 0)
     with suppress(OSError):
         connection.sendall(str(os.waitstatus_to_exitcode(status)).encode())
     os._exit(0)
 
 
-def _kill_without(connection: socket.socket, command: int) -> None:
-    """Kill a command when its client has ended. A client that still waits ends after the process that calls this."""
-    connection.recv(1)
-    os.kill(command, signal.SIGKILL)
+class _Popen(subprocess.Popen):
+    """Has the process of `roaas load` that measures come from the server for it."""
+
+    def __init__(self, args, **options) -> None:
+        server = os.environ.get(MEASURING)
+        if server and args == [sys.executable, "-P", "-m", "loadtests"] and not options.get("pass_fds"):
+            args = [sys.executable, "-I", "-S", "-c", _CLIENT, server, "-m", "loadtests"]
+        super().__init__(args, **options)
 
 
 def _run(words: list[str], folder: str, environment: dict[str, str], streams: list[int]) -> None:
     """Do in this process what `python` with these words does in a new one, and end it."""
     for number, stream in enumerate(streams):
         os.dup2(stream, number)
-        os.close(stream)
+        close(stream)
     os.environ.clear()
     os.environ.update(environment)
     tempfile.tempdir = None  # found anew, by the command's environment
     os.chdir(folder)
     sys.path.insert(0, folder)
     sys.argv[1:] = words[2:]
+    if words[1] == "loadtests":  # it ends with its parent, which is the process that waits for it
+        os.environ[PARENT_VARIABLE] = str(os.getppid())
+    else:
+        subprocess.Popen = _Popen
     if words[0] == "-m":
         runpy.run_module(words[1], run_name="__main__", alter_sys=True)
     else:
@@ -141,4 +171,4 @@ def _run(words: list[str], folder: str, environment: dict[str, str], streams: li
 
 
 if __name__ == "__main__":
-    _serve(sys.argv[1])
+    _serve(*sys.argv[1:])
