@@ -6,6 +6,7 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import msgspec
@@ -47,7 +48,7 @@ class RequirementSet:
     frozen_as: Mapping[str, Frozen]
     renamed: Mapping[str, str] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def requirements(self) -> dict[str, Frozen]:
         """Return level and text digest by present id."""
         return {self.renamed.get(id_, id_): item for id_, item in self.frozen_as.items()}
@@ -90,8 +91,7 @@ def current(contract: Contract, ledger: Mapping[str, Requirement]) -> Requiremen
     """Return a ledger as a set, with the name of the frozen set of the same content if there is one."""
     requirements = {id_: frozen_form(item) for id_, item in ledger.items()}
     sets = (load_set(contract, name) for name in names(contract))
-    same = next((set_ for set_ in sets if set_.requirements == requirements), None)
-    return same or RequirementSet(_UNFROZEN, requirements)
+    return next((set_ for set_ in sets if set_.requirements == requirements), RequirementSet(_UNFROZEN, requirements))
 
 
 def frozen_form(requirement: Requirement) -> Frozen:
