@@ -57,7 +57,7 @@ def redirect(where: str, status: int = 302) -> Answer:
 
 def packed(content: bytes) -> Answer:
     """Return an answer with content packed by gzip."""
-    return document(gzip.compress(content), Content_Encoding="gzip")
+    return document(gzip.compress(content, 1), Content_Encoding="gzip")
 
 
 @contextmanager

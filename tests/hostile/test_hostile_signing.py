@@ -58,26 +58,15 @@ def twice(result):
     result["requirements"].append(result["requirements"][0])
 
 
-def without_a_must(result):
-    result["requirements"].remove(first_of("MUST", result))
-
-
 def invented(result):
     result["requirements"].append(result["requirements"][0] | {"id": "http/invented", "class": "http"})
-
-
-def other_robot(result):
-    """Put the results of another robot in for a class that this one failed."""
-    result["requirements"] += [one | {"verdict": "pass"} for one in result["requirements"] if one["class"] == "http"]
 
 
 # What is changed in a result, and what `roaas sign` says of it.
 EDITED = [
     ("one requirement of all", only_one, f"{COUNT - 1} of {COUNT} requirements are not listed"),
-    ("a MUST less", without_a_must, f"1 of {COUNT} requirements are not listed"),
     ("a requirement twice", twice, "is listed more than once"),
     ("an invented requirement", invented, "the suite has no requirement http/invented"),
-    ("another robot's requirements", other_robot, "is listed more than once"),
     ("a MUST as SHOULD", lambda result: first_of("MUST", result).update(level="SHOULD"), "but is a MUST"),
     ("a SHOULD as MAY", lambda result: first_of("SHOULD", result).update(level="MAY"), "but is a SHOULD"),
     ("another class", requirement(0, **{"class": "describe"}), "is in class describe"),
@@ -262,7 +251,7 @@ def other_kind(vendor):
     edited(payloadType="application/vnd.in-toto+json")(vendor)
 
 
-# What is done to a genuine envelope, and why it is refused.
+# What is done to a genuine envelope besides what reports/attestation/test_forgeries.py does, and why it is refused.
 CHANGED = [
     ("payload twice", replaced('"payload"', '"payload": "e30=", "payload"'), "'payload' occurs twice"),
     (
@@ -270,12 +259,8 @@ CHANGED = [
         payload(lambda text: text.replace('"verdict"', '"verdict":"x","verdict"', 1)),
         "twice",
     ),
-    ("algorithm none", edited(alg="none"), "unknown field `alg`"),
-    ("no signature", signatures(lambda _: []), "length >= 1"),
     ("empty signature", signatures(lambda one: [one[0] | {"sig": ""}]), "not made by your key"),
     ("zero signature", signatures(lambda one: [one[0] | {"sig": base64.b64encode(bytes(64)).decode()}]), "not made by"),
-    ("two signatures", signatures(lambda one: one + one), "length <= 1"),
-    ("a key with the signature", signatures(lambda one: [one[0] | {"public": "x"}]), "unknown field `public`"),
     ("key id in capitals", signatures(lambda one: [one[0] | {"keyid": one[0]["keyid"].upper()}]), "foreign key"),
     ("payload as an object", edited(payload={}), "Expected `str`"),
     ("another payload type", edited(payloadType="application/vnd.in-toto+JSON"), "payload type"),

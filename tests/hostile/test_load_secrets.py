@@ -16,12 +16,9 @@ from conformance.transport.reach import Trust
 from loadtests.clients.robot import Robot, Secrets, with_secrets
 
 _SECRETS = {
-    "token": "tok3n/of+this&load-93jd82hd",
-    "basic": "pa55 wörd/43",
-    "wsse": "wsse-pa55 word",
-    "key": "k3y in&hdr-8842",
-    "lease": "h3ad er-value\"1'",
-}
+    "token": "tok3n/of+this&load-93jd82hd", "basic": "pa55 wörd/43", "wsse": "wsse-pa55 word",
+    "key": "k3y in&hdr-8842", "lease": "h3ad er-value\"1'",
+}  # fmt: skip
 # The options of each credential, with the names of files, over SOAP and over REST.
 _SOAP = (
     *("--token-file", "token", "--api-key", "query key", "--api-key-file", "key", "--headers-file", "lease"),

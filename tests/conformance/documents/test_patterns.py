@@ -68,11 +68,11 @@ def test_what_ecma_262_does_not_have_is_no_pattern(pattern):
 
 @pytest.mark.parametrize("pattern", [r"^(?=a)(a+)+$", r"^(?=a)(?:a|aa)+$", r"^(a|a)*\1$(?=x)"])
 def test_a_pattern_that_backtracks_for_ever_ends(pattern):
-    started = time.monotonic()
-    for _ in range(100):
+    started = time.process_time()
+    for _ in range(10):
         with pytest.raises(SlowPatternError, match="takes too long"):
             shape_of({"pattern": pattern}).problem("a" * 100 + "!")
-    assert time.monotonic() - started < 20
+    assert time.process_time() - started < 2
 
 
 def test_another_text_of_a_pattern_with_nested_quantifiers_is_judged():

@@ -113,17 +113,8 @@ class Cell:
 
 #: The faults, and the requirements that must notice each, the first one at least.
 FAULTS = {
-    "resets-while-running": "refused",
-    "starts-when-paused": "refused",
-    "speed-while-running": "refused",
-    "other-refusal": "refused",
-    "stop-refused-when-paused": "taken",
-    "refusal-pauses": "keeps",
-    "speed-stops": "leads",
-    "pause-without-effect": "leads",
-    "latch-lost": "leads",
-    "never-runs": "leads",
-    "resumes-by-itself": "leads",
-    "ready-while-starting": "order",
-    "paused-on-the-way": "order",
-}
+    "resets-while-running": "refused", "starts-when-paused": "refused", "speed-while-running": "refused",
+    "other-refusal": "refused", "stop-refused-when-paused": "taken", "refusal-pauses": "keeps", "speed-stops": "leads",
+    "pause-without-effect": "leads", "latch-lost": "leads", "never-runs": "leads", "resumes-by-itself": "leads",
+    "ready-while-starting": "order", "paused-on-the-way": "order",
+}  # fmt: skip

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
@@ -153,6 +152,8 @@ def test_a_binomial_quantile_is_the_first_number_whose_cumulative_probability_re
 
 @pytest.mark.parametrize("cells", [3, 10_000])
 def test_a_slope_and_its_interval_are_those_of_scipy(cells):
+    from scipy import stats  # noqa: PLC0415 - it takes half a second, in each process that shares the tests
+
     random = np.random.default_rng(1)
     for slope in (-1.0, 0.0, 0.3):
         times = np.cumsum(random.uniform(0.1, 1.0, 20))
