@@ -65,4 +65,4 @@ def test_a_run_ends_with_verdicts_whatever_lists_hold(tmp_path):
     verdicts = {one["id"]: one["verdict"] for one in done.result["requirements"]}
     assert "error" not in verdicts.values(), done.text
     assert "not judged: " not in done.text, done.text
-    assert verdicts["description/list-limit"] == "warn"
+    assert verdicts["description/list-limit"] == "fail"
