@@ -8,7 +8,7 @@ from conformance.api.rest.calls import Call, example_call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.validity import require_valid
 from conformance.documents.json_schema import kind_of
-from conformance.documents.openapi import Operation, operations_of
+from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.wsdl_pack import own_wsdl
 
 # Number of operations that the checks of HTTP read.
@@ -49,8 +49,8 @@ def readable(api: RestInterface, operation: Operation) -> Call:
         HarnessError: the generated request is invalid by the contract.
     """
     call = example_call(api, operation)
-    numbers = [item.name for item in operation.parameter("query") if kind_of(item.schema) in {"number", "integer"}]
-    required = [item.name for item in operation.parameter("query") if item.name in numbers and item.required]
+    plain = [item for item in operation.parameter("query") if item.required and not is_json(item.media_type)]
+    required = [item.name for item in plain if kind_of(item.schema) in {"number", "integer"}]
     if not required:
         return call
     if operation.id not in api.small_numbers:
