@@ -24,14 +24,14 @@ def sign(door: FrontDoor, directory: Path, key: Path, pack: str | None) -> None:
     key cannot be used.
     """
     by = _pack_of(door, directory) if pack is None else pack
-    suite = read_result(directory / RESULT_NAME)["suite"]
-    if suite["digest"] != door.known(by)["suite"]:
+    suite, known = read_result(directory / RESULT_NAME)["suite"], door.known(by)
+    if suite["digest"] != known["suite"]:
         click.echo(
             f"RoAAS {excerpt(suite['version'], 40)} judged the robot, with another suite or contract than the "
             "installed one: the requirements were not compared with a ledger",
             err=True,
         )
-    for path in render(directory, Notary(key, lambda: door.known(by))):
+    for path in render(directory, Notary(key, lambda: known)):
         click.echo(path)
 
 

@@ -33,11 +33,6 @@ def requirement(place, **members):
     return lambda result: result["requirements"][place].update(members)
 
 
-def without(*names):
-    """A result without some of its keys."""
-    return lambda result: [result.pop(name) for name in names]
-
-
 def of_result(**members):
     return lambda result: result.update(members)
 
