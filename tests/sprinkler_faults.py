@@ -32,7 +32,7 @@ FAULTS = [
     (
         "as described",
         {
-            "a missing If-Match is taken": "description/required",
+            "a missing If-Match is taken": "description/if-match",
             "a stale If-None-Match is current": "description/entity-tag",
             "one key acts twice": "description/idempotency-key",
             "what is refused with 406 is written": "description/refused-keeps",

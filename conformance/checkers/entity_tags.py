@@ -12,6 +12,12 @@ from conformance.documents.openapi import Operation, is_json
 from conformance.transport.exchange import SAFE_METHODS, Response
 from conformance.verdict.evidence import Case
 
+# Sentences in a description that demand a condition.
+_NEEDED: Final = re.compile(
+    r"\b(?:requires?|must|needs?)\b[^.]*\b(?:if-match|etag)\b|\b(?:if-match|etag)\b[^.]*\b(?:required|mandatory|must|needed)\b"
+    r"|\b(?:without|no|missing)\b[^.]*\bif-match\b",
+    re.IGNORECASE,
+)
 _TAG: Final = re.compile(r'(?:W/)?"[^"]*"')
 _OPAQUE: Final = re.compile(r'"[^"]*"')
 _PART: Final = re.compile(r"bytes (?P<first>\d+)-(?P<last>\d+)/", re.IGNORECASE)
@@ -20,7 +26,7 @@ _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 _CONDITIONS: Final = frozenset(
     {"if-match", "if-none-match", "if-modified-since", "if-unmodified-since", "if-range", "range"}
 )
-_TAGS, _MATCH, _REQUIRED = "description/entity-tag", "description/if-match", "description/required"
+_TAGS, _MATCH = "description/entity-tag", "description/if-match"
 # Conditions beside If-Match for which a request may also be refused with 412 (RFC 9110 13.2.2).
 _OTHERS: Final = frozenset({"if-none-match", "if-modified-since", "if-unmodified-since"})
 # _MOST: entity tags that are remembered. _LARGEST: bytes of the content of each.
@@ -254,7 +260,9 @@ def _judge_needed(occasion: Occasion, asked: dict[str, str]) -> Iterator[Case]:
     is_asked_for = "if-match" in names and "428" in operation.responses
     if asked.keys().isdisjoint({"if-match", *_OTHERS}) and is_asked_for and is_decided:
         expected = "a refusal with 428, which the operation declares as well as If-Match"
-        yield occasion.case(_REQUIRED, not is_done, expected, cause=f"{operation.label} header If-Match")
+        is_required = any(item.required for item in operation.parameter("header") if item.name.lower() == "if-match")
+        doubt = "" if is_required or _NEEDED.search(operation.text) else "428 may be about some requests only"
+        yield occasion.case(_MATCH, not is_done, expected, cause=f"{operation.label} header If-Match", doubt=doubt)
 
 
 def _has_changed(occasion: Occasion, before: Response) -> bool:

@@ -329,11 +329,10 @@ class Memory:
             if other:
                 self._undefaulted[key] = now[name]
             if not other or before == now[name]:
-                expected, cause = (
-                    f"the declared default of what {operation.label} left out",
-                    f"{operation.label} {name}",
-                )
-                yield occasion.case("description/defaults", not other, expected, other, cause=cause)
+                expected = f"the declared default of what {operation.label} left out"
+                cause, doubt = f"{operation.label} {name}", "the default may stand for a value that the device chooses"
+                doubt = "" if isinstance(one, int | float) else doubt
+                yield occasion.case("description/defaults", not other, expected, other, cause=cause, doubt=doubt)
 
     def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         """Judge whether a request has written members that the device sets, or members that never change."""

@@ -420,8 +420,9 @@ class Writes:
             is_kept = same(now, was) and change.is_settled(leaf.top, change.sent_value)
             of = "the default of what" if "default" in given else "which"
             expected = f"{clip(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
-            found = f"{clip(now)} as {name}, as before"
-            yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=f"{item.label} {name}")
+            found, cause = f"{clip(now)} as {name}, as before", f"{item.label} {name}"
+            doubt = "PUT may keep what it leaves out"
+            yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=cause, doubt=doubt)
 
     def _judge_merge(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a merge patch removes by null, merges objects and replaces lists (RFC 7396)."""

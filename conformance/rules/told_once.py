@@ -25,11 +25,13 @@ class Fault:
         cause: faults of the same cause are told once.
         observed: what the response shows, as a noun phrase.
         expected: what it should be, as a noun phrase; empty: that of the rule.
+        doubt: as in Case.
     """
 
     cause: str
     observed: str
     expected: str = ""
+    doubt: str = ""
 
 
 def told_once(
@@ -43,15 +45,15 @@ def told_once(
         fault_of: returns what is wrong with a probe, or None.
         apart: whether each operation is a cause of its own.
     """
-    faults: dict[str, list[tuple[Probe, Fault]]] = {}
+    faults: dict[tuple[str, str], list[tuple[Probe, Fault]]] = {}
     for probe in probes:
         fault = fault_of(probe)
         if fault is None:
             yield Case(holds=True, exchange=probe.attempt, expected=expected)
         else:
             cause = f"{probe.operation} {fault.cause}" if apart else fault.cause
-            faults.setdefault(cause, []).append((probe, fault))
-    for cause, found in faults.items():
+            faults.setdefault((cause, fault.doubt), []).append((probe, fault))
+    for (cause, doubt), found in faults.items():
         # The smallest request shows it best; a usual one better than an odd one.
         probe, fault = min(found, key=lambda pair: (_oddness(pair[0].kind), pair[0].attempt.request.size))
         showing = {
@@ -71,6 +73,7 @@ def told_once(
             cause=cause,
             subject=probe.operation,
             operations=tuple(showing.values()),
+            doubt=doubt,
         )
 
 

@@ -25,6 +25,9 @@ from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 
 _REFUSED = frozenset({400, 415, 422})
+_INVALID = frozenset({400, 422})
+# Doubt about a refusal of what the description allows.
+_FIT = "the values of a request may have to fit each other, or what the device does at the moment"
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
 # Header fields whose wrong values a server may ignore (RFC 9110 12.5, 13.1, 14.2; RFC 7240 2), whatever is declared.
 _OF_HTTP = frozenset(
@@ -205,7 +208,8 @@ def optional(trace: Survey) -> Iterable[Outcome]:
 @rule("description/enums", on=(survey,))
 def enums(trace: Survey) -> Iterable[Outcome]:
     """Judge whether each value of an enumeration is accepted, if another one is."""
-    yield from _judge_accepted(trace, (Kind.ENUM,), "each declared value of the enumeration accepted")
+    kinds = (Kind.ENUM,)
+    yield from _judge_accepted(trace, kinds, "each declared value of the enumeration accepted", sure=kinds)
 
 
 @rule("description/examples", on=(survey,))
@@ -235,7 +239,7 @@ def valid_accepted(trace: Survey, run: Run) -> Iterable[Outcome]:
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED or probe.exchange is None:
             return None
-        return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange))
+        return Fault(f"{probe.operation} {probe.status}", _refusal(probe.exchange), doubt=_FIT)
 
     valid = [one for one in generated if one.validity == VALID and not one.invents and not _is_extreme(one)]
     yield from held_back(one for one in trace.probes if one.kind is Kind.GENERATED and one.validity == VALID)
@@ -253,6 +257,13 @@ def _is_extreme(probe: Probe) -> bool:
         or any(abs(float(number)) > _LARGEST for number in _NUMBER.findall(text))
         or any(not _FIRST_YEAR <= int(year) <= _LAST_YEAR for year in _YEAR.findall(text))
     )
+
+
+def _is_alone(probe: Probe) -> bool:
+    """Return whether the value at a bound is the only parameter of a GET, so that it fits all others."""
+    request = probe.attempt.request
+    is_bound = probe.kind is Kind.BOUND and probe.place.startswith("query ") and probe.status in _INVALID
+    return is_bound and request.method == "GET" and len(parse_qsl(urlsplit(request.target).query)) == 1
 
 
 def _value_key(probe: Probe) -> tuple[str, str, str]:
@@ -295,9 +306,12 @@ def _path_of(probe: Probe) -> str:
 
 
 def _judge_accepted(
-    trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False
+    trace: Survey, kinds: tuple[Kind, ...], expected: str, *, anyway: bool = False, sure: tuple[Kind, ...] = ()
 ) -> Iterator[Outcome]:
-    """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is."""
+    """Yield whether valid requests are accepted; unless ``anyway``, of operations whose usual request is.
+
+    A refusal of the kinds ``sure`` is beyond doubt.
+    """
     works = {one.operation for one in trace.probes if one.kind is Kind.USUAL and one.ok}
     sent = [one for one in trace.probes if one.kind in kinds and one.exchange and one.validity != INVALID]
     # Only the device knows which ids and cursors exist.
@@ -311,7 +325,8 @@ def _judge_accepted(
     def fault(probe: Probe) -> Fault | None:
         if probe.status not in _REFUSED:
             return None
-        return Fault(f"{probe.operation} {without_numbers(probe.place)}", _refusal(probe.exchange))
+        doubt = "" if probe.kind in sure or _is_alone(probe) else _FIT
+        return Fault(f"{probe.operation} {without_numbers(probe.place)}", _refusal(probe.exchange), doubt=doubt)
 
     yield from held_back(sent)
     yield from told_once(probes, expected, fault)

@@ -176,7 +176,7 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
         ("description/if-match", [_STATE, _one("PUT /state 200", if_none_match="*")]),
         ("description/if-match", [_STATE, _one("PUT /state 200", if_match='W/"s"')]),
         ("description/problem-status", [_one("GET /state 404", b'{"status": 400}', kind="application/problem+json")]),
-        ("description/required", [_STATE, _one("PUT /state 200")]),
+        ("description/if-match", [_STATE, _one("PUT /state 200")]),
     ],
 )
 def test_faults_are_found(tmp_path, requirement, exchanges):
