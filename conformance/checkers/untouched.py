@@ -102,6 +102,8 @@ class Untouched:
             now = {"items": now, "total": answer.header("x-total-count")}
         if not isinstance(now, dict):
             return
+        # Things in a list may change by themselves; that there are more or fewer of them counts.
+        now = {name: f"{len(one)} items" if _is_list_of_things(one) else one for name, one in now.items()}
         if len(self._seen) < _MOST:
             self._seen[path] = _Seen(now)
         if before is None or len(before.since) > 1:
@@ -132,3 +134,7 @@ class Untouched:
         expected = f"the members as before {label}, as {times} times"
         doubt = "" if self._keeps_all and label != _CONDITIONAL else "it may count requests, also refused ones"
         yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched", doubt=doubt)
+
+
+def _is_list_of_things(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)

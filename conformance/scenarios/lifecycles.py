@@ -202,8 +202,9 @@ class _Cycle:
 
             found = self.writer.settle(lambda: self.writer.send(self.read, thing.path), unseen)
             told = ", ".join(f"{clip(one)} as {name}" for name, one in said.items()) or "the thing"
-            expected = f"{told}, as {action.label} with status {sent.response.status} said"
-            living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing)
+            expected, doubt = f"{told}, as {action.label} with status {sent.response.status} said", "it may act later"
+            living.note(Kind.KEPT, action.label, found.exchange, expected, "; ".join(found.wrong), thing, doubt)
+            thing.has_acted = True
             thing.last = found.exchange if found.exchange.response.ok else thing.last
             # An operation may change members that were written, and end the thing.
             wrong = living.other(thing, found.exchange)

@@ -31,7 +31,8 @@ _OF_KEYS = frozenset({"same request", "new key"})
 def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
     """Yield a case for each look of a kind."""
     for look in (look for life in trace for look in life.looks if look.kind is kind):
-        yield Case(not look.other, look.found, look.expected, look.other, cause=f"{look.operation} {kind}")
+        cause = f"{look.operation} {kind}"
+        yield Case(not look.other, look.found, look.expected, look.other, cause=cause, doubt=look.doubt)
 
 
 @rule("description/created-is-there", on=(lifecycles,))

@@ -74,6 +74,11 @@ def _listed(path, times=3):
 
 _REFUSAL = ("PATCH /valves/1 422", {})
 _ECHOED = ("GET /valves/9 404", {"detail": "last: Bearer roaas-not-this-one"})
+# Jobs in a list go on, whatever is refused meanwhile.
+_GOES_ON = [
+    (line, {"jobs": [{"progress": members["revision"]}]} if "GET" in line else members)
+    for line, members in _rounds(_REFUSAL)
+]
 _BROKEN = {
     "a refused patch counts as a revision": (_rounds(_REFUSAL), False, _KEPT),
     "a refused patch appends an event": (_rounds(_REFUSAL, "last", "/events"), True, _KEPT),
@@ -89,6 +94,7 @@ _RIGHT = {
     "a member of which nothing is said": (_rounds(_REFUSAL, "seen"), False),
     "an event, where nothing is said": (_rounds(_REFUSAL, "last", "/events"), False),
     "a patch that was taken": (_rounds(("PATCH /valves/1 200", {})), True),
+    "a job in a list that goes on": (_GOES_ON, True),
     "its own wrong credentials": ([(*_ECHOED, ("Authorization", "Bearer roaas-not-this-one"))], False),
 }
 
