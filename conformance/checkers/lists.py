@@ -10,7 +10,7 @@ from datetime import datetime
 from itertools import combinations
 from typing import Any, Final
 
-from conformance.api.rest.listing import CASELESS, Listing, Page, listing_of, members_of, number_of, page_of
+from conformance.api.rest.listing import CASELESS, IN_TIME, Listing, Page, listing_of, members_of, number_of, page_of
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.totals import Totals
 from conformance.documents.json_schema import is_number, kinds_of
@@ -19,7 +19,7 @@ from conformance.documents.parameters import Parameter, plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
 from conformance.transport.exchange import Response
-from conformance.verdict.evidence import Case
+from conformance.verdict.evidence import SENTENCE, Case
 
 # _REMEMBERED: values of items that are remembered. _ASKED: values of filters. Below: items of a list that are compared.
 _REMEMBERED: Final = 50_000
@@ -78,6 +78,7 @@ class Lists:
         yield from self._filters(occasion, listing, page, sent)
         yield from self._bounds(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
+        yield from _said_order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         yield from self._search(occasion, listing, page, sent)
         yield from _links(occasion, listing, page, sent)
@@ -249,6 +250,24 @@ class Lists:
             f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
             cause=f"{listing.operation.label} {sorting.member}",
         )
+
+
+def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+    """Judge the order in time that the description of a list tells, by the one time that all its items have."""
+    said = IN_TIME.search(listing.operation.text)
+    if said is None or (listing.sort is not None and listing.sort.name in sent) or listing.direction is not None:
+        return
+    dated = [name for name, one in listing.members.items() if flat(one).get("format") == "date-time"]
+    made = [name for name in dated if plain_name(name).startswith("created")] or (dated if len(dated) == 1 else [])
+    values = [members_of(item).get(made[0]) for item in page.items[:_COMPARED]] if made else []
+    pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
+    descending = said[1] is not None
+    wrong = [(one, other) for one, other, before in pairs if before is descending]
+    if any(before is not None for _, _, before in pairs) and not _comes_first(page, made[0], descending):
+        expected, found = f"the {said[0].lower()}, by the description of the list", ""
+        found = f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])} as {made[0]}" if wrong else ""
+        cause = f"{listing.operation.label} {made[0]} said"
+        yield occasion.case("description/list-order", not wrong, expected, found, cause=cause, doubt=SENTENCE)
 
 
 def _contains(listing: Listing, item: Mapping[str, Any] | None, term: str, fold: Callable[[str], str] = str) -> bool:

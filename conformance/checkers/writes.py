@@ -21,7 +21,16 @@ from typing import Any, Final, NamedTuple
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import differences, entry_of, is_devices, is_shared, members_in, object_in, parts_of
+from conformance.api.rest.things import (
+    differences,
+    entry_of,
+    is_devices,
+    is_moved,
+    is_shared,
+    members_in,
+    object_in,
+    parts_of,
+)
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -353,13 +362,12 @@ class Writes:
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
-                is_lost = not kept and abs(now - value) < 1 and key not in self._precise
-                if is_lost and "integer" not in kinds_of(shape.get(name, {})):
+                if not kept and abs(now - value) < 1 and "integer" not in kinds_of(shape.get(name, {})):
                     self._doubts[key].add(str(value).encode())
                     wrong, doubt = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else "", _COARSE
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
-            elif part.get("format") in {"date", "date-time"} and not same(now, was) and _is_moved(value, now):
+            elif part.get("format") in {"date", "date-time"} and not same(now, was) and is_moved(value, now):
                 wrong = f"{now} as {name}"
             elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
                 wrong = f"{clip(now)} as {name}" if _is_altered(value, now) else ""
@@ -517,17 +525,6 @@ def _is_rounded(value: Any, now: Any) -> bool:
 def _is_altered(value: str, now: str) -> bool:
     """Return whether a text reads without its leading zeros, or with other ends of lines."""
     return value != now and (_ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines())
-
-
-def _is_moved(value: Any, now: Any) -> bool:
-    """Return whether a time reads with the same hour in another time zone, or a date as the day beside it."""
-    try:
-        sent, read = datetime.fromisoformat(value), datetime.fromisoformat(now)
-    except (TypeError, ValueError):
-        return False
-    if sent.tzinfo is None or read.tzinfo is None:
-        return len(value) == len(now) == len("2026-11-29") and abs((sent - read).days) == 1
-    return sent != read and sent.replace(tzinfo=None, microsecond=0) == read.replace(tzinfo=None, microsecond=0)
 
 
 def _leaves(

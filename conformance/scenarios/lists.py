@@ -548,7 +548,7 @@ class _Parts:
             return None
         ids: list[str] = []
         last: tuple[Exchange, Page] | None = None
-        ends = ""
+        ends = loops = ""
         for number in range(_PAGES):
             query, link = where(len(ids), number), ""
             if query is None and last is not None:
@@ -566,6 +566,8 @@ class _Parts:
             last = part
             ids += part[1].identities
             if len(ids) >= self._count(whole) and not whole.goes_on:
+                again = self._after(part, way, size)
+                loops = f"the item {again[0][:60]} again, after the last page" if again and again[0] in ids else ""
                 break
             if not part[1].items:
                 ends = f"an empty page after {len(ids)} items"
@@ -576,10 +578,22 @@ class _Parts:
         fault = "" if tuple(ids[: len(expected)]) == expected else _difference(expected, tuple(ids))
         # The list may have become shorter meanwhile.
         count = min([self._count(whole), *last[1].totals.values()])
-        fault = fault or (ends if len(ids) < max(count, len(whole.items)) else "")
+        fault = fault or loops or (ends if len(ids) < max(count, len(whole.items)) else "")
         twice = next((f"the item {text[:60]} twice" for text in ids if ids.count(text) > 1), "")
         fault = fault or ("" if self.reader.by else twice)
         return self._page_case(way, last[0], f"each item of the list once, page after page by {way}", fault)
+
+    def _after(self, last: tuple[Exchange, Page], way: str, size: int) -> tuple[str, ...]:
+        """Return the items of the page that the last page names as the next one; a loop begins again."""
+        listing = self.reader.listing
+        if way == _LINK:
+            part = next((self.reader.follow(link) for link in self._links(*last)), None)
+        elif listing.cursor is not None and way == listing.cursor.name and listing.limit is not None:
+            following = next(cursors(listing, *last), "")
+            part = self.reader.part({way: following, listing.limit.name: size}) if following else None
+        else:
+            part = None
+        return part[1].identities if part is not None else ()
 
 
 def _difference(expected: tuple[str, ...], found: tuple[str, ...]) -> str:

@@ -12,7 +12,7 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote
 
-from conformance.api.rest.listing import fitting, listing_of
+from conformance.api.rest.listing import IN_TIME, fitting, listing_of
 from conformance.api.rest.things import differences, identifier_of, is_marked_deleted, is_shared, object_in, parts_of
 from conformance.documents.json_schema import Schema, is_number
 from conformance.documents.json_text import clip, read_json
@@ -50,6 +50,7 @@ class Kind(StrEnum):
     KEPT = "kept"  # a written value reads differently later
     GONE = "gone"  # a deleted thing is back, or still listed
     SHOWN = "shown"  # the list shows other values than the item
+    ORDER = "order"  # the list is not in the order of creation that its description tells
     CHOSEN = "chosen"  # a filtered list has a thing by its former value
     REFUSED = "refused"  # a refused request has changed something
 
@@ -319,8 +320,21 @@ class Living:
             is_changed = kind is Kind.THERE and len(thing.life.writes) > 1
             self.note(kind, operation, listing.exchange, text, other, thing, _LEFT_OUT if is_changed else "")
             thing.is_told = True
+        self._look_at_order(operation)
         for thing in self.of(State.ALIVE)[-_LOOKED:] if not self._is_shown_otherwise else ():
             self._compare(thing, operation)
+
+    def _look_at_order(self, operation: str) -> None:
+        """Compare the order of the list with that in which its things were created, if its description tells it."""
+        said = IN_TIME.search(self.lister.text) if self.lister is not None else None
+        if said is None or self.listing is None:
+            return
+        made = [thing.id for thing in self.of(State.ALIVE) if self.listing.ids.count(thing.id) == 1]
+        made = made[::-1] if said[1] else made
+        there = [id_ for id_ in self.listing.ids if id_ in made]
+        if len(made) > 1:
+            expected, other = f"{', '.join(made)}, the {said[0].lower()}", "" if there == made else ", ".join(there)
+            self.note(Kind.ORDER, operation, self.listing.exchange, expected, other, self.things[-1])
 
     def _compare(self, thing: Thing, operation: str) -> None:
         """Compare a thing in the list with itself, again and again where they differ and the thing is steady."""

@@ -316,6 +316,9 @@ class _Thing:
                     coded = replace(request, body=octets, headers=(*request.headers, _IN_CHUNKS))
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
+                earlier = [octets for _, octets in files[:-1]]
+                earlier += [file_of(other, octets) for other in others[:1] for octets in _FILES[:2]]
+                self._look_again(read, whole, earlier)
                 self._end_file(put, read, operations.get(("DELETE", template)), request, whole)
                 self.uploads.append((read, request, [octets for _, octets in files]))
 
@@ -402,6 +405,14 @@ class _Thing:
                 self.below.append((read, whole))
             else:
                 self.surveyor.send(read, odd, whole)
+
+    def _look_again(self, read: Operation, request: Outgoing, earlier: list[bytes]) -> None:
+        """Read a file while it is an earlier one, until the time for that is over."""
+        began, again = time.monotonic(), Variation(Kind.AGAIN, "", "", Inputs())
+        while (found := self.surveyor.send(read, again, request).exchange) and found.response.body in earlier:
+            if time.monotonic() - began > _SETTLES_S:
+                return
+            time.sleep(_PAUSE_S)
 
     def _look_at_gone(self, read: Operation, request: Outgoing) -> None:
         """Read a deleted thing until it is gone, or the time for that is over."""

@@ -56,6 +56,10 @@ _CONTAINS: Final = re.compile(
     r".*\b(?:contain(?:s|ing)?|substring|occurs|occurring|appears|somewhere in|part of)\b",
     re.IGNORECASE | re.DOTALL,
 )
+#: Phrases in a description for an order in time; the first group: the newest items come first.
+IN_TIME: Final = re.compile(
+    r"\b(?:(newest|latest|most recent(?:ly \w+)?|youngest)|oldest|earliest)(?: \w+){0,2} first\b", re.IGNORECASE
+)
 #: Phrases in a description which say that upper and lower case are the same.
 CASELESS: Final = re.compile(
     r"\bcase.?insensitive|\b(?:ignor\w+|regardless of|whatever|without regard to|in any) (?:the |its )?case\b"

@@ -30,6 +30,10 @@ _OWN: Final = re.compile(
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone|cancell?ed|aborted|revoked")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
+# Words of a description: for a text that is stored as it is.
+_EXACTLY: Final = re.compile(
+    r"\b(?:exactly|verbatim|case[- ]sensitive|(?:kept|stored|returned) as (?:sent|written|given))\b", re.IGNORECASE
+)
 # Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
 # that end by themselves.
 _REMOVES: Final = re.compile(r"\b(?:delet|remov|eras|destroy|discard|purg|unregister)", re.IGNORECASE)
@@ -57,6 +61,9 @@ _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02
 _CHOSEN_NUMBER: Final = 987_001
 # Other items of a list of objects that are made from one.
 _ITEMS: Final = 2
+# Added to numbers that may have a fraction. Below: offset of a distant time zone.
+_PART: Final = 0.375
+_ELSEWHERE: Final = "-05:00"
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
 _SECOND: Final = 1.0
 
@@ -176,10 +183,12 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
         found = [not value]
     elif not found and is_number(value) and kinds & {"number", "integer"}:
         bounds = [given[key] for key in ("maximum", "minimum") if is_number(given.get(key))]
-        middle = [sum(bounds) // 2] if len(bounds) > 1 else [value + turn + 1]
-        found = [*bounds, *middle]
-    elif not found and isinstance(value, str) and "pattern" not in given:
+        middle = sum(bounds) // 2 if len(bounds) > 1 else value + turn + 1
+        found = [*bounds, *([middle + _PART] if "number" in kinds else []), middle]
+    elif not found and isinstance(value, str) and (form or "pattern" not in given):
         dated = FORMATS.get(form, "").replace("-01-31", f"-02-{turn % 20 + 1:02}").replace("someone@", f"one{turn}@")
+        # A device in one time zone has clients in others.
+        dated = dated.replace("Z", _ELSEWHERE) if form == "date-time" and turn % 2 else dated
         found = [dated] if form else [f"roaas {turn}", f"r{turn}"]
     begin = turn % len(found) if found else 0
     yield from (*found[begin:], *found[:begin])
@@ -272,7 +281,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         name: answer[name]
         for name, value in sent.items()
         if isinstance(answer.get(name), str | int | float) and "enum" not in flat(parts.get(name, {}))
-        if answer[name] not in (value, before.get(name))
+        if answer[name] not in (value, before.get(name)) and not is_moved(value, answer[name])
     }
     return {**sent, **told}
 
@@ -320,6 +329,8 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
             return other is not None
     if isinstance(value, str) and str(schema.get("format", "")) not in _COMPARED:
         return True
+    if isinstance(value, str) and _EXACTLY.search(str(schema.get("description", ""))):
+        return bool(value == other)
     if schema.get("format") == "date-time" and isinstance(other, str):
         one, two = _instant(value), _instant(other)
         return one is None or two is None or abs((one - two).total_seconds()) <= _SECOND
@@ -340,3 +351,14 @@ def _instant(text: str) -> datetime | None:
     except ValueError:
         return None
     return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def is_moved(value: Any, now: Any) -> bool:
+    """Return whether a time reads with the same hour in another time zone, or a date as the day beside it."""
+    try:
+        sent, read = datetime.fromisoformat(value), datetime.fromisoformat(now)
+    except (TypeError, ValueError):
+        return False
+    if sent.tzinfo is None or read.tzinfo is None:
+        return len(value) == len(now) == len("2026-11-29") and abs((sent - read).days) == 1
+    return sent != read and sent.replace(tzinfo=None, microsecond=0) == read.replace(tzinfo=None, microsecond=0)

@@ -4,6 +4,7 @@ RFC 9110 15.3.2, 9.3.4, 9.3.5, 15.5.
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from http import HTTPStatus
 
 import pytest
@@ -92,6 +93,12 @@ def nothing_refers_to_what_is_gone(trace: tuple[Deletion, ...]) -> Iterable[Outc
 def same_values(trace: tuple[Life, ...]) -> Iterable[Outcome]:
     """Judge whether a list shows its items with the values that they have themselves."""
     yield from _looks(trace, Kind.SHOWN)
+
+
+@rule("description/list-order", on=(lifecycles,))
+def created_in_order(trace: tuple[Life, ...]) -> Iterable[Outcome]:
+    """Judge whether a list has the order of creation that its description tells."""
+    yield from (replace(case, doubt=SENTENCE) for case in _looks(trace, Kind.ORDER))
 
 
 @rule("description/list-filter", on=(lifecycles,))
