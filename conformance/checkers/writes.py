@@ -169,7 +169,9 @@ class Writes:
         self._moving: set[tuple[str, str]] = set()
         # By operation and member: bodies with which it failed; a single one may be chance.
         self._doubts: dict[tuple[str, str], set[bytes]] = defaultdict(set)
+        # Members that once kept a fraction, and one other than a half.
         self._precise: set[tuple[str, str]] = set()
+        self._fine: set[tuple[str, str]] = set()
         # By template and member: methods whose values were read as they were sent, and patches that changed nothing.
         self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._ignored: dict[tuple[str, str], dict[bytes, Case]] = defaultdict(dict)
@@ -362,7 +364,10 @@ class Writes:
             elif is_number(value) and is_number(now) and "number" in kinds_of(part) and not float(value).is_integer():
                 kept = not float(now).is_integer() or float(part.get("multipleOf", 0.5)).is_integer()
                 self._precise |= {key} if kept else set()
-                if not kept and abs(now - value) < 1 and "integer" not in kinds_of(shape.get(name, {})):
+                # Of a device that keeps halves, a whole number is one as well.
+                self._fine |= {key} if same(now, value) and not float(2 * value).is_integer() else set()
+                is_lost = not kept and (key in self._fine or key not in self._precise)
+                if is_lost and abs(now - value) < 1 and "integer" not in kinds_of(shape.get(name, {})):
                     self._doubts[key].add(str(value).encode())
                     wrong, doubt = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else "", _COARSE
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
