@@ -72,13 +72,15 @@ class Lists:
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
             return
         page, sent = page_of(occasion.response, operation), listing.query_texts(occasion.context.target)
-        if page is None or sent is None or not (listing.operation.parameters or page.totals):
+        if page is None or sent is None:
+            return
+        yield from _said_order(occasion, listing, page, sent)
+        if not (listing.operation.parameters or page.totals):
             return
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
         yield from self._bounds(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
-        yield from _said_order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         yield from self._search(occasion, listing, page, sent)
         yield from _links(occasion, listing, page, sent)

@@ -44,7 +44,7 @@ _PATHS = {
 _WHOLE = b"0123456789"
 
 
-def _one(line, body=b"", sent=b"", *, kind=_OCTETS, **fields):
+def _one(line, body=b"", sent=b"", *, kind=_OCTETS, at_s=0.0, **fields):
     """Return an exchange: "GET /map 200", its content, that of the request, and fields; ``_name`` is the response's."""
     method, target, status = line.split()
     back = [(name[1:].replace("_", "-"), text) for name, text in fields.items() if name.startswith("_")]
@@ -52,7 +52,8 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, **fields):
     types = {"/label": "text/plain", "/note": "text/plain", "/icon": "image/png", "/photo": "image/jpeg"}
     asked += [("Content-Type", types.get(target, _OCTETS))] if sent else []
     request = Request(method, _BASE + target, (("Host", "device:80"), *asked), sent)
-    return Exchange(request, Response(int(status), tuple([*back, ("Content-Type", kind)] if body else back), body, 1.0))
+    headers = tuple([*back, ("Content-Type", kind)] if body else back)
+    return Exchange(request, Response(int(status), headers, body, 1.0, received_s=at_s))
 
 
 def _broken(tmp_path, exchanges):
@@ -90,6 +91,13 @@ _OTHER_PIXEL = [(image, image.replace(b"\x90", b"?")) for image in _IMAGES]
 _CHANGED_ENDS = ((b"a\nb", b"a\r\nb"), (b"c\nd", b"c\r\nd"))
 _CUT = ((b"a\nb c", b"a\nb"), (b"c\nd e", b"c\nd"))
 _IF_RANGE = {"range": "bytes=2-2", "_etag": '"a"', "_content_range": "bytes 2-2/10"}
+
+
+def _put(sent):
+    return _one("PUT /map 200", sent=sent)
+
+
+_GET_LATE = _one("GET /map 200", _WHOLE, at_s=9.0)
 _STATE = _one("GET /state 200", b"{}", kind="application/json", _etag='"s"')
 _STATE_NOW = _one("GET /state 200", b"{ }", kind="application/json", _etag='"t"')
 _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
@@ -173,6 +181,8 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
             [_one("PUT /map 200", b'{"sha256": "%s"}' % (b"0" * 64), b"x", kind="application/json")],
         ),
         ("description/written-is-read", [_PUT, _OTHER, _PUT_NEXT, _one("GET /map 200", b"nex")]),
+        # The first file stays, whatever is uploaded.
+        ("description/written-is-read", [_GET, _put(b"x"), _GET, _put(b"y"), _GET, _GET_LATE]),
         ("description/if-match", [_STATE, _one("PUT /state 200", if_none_match="*")]),
         ("description/if-match", [_STATE, _one("PUT /state 200", if_match='W/"s"')]),
         ("description/problem-status", [_one("GET /state 404", b'{"status": 400}', kind="application/problem+json")]),

@@ -66,8 +66,8 @@ def _of(value):
 class Seen:
     """The requirements that are not met in a run of exchanges with one list."""
 
-    def __init__(self, tmp_path, parameters, wrapped=lambda items: items):
-        get = {"responses": {"200": answers(_of(wrapped([])))}, "parameters": list(parameters)}
+    def __init__(self, tmp_path, parameters, wrapped=lambda items: items, says=""):
+        get = {"responses": {"200": answers(_of(wrapped([])))}, "parameters": list(parameters), "summary": says}
         document = described(
             {"/valves": {"get": get, "post": {"responses": {"201": {"description": "made"}}}}}, "3.1.0"
         )
@@ -345,6 +345,22 @@ _SORT = _text("sort", enum=["name", "-name", "size", "opened:desc", "state", "id
 def test_orders(parameters, query, order, blamed, tmp_path):
     items = [VALVES[int(number) - 1] for number in order]
     assert (ORDER in Seen(tmp_path, parameters).read(VALVES).read(items, **query).broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("says", "order", "blamed"),
+    [
+        ("Valves, newest first.", "4321", True),
+        ("Valves, newest first.", "1234", False),
+        ("The oldest valves first.", "134", True),
+        ("As they were opened, oldest first.", "4321", False),
+        ("All valves.", "4321", False),
+    ],
+)
+def test_an_order_that_the_description_tells(says, order, blamed, tmp_path):
+    seen = Seen(tmp_path, [], says=says).read([VALVES[int(number) - 1] for number in order])
+    assert (ORDER in seen.broken) == blamed
+    assert all(case.doubt for case in seen.cases if case.requirement == ORDER)
 
 
 @pytest.mark.parametrize(

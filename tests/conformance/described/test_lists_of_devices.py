@@ -58,6 +58,7 @@ _FAULTS = [
     ("none", "total counts the deleted", TOTAL),
     ("page-1", "total counts the refused", TOTAL),
     ("cursor", "page repeated", PAGES),
+    ("next-page", "the last page leads to the first", PAGES),
     ("page-0", "page repeated", PAGES),
     ("next-page", "equal items skipped", PAGES),
     ("page-1", "item left out", PAGES),
@@ -158,6 +159,8 @@ class _Collection:
             return web.json_response(part, headers=headers)
         following = self.style.get("next", lambda _, end: {"next": f"c{end}"}) if "cursor" in self.style else None
         following = following(self.path, end) if following is not None and end < len(found) else {}
+        if "leads to the first" in self.fault and begin and not following:
+            following = {"nextPageToken": "c0"}
         shown = {self.style["in"]: part, **self.style["around"](part, total), **following}
         return web.json_response(shown, headers=headers)
 
