@@ -435,8 +435,8 @@ class _Parts:
         if part is None or later is None or len(part[1].items) != count:
             return None
         fault = f"{cursor.name} {following[:60]}, which leads to an empty page" if not later[1].items else ""
-        expected = "no further page, as the description says of the last"
-        return replace(self._page_case(f"{limit.name} exactly", later[0], expected, fault), is_said=True)
+        expected, way = "no further page, as the description says of the last", f"{limit.name} exactly"
+        return replace(self._page_case(way, later[0], expected, fault), is_said=True)
 
     def _read_shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""
@@ -480,8 +480,7 @@ class _Parts:
         return self._walk(whole, offset.name, lambda read, _: {offset.name: read})
 
     def _by_page(self, whole: Page) -> Paged | None:
-        page, size = self.reader.listing.page, self._size(whole)
-        limit = self.reader.listing.limit
+        page, limit, size = self.reader.listing.page, self.reader.listing.limit, self._size(whole)
         if page is None or limit is None or not size:
             return None
         # Page numbers begin at 0 or at 1.
@@ -566,8 +565,8 @@ class _Parts:
             last = part
             ids += part[1].identities
             if len(ids) >= self._count(whole) and not whole.goes_on:
-                again = self._after(part, way, size)
-                loops = f"the item {again[0][:60]} again, after the last page" if again and again[0] in ids else ""
+                again = [text for text in self._after(part, way, {limit.name: size})[:1] if text in ids]
+                loops = f"the item {again[0][:60]} again, after the last page" if again else ""
                 break
             if not part[1].items:
                 ends = f"an empty page after {len(ids)} items"
@@ -583,16 +582,13 @@ class _Parts:
         fault = fault or ("" if self.reader.by else twice)
         return self._page_case(way, last[0], f"each item of the list once, page after page by {way}", fault)
 
-    def _after(self, last: tuple[Exchange, Page], way: str, size: int) -> tuple[str, ...]:
+    def _after(self, last: tuple[Exchange, Page], way: str, size: dict[str, Any]) -> tuple[str, ...]:
         """Return the items of the page that the last page names as the next one; a loop begins again."""
-        listing = self.reader.listing
-        if way == _LINK:
-            part = next((self.reader.follow(link) for link in self._links(*last)), None)
-        elif listing.cursor is not None and way == listing.cursor.name and listing.limit is not None:
-            following = next(cursors(listing, *last), "")
-            part = self.reader.part({way: following, listing.limit.name: size}) if following else None
-        else:
-            part = None
+        reader, cursor = self.reader, self.reader.listing.cursor
+        part = next(map(reader.follow, self._links(*last)), None) if way == _LINK else None
+        if cursor is not None and way == cursor.name:
+            following = next(cursors(reader.listing, *last), "")
+            part = reader.part({way: following, **size}) if following else None
         return part[1].identities if part is not None else ()
 
 
