@@ -152,12 +152,14 @@ class Memory:
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         # By operation and member: values in responses to creations that differ from the declared default.
         self._undefaulted: dict[tuple[str, str], Any] = {}
-        # By operation and member: writes whose response shows another value than the next read. Below: members that a
-        # read shows late.
+        # By operation and member: writes whose response shows another value than the next read; below, late members.
         self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._late: set[tuple[str, str]] = set()
         # Templates of things that end by themselves, because an identifier came again.
         self._ends: set[str] = set()
+        self._deletable = {template for method, template in methods if method == "DELETE"}
+        # By template: created things that were not there, with when they were created.
+        self._lost: dict[str, list[tuple[float, Case]]] = defaultdict(list)
         # Paths that the run created. Below: collections in which something was deleted, and cases that wait for that.
         self._made: set[str] = set()
         self._gone: set[str] = set()
@@ -165,8 +167,7 @@ class Memory:
         self._acts = 0
         # How long a value stayed the same, s: of things by template, of members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
-        # Cases that fail only if the value stays the same elsewhere: with their age, s, and the value that was read
-        # instead.
+        # Cases that fail only if the value stays the same elsewhere, with their age, s, and what was read instead.
         self._pending: dict[tuple[str, str], list[tuple[float, str, Case]]] = defaultdict(list)
 
     def forget(self, *, deletes: bool = True) -> None:
@@ -185,8 +186,7 @@ class Memory:
                 yield from self._judge_read(occasion, operation, path)
             return
         self._acts += 1
-        status = occasion.response.status
-        if status in _REFUSED:
+        if occasion.response.status in _REFUSED:
             return
         item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
         made = self._of_collections.get(operation.template.rstrip("/")) if operation is not None else None
@@ -357,8 +357,7 @@ class Memory:
             yield occasion.case("description/read-only", holds, expected, found, cause=cause, doubt=doubt)
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
-        thing = self._things.get(path.casefold())
-        response = occasion.response
+        thing, response = self._things.get(path.casefold()), occasion.response
         if response.ok:
             yield from self._devices(occasion, item, path)
         if thing is None or thing.path != path:
@@ -373,11 +372,17 @@ class Memory:
         if response.status in _ABSENT and thing.made:
             if age_s > _SETTLES_S and not thing.replaced and item.template not in self._ends:
                 expected = f"the thing that {thing.change} has created {age_s:.0f} s before"
-                case = self._case("created-is-there", occasion, expected, cause=item.label, doubt=doubt_of_life(item))
+                doubt = doubt_of_life(item) or "it may keep only the newest of them, or for a time of its own"
+                case = self._case("created-is-there", occasion, expected, cause=item.label, doubt=doubt)
                 yield from self._differs(kept, age_s, "none", case)
+                self._lost[item.template] = [*self._lost[item.template], (thing.changed_s, case)][-_MOST_PENDING:]
         elif response.ok:
             thing.made = False
             yield from self._lasts(kept, age_s, "there")
+            # An older thing is still there: a device that keeps the newest has lost no other one by that.
+            lost = self._lost.pop(item.template, []) if item.template in self._deletable else []
+            yield from (replace(case, doubt=doubt_of_life(item)) for made_s, case in lost if made_s > thing.changed_s)
+            self._lost[item.template] += [one for one in lost if one[0] <= thing.changed_s]
             if thing.told is not None:
                 yield from self._told(occasion, item, thing.told)
                 thing.told = None

@@ -458,8 +458,6 @@ def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
         if number is not None and number.is_nan():
             return True  # no limit makes a number of it
         numbers = [decimal for decimal in numbers if decimal.is_finite()]
-        if number is None or not numbers:
-            return False
-        return min(numbers) <= number <= max(numbers)
+        return False if number is None or not numbers else min(numbers) <= number <= max(numbers)
     longest = max(*map(len, kept), simple.max_length or 0)
     return len(text) <= longest or not _WORDS.fullmatch(text)

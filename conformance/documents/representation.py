@@ -130,9 +130,7 @@ def from_element(element: etree._Element, schema: Schema) -> Any:
         return [from_element(child, schema.get("items", {})) for child in children]
     if kind == "object":
         return _from_children(children, schema)
-    if children:
-        return {local_name(child): "" for child in children}
-    return scalar(element.text or "", kind)
+    return {local_name(child): "" for child in children} if children else scalar(element.text or "", kind)
 
 
 def _from_children(children: list[etree._Element], schema: Schema) -> dict[str, Any]:
@@ -173,9 +171,7 @@ def from_plain(value: Any, schema: Schema) -> Any:
     if isinstance(value, str):
         if value in _NULLS and "null" in types_of(schema):
             return None
-        if kind in {"array", "object"}:
-            return value
-        return scalar(value, kind)
+        return value if kind in {"array", "object"} else scalar(value, kind)
     if isinstance(value, list):
         return [from_plain(item, schema.get("items", {})) for item in value]
     if isinstance(value, dict):

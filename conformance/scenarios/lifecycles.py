@@ -296,7 +296,11 @@ class _Cycle:
             again = next((thing for thing in self.living.of(State.ALIVE) if thing.path == path), None)
             if again is not None:
                 expected, sent = f"another path than {path}, where an earlier thing is", again.life.created.request.body
-                other = f"{path} once more" if sent != created.request.body else ""
+                # A text that was sent may be the identifier: the later thing replaces the earlier one.
+                last = unquote(path.rstrip("/").rpartition("/")[2]).casefold()
+                body = re.sub(r"\W+", "-", created.request.body.decode(errors="replace")).casefold()
+                is_named = f"-{last}-" in body and not last.isdecimal()
+                other = f"{path} once more" if sent != created.request.body and not is_named else ""
                 self.living.note(Kind.THERE, self.create.label, created, expected, other, again)
                 return False
             self._read_created(created, path, id_)

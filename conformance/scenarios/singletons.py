@@ -158,9 +158,7 @@ def _write(writer: Writer, read: Operation, write: Operation, body: Any, before:
     if not sent.response.ok or sent.response.status == _ACCEPTED:
         return []
     done = writer.read_back(write, read, "", sent, before=before)
-    if done.other:
-        return [done]
-    return [done, writer.read_back(write, read, "", sent, before=before, fresh=True)]
+    return [done] if done.other else [done, writer.read_back(write, read, "", sent, before=before, fresh=True)]
 
 
 def is_changeable(name: str, schema: Schema, collections: frozenset[str]) -> bool:

@@ -83,6 +83,4 @@ def _slow_down(value: Any) -> Any:
         return [_slow_down(item) for item in value]
     if isinstance(value, float) and abs(value) > _SLOW:
         return _SLOW
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1:
-        return 1
-    return value
+    return 1 if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 1 else value

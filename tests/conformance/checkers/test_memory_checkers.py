@@ -419,21 +419,33 @@ def _broken(contract, steps):
     return broken & {GONE, THERE, READ, DEFAULTS, KEEPS, PATCH, OWN, STATES}
 
 
+def _doubts(contract, requirement, steps):
+    """Return whether the failed cases of a requirement have doubts; steps: second, and the rest as above."""
+    checkers, found = RestCheckers(contract, BASE), set()
+    for now, (method, path, sent, status, seen) in steps:
+        fields = (("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else []))
+        body = json.dumps(seen).encode() if seen and status not in {204, 404} else b""
+        response = Response(status, (("Content-Type", "application/json"),), body, 1.0, received_s=float(now))
+        request = Request(method, BASE + path, fields, json.dumps(sent).encode() if sent else b"")
+        cases = checkers(Exchange(request, response))
+        found |= {bool(case.doubt) for case in cases if case.requirement == requirement and not case.holds}
+    return found
+
+
 def test_what_is_published_later_is_a_doubt(contract):
-    told = dict[str, set[bool]]()
-    for path in ("drafts", "jobs"):
-        checkers = RestCheckers(contract, BASE)
-        for now, method, rank in ((0, "PUT", 7), (5, "GET", 1), (6, "GET", 1), (9, "PUT", 3), (20, "GET", 3)):
-            sent = json.dumps({"name": "a", "rank": rank}).encode() if method == "PUT" else b""
-            fields = (("Host", "device:8000"), *([("Content-Type", "application/json")] if sent else []))
-            body = json.dumps(_job("1", rank=rank)).encode() if not sent else b""
-            response = Response(
-                200 if body else 204, (("Content-Type", "application/json"),), body, 1.0, received_s=now
-            )
-            exchange = Exchange(Request(method, f"{BASE}/{path}/1", fields, sent), response)
-            cases = [case for case in checkers(exchange) if case.requirement == READ and not case.holds]
-            told.setdefault(path, set()).update(bool(case.doubt) for case in cases)
-    assert told == {"drafts": {True}, "jobs": {False}}
+    for path, doubts in (("/drafts/1", {True}), ("/jobs/1", {False})):
+        put, read = ("PUT", path, {"name": "a", "rank": 7}, 204, None), ("GET", path, None, 200, _job("1"))
+        again, shown = ("PUT", path, {"rank": 3}, 204, None), ("GET", path, None, 200, {"id": "1", "rank": 3})
+        steps = [(0, put), (5, read), (6, read), (9, again), (20, shown)]
+        assert _doubts(contract, READ, steps) == doubts
+
+
+def test_a_lost_thing_is_a_doubt_until_an_older_one_is_still_there(contract):
+    made = [(number, _post(str(number), name=f"job {number}")) for number in range(3)]
+    first_is_lost = [*made, (8, _get("0", 404)), (12, _get("2", name="job 2"))]
+    assert _doubts(contract, THERE, first_is_lost) == {True}
+    second_is_lost = [*made, (8, _get("1", 404)), (12, _get("2", name="job 2")), (12, _get("0", name="job 0"))]
+    assert _doubts(contract, THERE, second_is_lost) == {True, False}
 
 
 @pytest.mark.parametrize("name", BROKEN)
