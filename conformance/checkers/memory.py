@@ -58,6 +58,7 @@ _SHOWN: Final = 200
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
 _READ: Final = "written-is-read"
+_GONE: Final = "deleted-is-gone"
 # Phrases in a description which say that a response shows what was there before the request.
 _EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
 # Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
@@ -240,6 +241,7 @@ class Memory:
         if occasion.request.method == "DELETE":
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
             thing.doubt = doubt_of_deletion(operation)
+            yield from self._again(occasion, operation, before)
             self._things |= {text.casefold(): replace(thing, path=text, own=True) for text in below}
         if status == HTTPStatus.CREATED:
             self._made.add(path)
@@ -251,6 +253,13 @@ class Memory:
                 thing.shown.pop(name, None)
             thing.told = occasion
         self._things[path.casefold()] = thing
+
+    def _again(self, occasion: Occasion, delete: Operation, before: _Thing | None) -> Iterator[Case]:
+        """Judge a DELETE of what is gone already, if it is declared how that is answered."""
+        if before is not None and before.gone and before.absent and {"404", "410"} & delete.responses.keys():
+            expected = f"a status that says that nothing is there, as a GET after {before.change} did"
+            found, doubt = f"status {occasion.response.status}", "a DELETE may be repeated (RFC 9110 9.2.2)"
+            yield self._case(_GONE, occasion, expected, found, cause=f"{delete.label} again", doubt=doubt)
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
         """Return the things that end together with a thing, by the description of its DELETE."""
@@ -394,7 +403,7 @@ class Memory:
         thing.absent |= response.status in _ABSENT
         if response.ok and age_s > _SETTLES_S and not is_marked_deleted(read_json(response.body).value):
             expected = f"status 404 or 410, {age_s:.0f} s after {thing.change} was answered {thing.status}"
-            case = self._case("deleted-is-gone", occasion, expected, cause=item.label, doubt=thing.doubt)
+            case = self._case(_GONE, occasion, expected, cause=item.label, doubt=thing.doubt)
             # A thing that always exists is emptied by DELETE, or reset.
             if thing.own or item.template in self._gone:
                 yield case
@@ -412,7 +421,7 @@ class Memory:
             if last in above.ends and age_s > _SETTLES_S:
                 expected = f"status 404, as {above.change} ended the {last} too, by the description"
                 cause = f"{operation.label} below"
-                yield self._case("deleted-is-gone", occasion, expected, cause=cause, doubt=SENTENCE)
+                yield self._case(_GONE, occasion, expected, cause=cause, doubt=SENTENCE)
         item = self._of_collections.get(operation.template.rstrip("/"))
         gone = {key: one for key, one in self._things.items() if one.absent and one.path.rpartition("/")[0] == path}
         if item is None or not gone or not is_json(occasion.response.media_type):
@@ -423,7 +432,7 @@ class Memory:
             if thing is not None and age_s > _SETTLES_S and not is_marked_deleted(value):
                 expected = f"a list without what {thing.change} has deleted {age_s:.0f} s before, which no GET finds"
                 cause = f"{operation.label} listed"
-                yield self._case("deleted-is-gone", occasion, expected, "a list with it", cause=cause)
+                yield self._case(_GONE, occasion, expected, "a list with it", cause=cause)
 
     def _lasts(self, kept: tuple[str, str], age_s: float, value: str) -> Iterator[Case]:
         """Record how long a value has stayed the same; yield waiting cases that must have lasted as long."""

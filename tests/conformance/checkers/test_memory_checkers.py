@@ -59,7 +59,11 @@ _PATHS = {
         },
     },
     "/tags": {"post": {"requestBody": _BODY, "responses": _OK}},
-    "/tags/{id}": {"parameters": [_ONCE], "get": {"responses": _OK}, "delete": {"responses": _OK}},
+    "/tags/{id}": {
+        "parameters": [_ONCE],
+        "get": {"responses": _OK},
+        "delete": {"responses": {**_OK, "404": {"description": "no such tag"}}},
+    },
     "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "ended"}}}},
     "/jobs/{id}/retry": {"parameters": [_ID], "post": {"responses": {**_OK, "409": {"description": "not ended"}}}},
     "/keys": {"post": {"requestBody": _BODY, "responses": _OK}},
@@ -125,6 +129,7 @@ def _delete(id_, status=204):
     return "DELETE", f"/jobs/{id_}", None, status, None
 
 
+_NO_TAG = ("DELETE", "/tags/1", None, 204, None)
 _U1, _U2 = (f"3fa85f64-5717-4562-b3fc-2c963f66af0{number}" for number in (1, 2))
 
 
@@ -187,6 +192,7 @@ BROKEN = {
         [_get("1", phase="running"), *_started("2"), _get("1", phase="running")], STATES,
     ),
     "a label outlives its job": ([_post("1"), _LABEL, _delete("1"), 4.0, _below("GET")], GONE),
+    "a tag is deleted twice": ([_NO_TAG, ("GET", "/tags/1", None, 404, None), _NO_TAG], GONE),
     "an identifier is given twice": ([_tag(), ("DELETE", "/tags/1", None, 204, None), _tag()], THERE),
     "deleted where another one is gone": ([_delete("2"), _get("2", 404), _delete("1"), 5.0, _get("1")], GONE),
     "deleted where another one goes": ([_delete("1"), 5.0, _get("1"), _delete("2"), _get("2", 404)], GONE),
