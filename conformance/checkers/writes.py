@@ -487,16 +487,17 @@ class Writes:
             if was is None or is_devices(name, given, self._collections) or is_shared(name):
                 continue
             default = flat(parts_of(item.shape).get(name) or {}).get("default", given.get("default"))
-            is_reset = not same(was, now) and (now is None or same(now, default) or now in ("", [], {}, 0, False))
-            if is_reset:
-                bodies = self._doubts[label, f"{name} reset"]
-                bodies.add(change.write.request.body)
-                if len(bodies) >= _SEEN:
-                    expected = f"{clip(was)} as {name}, which {change.label} does not name"
-                    found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
-                    named = set.intersection(*(set(read_json(body).value) for body in bodies))
-                    doubt = f"{name} may follow {min(named)}" if named else ""
-                    yield occasion.case(_PATCH, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
+            if same(was, now):
+                continue
+            is_empty = now is None or same(now, default) or now in ("", [], {}, 0, False)
+            bodies = self._doubts[label, f"{name} to {clip(now)}"]
+            bodies.add(change.write.request.body)
+            named = set.intersection(*(set(read_json(body).value) for body in bodies))
+            if len(bodies) >= _SEEN and (is_empty or not named):
+                expected = f"{clip(was)} as {name}, which {change.label} does not name"
+                found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
+                doubt = "" if is_empty and not named else f"{name} may follow {min(named, default='other members')}"
+                yield occasion.case(_PATCH, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
 
 def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:

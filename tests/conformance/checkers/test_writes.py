@@ -177,6 +177,13 @@ BROKEN = {
             *(_patch("/merge", {"gain": 3.5}), _get("/merge", gain=3.5, note=None)),
         ], PATCH,
     ),
+    "a patch sets the mode, whatever it names": (
+        [
+            *(_get("/merge"), _patch("/merge", {"gain": 2.5}), _get("/merge", gain=2.5, mode="off")),
+            *(_put("/merge", **_WHOLE), _get("/merge")),
+            *(_patch("/merge", {"note": "b"}), _get("/merge", note="b", mode="off")),
+        ], PATCH,
+    ),
     "refused, and the valid members taken, by PUT": (
         [_get(), _put(status=422, gain=9.5, mode="x"), _get(gain=9.5)],
         KEPT,
@@ -332,6 +339,11 @@ RIGHT = {
         _get(), _put(**{**_WHOLE, "gain": 50.5}), _get(gain=10), _put(**{**_WHOLE, "gain": 60.5}), _get(gain=10),
     ],
     "words as a set": [_get(), _put(**_WHOLE, words=["b", "a", "b"]), _get(words=["a", "b"])],
+    "a mode that follows the gain": [
+        *(_get("/merge"), _patch("/merge", {"gain": 2.5}), _get("/merge", gain=2.5, mode="off")),
+        *(_put("/merge", **_WHOLE), _get("/merge")),
+        *(_patch("/merge", {"gain": 3.5}), _get("/merge", gain=3.5, mode="off")),
+    ],
     "one reset by another mode": [_get(), _patch("/plain", {"mode": "off"}), _get(mode="off", loud=False)],
 }  # fmt: skip
 
