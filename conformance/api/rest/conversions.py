@@ -96,11 +96,13 @@ def _shows(said: Any, steps: Steps, meanings: list[Any]) -> bool:
     value = _at(said, steps)
     if value is NOTHING or meanings[0] is NOTHING:
         return True
-    return any(same(value, meant) or _is_same_set(value, meant) for meant in meanings)
+    return any(same(value, meant) or _is_alike(value, meant) for meant in meanings)
 
 
-def _is_same_set(one: Any, other: Any) -> bool:
-    """Return whether two lists have the same items in any order."""
+def _is_alike(one: Any, other: Any) -> bool:
+    """Return whether two lists have the same items in any order, or two texts the same number, as 0 and 0.00."""
+    if isinstance(one, str) and isinstance(other, str) and _NUMBER.fullmatch(one) and _NUMBER.fullmatch(other):
+        return float(one) == float(other)
     return isinstance(one, list) and isinstance(other, list) and sorted(map(str, one)) == sorted(map(str, other))
 
 

@@ -71,9 +71,7 @@ def _make(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) -> 
         return _array(schema, depth, room, whole=whole)
     if kinds & {"number", "integer"}:
         return _number(schema, "integer" if "number" not in kinds else "number")
-    if kinds == {"boolean"}:
-        return True
-    return _text(schema)
+    return True if kinds == {"boolean"} else _text(schema)
 
 
 def backwards(schema: Schema, depth: int = 0) -> Schema:

@@ -289,6 +289,7 @@ _LENIENT = {
         ('{"n": 1, "on": "false"}', '{"n": 1, "on": true}', False),
         ('{"n": 1, "on": 2}', '{"n": 1, "on": true}', False),
         ('{"n": 1, "text": 5.0}', '{"text": "5"}', True),
+        ('{"n": 1, "text": 5}', '{"text": "5.00"}', True),
         ('{"n": 1, "text": true}', '{"text": "1"}', False),
         ('{"n": 1, "text": null}', '{"text": "a"}', True),
         ('{"n": 1, "set": [2, 1, 2]}', '{"set": [1, 2]}', True),
