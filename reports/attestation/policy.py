@@ -75,7 +75,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     ros: bool = False
     baseline: bool = False
     interrupted: Literal[False] = False
-    tested: _Share = 0.5
+    tested: _Share = 0.4
     operations: _Share = 0.5
     cases: _Share = 0.04
     max_age_days: Annotated[float, msgspec.Meta(gt=0, le=100_000)] = 365

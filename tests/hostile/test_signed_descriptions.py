@@ -13,7 +13,6 @@ _POLICY = """
 classes = ["description", "robustness", "http"]
 requirement_sets = ["unfrozen"]
 efforts = ["quick"]
-tested = 0.4  # what only a write shows is not tested
 motion = false
 """
 
