@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any, Final
 
 from conformance.api.rest.listing import CASELESS, IN_TIME, Listing, Page, listing_of, members_of, number_of, page_of
@@ -80,6 +80,7 @@ class Lists:
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
         yield from self._bounds(occasion, listing, page, sent)
+        yield from self._included(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         yield from self._search(occasion, listing, page, sent)
@@ -88,7 +89,7 @@ class Lists:
 
     def _learn(self, listing: Listing, page: Page) -> None:
         names = {*listing.filters, *(sorting.member for sorting in listing.sortings.values())}
-        names |= {bound.member for bound in listing.bounds}
+        names |= {bound.member for bound in listing.bounds} | listing.includes.keys()
         if len(self._seen) < _REMEMBERED:
             for identity, item in zip(page.identities, page.items, strict=True):
                 own = members_of(item)
@@ -100,6 +101,12 @@ class Lists:
             value = members_of(item).get(name)
             if value is not None and hash((listing.operation.label, identity, name, str(value))) in self._seen:
                 yield value
+
+    def _known(self, listing: Listing, page: Page, name: str, value: Any) -> list[str]:
+        """Return the items in which a member is known from before to have a value, which may be null."""
+        own = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
+        there = [one for one, item in own.items() if name in item and item[name] is value]
+        return [one for one in there if hash((listing.operation.label, one, name, str(value))) in self._seen]
 
     def _limit(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge that there are no more items than the parameter allows; 0 may mean all.
@@ -146,11 +153,24 @@ class Lists:
             asked = text.split(",") if "array" in kinds_of(parameter.schema) else [text]
             values = list(self._known_values(listing, page, name))
             wrong = self._wrong(listing, name, asked, values)
+            doubt = ""
+            if not wrong and _choices(parameter) and self._known(listing, page, name, None):
+                wrong, doubt = ["null"], "what has no value may belong to each"
             if wrong is None:
                 continue
             expected = f"items with {text}, which the parameter {parameter.name} asks for"
             found, cause = f"an item with {', '.join(wrong)}", f"{listing.operation.label} {parameter.name}"
-            yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause)
+            yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
+
+    def _included(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge that a list has no items of a kind that a parameter such as `include_archived` would add."""
+        for name, parameter in listing.includes.items():
+            text = sent.get(parameter.name, text_of(flat(parameter.schema).get("default")))
+            if text.lower() == "false" and name not in {plain_name(other) for other in sent}:
+                is_there = bool(self._known(listing, page, name, True))  # noqa: FBT003 - a value
+                expected, found = f"items that are not {name}, because {parameter.name} is false", f"one that is {name}"
+                cause = f"{listing.operation.label} {parameter.name}"
+                yield occasion.case("description/list-filter", not is_there, expected, found, cause=cause)
 
     def _bounds(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge bounds of members; an undescribed parameter is one if earlier lists show its effect."""
@@ -390,6 +410,11 @@ def is_before(one: Any, other: Any) -> bool | None:
         return None
     said = {key(one) < key(other) for key in _KEYS} | {not key(other) < key(one) for key in _KEYS}
     return said.pop() if len(said) == 1 else None
+
+
+def is_mixed(values: Sequence[Any]) -> bool:
+    """Return whether values are in no order, so that sorting them shows."""
+    return {is_before(one, other) for one, other in pairwise(values)} >= {True, False}
 
 
 def _natural(text: str) -> list[tuple[int, int, str]]:

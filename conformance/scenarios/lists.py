@@ -30,6 +30,7 @@ from conformance.api.rest.listing import (
 )
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
+from conformance.checkers.lists import is_mixed
 from conformance.checkers.totals import SETTLES_S, says_filtered
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import operations_of
@@ -100,12 +101,8 @@ class Paged:
 
 def lists_of(api: RestInterface) -> list[Listing]:
     """Return the lists that may be read and that end."""
-    found = [
-        listing_of(operation)
-        for operation in operations_of(api.run.contract)
-        if operation.label not in api.streams and allows(api, operation)
-    ]
-    return [listing for listing in found if listing is not None]
+    operations = (one for one in operations_of(api.run.contract) if one.label not in api.streams and allows(api, one))
+    return [listing for operation in operations if (listing := listing_of(operation)) is not None]
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.LATE)
@@ -135,13 +132,14 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
     """Yield values of the sort with their members, and values of filters that keep several items."""
     items = [members_of(one) for one in page.items]
     if listing.sort is not None and listing.direction is None and "array" not in kinds_of(listing.sort.schema):
-        ranks = {text: len({str(item.get(one.member)) for item in items}) for text, one in listing.sortings.items()}
+        kept = {text: [item.get(one.member) for item in items] for text, one in listing.sortings.items()}
+        ranks = {text: (is_mixed(values), len(set(map(str, values)))) for text, values in kept.items()}
         best = max(ranks, key=ranks.__getitem__, default="")
         # A cursor must tell apart items with equal values: try each member, because some may not.
         others = {one.member: text for text, one in listing.sortings.items()} if listing.cursor is not None else {}
         others.pop(listing.sortings[best].member if best else "", None)
         for text in (best, *islice(others.values(), _SORTS)):
-            if ranks.get(text, 0) < _FEWEST:
+            if ranks.get(text, (False, 0))[1] < _FEWEST:
                 continue
             yield {listing.sort.name: text}, listing.sortings[text].member
     filters = list[dict[str, Any]]()
@@ -424,8 +422,8 @@ class _Parts:
 
     def _exact(self, whole: Page) -> Paged | None:
         """Read with a limit equal to the list's length: no page may follow, if the description says how that shows."""
-        listing, count = self.reader.listing, self._count(whole)
-        limit, cursor = listing.limit, listing.cursor
+        listing, limit, cursor = self.reader.listing, self.reader.listing.limit, self.reader.listing.cursor
+        count = self._count(whole)
         is_said = any(NEXT.fullmatch(plain_name(name)) and _ENDS.search(text) for name, text in listing.says.items())
         if limit is None or cursor is None or not is_said or not fitting(limit, count):
             return None

@@ -51,6 +51,7 @@ _NO_FILTERS: Final = frozenset(
 )  # fmt: skip
 # Parameters that search texts, and phrases in a description on what they find.
 _SEARCHES: Final = ("q", "search", "query", "text")
+_INCLUDES: Final = re.compile(r"(?:include|with|show)(\w+)")
 _CONTAINS: Final = re.compile(
     r"^(?!.*\b(?:words?|prefix|starts?|begins?|fuzzy|similar|tokens?|pattern|response|order\w*|sort\w*)\b)"
     r".*\b(?:contain(?:s|ing)?|substring|occurs|occurring|appears|somewhere in|part of)\b",
@@ -107,6 +108,7 @@ class Listing:
         filters: the parameters that choose items by a member, by the plain name of both.
         bounds: those that choose items by the least or greatest value of a member.
         search: the parameter whose text chosen items contain, in members that its description names.
+        includes: those that add items in which a boolean member is true, such as `include_archived`, by that member.
     """
 
     operation: Operation
@@ -121,6 +123,7 @@ class Listing:
     filters: Mapping[str, Parameter] = field(default_factory=dict)
     bounds: tuple[Bound, ...] = ()
     search: Parameter | None = None
+    includes: Mapping[str, Parameter] = field(default_factory=dict)
 
     @cached_property
     def searched(self) -> tuple[str, ...]:
@@ -374,6 +377,12 @@ def listing_of(operation: Operation) -> Listing | None:
         filters,
         tuple(bound for parameter in rest if (bound := bound_of(parameter, plain.members))),
         next((one for name, one in query.items() if name in _SEARCHES and _CONTAINS.search(one.says)), None),
+        {
+            found[1]: one
+            for name, one in query.items()
+            if (found := _INCLUDES.fullmatch(name)) and kinds_of(one.schema) == {"boolean"}
+            if kinds_of(plain.members.get(found[1], {})) == {"boolean"}
+        },
     )
 
 

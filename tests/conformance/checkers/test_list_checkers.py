@@ -21,7 +21,7 @@ _STATES, _LEVELS, _WAYS = ["open", "closed", "moving"], ["info", "warning", "err
 _MEMBERS = {
     "id": {"type": "integer"},
     "name": {"type": "string"},
-    "zone": {"type": "string"},
+    "zone": {"type": ["string", "null"]},
     "state": {"type": "string", "enum": _STATES},
     "level": {"type": "string", "enum": _LEVELS},
     "active": {"type": "boolean"},
@@ -345,6 +345,24 @@ _SORT = _text("sort", enum=["name", "-name", "size", "opened:desc", "state", "id
 def test_orders(parameters, query, order, blamed, tmp_path):
     items = [VALVES[int(number) - 1] for number in order]
     assert (ORDER in Seen(tmp_path, parameters).read(VALVES).read(items, **query).broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("query", "shown", "blamed"),
+    [
+        ({}, {"archived": True}, True),
+        ({"include_archived": "false"}, {"archived": True}, True),
+        ({"include_archived": "true"}, {"archived": True}, False),
+        ({}, {"archived": False}, False),
+        ({"zone": "north"}, {"zone": None}, True),
+        ({"zone": "north"}, {"zone": "north"}, False),
+    ],
+)
+def test_what_a_list_leaves_out(query, shown, blamed, tmp_path):
+    parameters = [_bool("include_archived", default=False), _text("zone", enum=["north", "south"])]
+    items = [{**VALVES[0], **shown}]
+    seen = Seen(tmp_path, parameters).read(items, include_archived="true").read(items, **query)
+    assert (FILTER in seen.broken) == blamed
 
 
 @pytest.mark.parametrize(
