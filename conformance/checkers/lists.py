@@ -80,7 +80,7 @@ class Lists:
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
         yield from self._bounds(occasion, listing, page, sent)
-        yield from self._included(occasion, listing, page, sent)
+        yield from self._judge_included(occasion, listing, page, sent)
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         yield from self._search(occasion, listing, page, sent)
@@ -162,7 +162,9 @@ class Lists:
             found, cause = f"an item with {', '.join(wrong)}", f"{listing.operation.label} {parameter.name}"
             yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
 
-    def _included(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+    def _judge_included(
+        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]
+    ) -> Iterator[Case]:
         """Judge that a list has no items of a kind that a parameter such as `include_archived` would add."""
         for name, parameter in listing.includes.items():
             text = sent.get(parameter.name, text_of(flat(parameter.schema).get("default")))

@@ -88,11 +88,11 @@ def _in_lists(before: list[Any], between: Any, after: list[Any], slack: Slack, w
     return ""
 
 
-def unstamped(value: Any) -> Any:
+def without_stamps(value: Any) -> Any:
     """Return a copy of a message without timestamps, which may legitimately differ between responses."""
     if isinstance(value, dict):
-        return {name: unstamped(item) for name, item in value.items() if name != "stamp"}
-    return [unstamped(item) for item in value] if isinstance(value, list) else value
+        return {name: without_stamps(item) for name, item in value.items() if name != "stamp"}
+    return [without_stamps(item) for item in value] if isinstance(value, list) else value
 
 
 def stamp_of(message: Any) -> tuple[float, float]:

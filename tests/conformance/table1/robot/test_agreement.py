@@ -12,8 +12,8 @@ from conformance.packs.table1.robot.state_read import (
     contradiction,
     disagreement,
     stamp_fault,
-    unstamped,
     usable,
+    without_stamps,
 )
 
 _SLACK = Slack(0.02, 0.05)
@@ -48,8 +48,8 @@ def test_a_stamp_counts_only_while_it_stands_still():
 
 def test_what_is_made_anew_is_compared_without_its_stamps():
     poses = {"poses": [_pose(1.0), _pose(2.0)]}
-    assert unstamped(poses) == unstamped({"poses": [_pose(1.0, sec=5), _pose(2.0, sec=6)]})
-    assert unstamped(poses)["poses"][1] == {"header": {}, "pose": {"x": 2.0, "covariance": [2.0, 0.0]}}
+    assert without_stamps(poses) == without_stamps({"poses": [_pose(1.0, sec=5), _pose(2.0, sec=6)]})
+    assert without_stamps(poses)["poses"][1] == {"header": {}, "pose": {"x": 2.0, "covariance": [2.0, 0.0]}}
 
 
 def test_a_quaternion_and_its_negative_are_one_orientation():

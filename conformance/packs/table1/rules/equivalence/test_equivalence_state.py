@@ -27,8 +27,8 @@ from conformance.packs.table1.robot.state_read import (
     StateRead,
     compare,
     disagreement,
-    unstamped,
     value_in,
+    without_stamps,
 )
 from conformance.packs.table1.scenarios.interfaces_in_motion import goals_over_soap, interfaces_in_motion
 from conformance.packs.table1.scenarios.turn import turn
@@ -221,8 +221,8 @@ def _compare_plans(
     if before is None or after is None:
         return
     problem = problem or GET_PLAN.problem(between)
-    if not problem and unstamped(before) == unstamped(after):
-        problem = disagreement(unstamped(before), unstamped(between), unstamped(after), _SAME)
+    if not problem and without_stamps(before) == without_stamps(after):
+        problem = disagreement(without_stamps(before), without_stamps(between), without_stamps(after), _SAME)
     elif not problem and plan_of(between).poses[-1].distance(goal) > _END_OFF:
         # A planner may answer the same request differently each time; then only the goal must be the same.
         problem = "the end is another one"
