@@ -31,6 +31,10 @@ _MOST_THINGS: Final = 1_000
 _KEPT: Final = "description/refused-keeps"
 # A device may carry out an operation this long after its response, s.
 _SETTLES_S: Final = 3.0
+# Phrases in a description for the only states in which an operation is not refused.
+_ONLY_FROM: Final = re.compile(
+    r"\b(?:409|refuse[sd]?|conflict)\b[^.;]*\bunless\b((?:(?!\bnot\b)[^.;])*)", re.IGNORECASE
+)
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
 _DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
@@ -101,6 +105,13 @@ class Changes:
             for operation in operations
             if "409" in operation.responses and (found := _alone(operation))
         }
+        # By operation: the states in which alone it is not refused, by the description.
+        self._only = {
+            operation.label: only
+            for operation in operations
+            if (template := operation.template.rpartition("/")[0]) in self._states
+            if (only := _only(operation, _states_of(reads[template], self._states[template])))
+        }
         self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
         # By path template: members that never decrease. Below, by path: their last values.
         self._growing = {
@@ -166,6 +177,10 @@ class Changes:
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
+        only = self._only.get(operation.label, frozenset({was}))
+        if now and was in FINAL and was not in only:
+            expected = f"a refusal, as the thing was {was}, and not {' or '.join(sorted(only))}"
+            yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
         for said in self._alone.get(operation.label, ()) if now else ():
             if said == now:
                 near = path.rpartition("/")[0]
@@ -221,6 +236,9 @@ class Changes:
             expected = f"{before.value} as {name}, which the response to {before.told} said"
             lost = before.value in FINAL and now not in _AWAY
             wrong = now if lost or (now == before.was and is_late) else ""
+        elif before.refused and now in _CANCELLED and before.value not in FINAL:
+            expected += f" and as {before.refused} must leave it"
+            wrong = now
         elif before.value in FINAL and now != before.value and now not in _AWAY:
             reason = before.refused or before.by
             expected += f" and as {reason} must leave it" if reason else ""
@@ -267,6 +285,16 @@ def _alone(operation: Operation) -> frozenset[str]:
     """Return the words, in backticks or alone, for the state of another thing in which an operation is refused."""
     said = [found[0] for found in ANOTHER.finditer(operation.text)]
     return frozenset(word for text in said for word in re.findall(r"`([\w -]+)`", text))
+
+
+def _states_of(read: Operation, name: str) -> tuple[str, ...]:
+    return tuple(map(str, flat(flat(read.shape or {}).get("properties", {}).get(name, {})).get("enum", ())))
+
+
+def _only(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
+    """Return the states in a phrase such as "409 unless the job is queued or paused"."""
+    said = [found[1] for found in _ONLY_FROM.finditer(operation.text)]
+    return frozenset(state for state in states for text in said if re.search(rf"\b{re.escape(state)}\b", text))
 
 
 def _growing(read: Operation) -> frozenset[str]:

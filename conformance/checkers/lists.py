@@ -55,6 +55,8 @@ class Lists:
         # no limit cut.
         self._longest: dict[object, int] = defaultdict(int)
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
+        # By operation: limits to which a first page was cut.
+        self._kept: dict[str, set[int]] = defaultdict(set)
         # Lists that had fewer items than the default page size although more exist: number of items, total, case.
         self._short: dict[object, tuple[int, int, Case]] = {}
         # By operation: the items of the whole list, and cases of searches without one of them, until the list shows it.
@@ -137,6 +139,12 @@ class Lists:
             self._short[key] = count, total, case
         elif is_sent and short is not None and short[0] < count <= most <= listing.most({}) and total == short[1]:
             yield self._short.pop(key)[2]
+            return
+        # A device that raises a limit does so on the first page too.
+        is_first = sent.keys().isdisjoint(places)
+        self._kept[cause] |= {most} if is_sent and is_first and is_cut and count == most else set()
+        if not case.holds and most in self._kept[cause]:
+            yield case
             return
         if is_sent and not is_cut and count <= _LEAST:
             case = replace(case, doubt="it may raise the limit to its least one")

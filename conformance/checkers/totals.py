@@ -23,7 +23,17 @@ _FEWEST_CUT: Final = 10, 20
 # Combinations of filters that are remembered.
 _MOST: Final = 1000
 # Phrases in a description which say that a total counts the filtered items.
-_FILTERED: Final = re.compile(r"\b(?:filter\w*|match\w*)\b(?![^.]*\b(?:ignor|regardless|whatever))", re.IGNORECASE)
+_FILTERED: Final = re.compile(
+    r"^(?!.*\b(?:ignor\w*|regardless of|whatever|independent\w* of)\W+(?:\w+\W+){0,2}filter)"
+    r"(?!.*\bfilter\w*\W+(?:\w+\W+){0,3}ignored).*\b(?:filter|match)",
+    re.IGNORECASE | re.DOTALL,
+)
+# Phrases in a description which say that a total counts the items of all pages.
+_OF_ALL: Final = re.compile(
+    r"\b(?:all (?:the )?pages|whole (?:list|collection)"
+    r"|(?:whatever|regardless of|before|across) (?:the |any )?(?:pag|limit))",
+    re.IGNORECASE,
+)
 _CAP: Final = 50
 
 
@@ -117,11 +127,16 @@ class Totals:
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, frozenset[tuple[str, str]]], _Count] = defaultdict(_Count)
         self._longest: dict[str, int] = defaultdict(int)
+        # By path, total and filters: what the whole list tells, and parts of it that tell another total.
+        self._told: dict[tuple[str, str, frozenset[tuple[str, str]]], int] = {}
+        self._apart: dict[tuple[str, str, frozenset[tuple[str, str]]], list[Case]] = defaultdict(list)
         self._changed_s = float("-inf")
 
     def note_change(self, when_s: float) -> None:
         """Note a request that may have changed a list."""
         self._changed_s = when_s
+        self._told.clear()
+        self._apart.clear()
 
     def __call__(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Yield the cases of one response; none if the parameters do not tell which part of the list it contains."""
@@ -148,6 +163,7 @@ class Totals:
         sure = whole and not self._is_cut(listing, shown)
         part = _Part(occasion, page, frozenset(sent), offset, whole=whole, sure=sure)
         for name, total in page.totals.items():
+            yield from self._of_all_pages(listing, part, name, chosen, total)
             every = self._counts[label, name, frozenset()]
             count = self._counts[label, name, chosen] if len(self._counts) < _MOST else every
             every.is_of_all |= total > shown > 0
@@ -159,6 +175,23 @@ class Totals:
                 count.learn(total, part)
             if count.agrees and (count is not every or not chosen):
                 yield from self._judge_total(count, every, part, name, total)
+
+    def _of_all_pages(
+        self, listing: Listing, part: _Part, name: str, chosen: frozenset[tuple[str, str]], total: int
+    ) -> Iterator[Case]:
+        """Judge a total that counts all pages, by the description, between two reads of the whole list that tell it."""
+        paging = {one.name for one in (listing.limit, listing.offset) if one is not None}
+        names, path = {text for text, _ in chosen}, part.occasion.context.target.partition("?")[0]
+        if not (_OF_ALL.search(listing.says.get(name, "")) and part.names <= names | paging):
+            return
+        key = path, name, chosen
+        if part.names == names:
+            apart, before = self._apart.pop(key, []), self._told.get(key)
+            yield from apart if before == total else ()
+            self._told[key] = total
+        elif self._told.get(key, total) != total:
+            expected = f"{self._told[key]} as {name}, whatever the page, by its description"
+            self._apart[key].append(_case(part.occasion, name, f"{total} as {name}", expected, holds=False))
 
     def _judge_total(self, count: _Count, every: _Count, part: _Part, name: str, total: int) -> Iterator[Case]:
         """Yield the cases of a total whose meaning is known; every: that of the list without filters."""

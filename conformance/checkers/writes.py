@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -175,6 +175,8 @@ class Writes:
         # By template and member: methods whose values were read as they were sent, and patches that changed nothing.
         self._taken: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._ignored: dict[tuple[str, str], dict[bytes, Case]] = defaultdict(dict)
+        # By template, member, method and value: how often it was as before after such a request.
+        self._refused = Counter[tuple[str, str, str, str]]()
         # By path: the last accepted body, which a device may still apply after a refused request.
         self._accepted: dict[str, Any] = {}
 
@@ -401,8 +403,13 @@ class Writes:
                 doubt = "null may mean that the member is not to be changed" if leaf.value is None else ""
                 yield replace(case, doubt=doubt)
             part: Schema = {"properties": {last: leaf.part}}
-            if method == "PATCH" and any(differences({last: leaf.value}, {last: leaf.now}, part, None, frozenset())):
+            differs = any(differences({last: leaf.value}, {last: leaf.now}, part, None, frozenset()))
+            if method == "PATCH" and differs:
                 self._ignored[key][change.write.request.body] = case
+            # Programs take 0, false and an empty text for nothing.
+            self._refused[*key, method, clip(leaf.value)] += differs and leaf.value in (0, "")
+            if method in self._taken[key] and self._refused[*key, method, clip(leaf.value)] >= _SEEN:
+                yield replace(case, doubt="it may not take this value at the moment")
         if self._taken[key] == {"PUT"} and len(self._ignored[key]) >= _SEEN:
             yield from self._ignored.pop(key).values()
 

@@ -41,6 +41,7 @@ from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.reach import is_same, joined, split
+from conformance.verdict.evidence import SENTENCE
 
 # _PAGES: consecutive pages to read, with _LARGE items at most where the limit allows that. _VALUES: values of one
 # parameter at quick; below, at other efforts.
@@ -88,7 +89,7 @@ class Paged:
         found: the last request for a part.
         expected: what the part should have, as a noun phrase.
         fault: what it had instead; empty: what it should have.
-        is_said: whether only a sentence of the description demands it.
+        doubt: as in Case.
     """
 
     operation: str
@@ -96,7 +97,7 @@ class Paged:
     found: Exchange
     expected: str
     fault: str = ""
-    is_said: bool = False
+    doubt: str = ""
 
 
 def lists_of(api: RestInterface) -> list[Listing]:
@@ -153,7 +154,10 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
 def pages_below(api: RestInterface, values: Values, listing: Listing, path: str) -> Iterator[Paged]:
     """Yield what is seen of a list below a thing in parts."""
     reader = Reader(api, values, listing, path=path)
-    return _Parts(reader).all(reader.until)
+    yield from _Parts(reader).all(reader.until)
+    page = reader.page()
+    for query in islice(_queries(listing, page, _FEWEST), _PAGES) if page is not None and page.items else ():
+        reader.read(query)
 
 
 def vary_lists(api: RestInterface, values: Values) -> None:
@@ -250,12 +254,7 @@ class Reader:
 
 
 def _reread_totals(reader: Reader, doubted: list[dict[str, Any]]) -> None:
-    """Read lists with a wrong total again, if no change explains it.
-
-    Args:
-        reader: of the list.
-        doubted: queries by which a total was not the number of items.
-    """
+    """Read lists with a wrong total again, if no change explains it: with the queries that had one, and without."""
     listing, first = reader.listing, reader.api.first.get(reader.listing.operation.label)
     before = page_of(first.response, listing.operation) if first is not None else None
     now = reader.page()
@@ -434,7 +433,7 @@ class _Parts:
             return None
         fault = f"{cursor.name} {following[:60]}, which leads to an empty page" if not later[1].items else ""
         expected, way = "no further page, as the description says of the last", f"{limit.name} exactly"
-        return replace(self._page_case(way, later[0], expected, fault), is_said=True)
+        return replace(self._page_case(way, later[0], expected, fault), doubt=SENTENCE)
 
     def _read_shifted(self, whole: Page) -> Paged | None:
         """Read from the second item on."""

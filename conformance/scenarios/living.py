@@ -320,9 +320,21 @@ class Living:
             is_changed = kind is Kind.THERE and len(thing.life.writes) > 1
             self.note(kind, operation, listing.exchange, text, other, thing, _LEFT_OUT if is_changed else "")
             thing.is_told = True
+        if is_new and before is not None and before.is_whole:
+            expected = f"one more thing in the list after {_change_text(after)}"
+            self.note(Kind.THERE, operation, listing.exchange, expected, self._twin(thing, before, listing), thing)
         self._look_at_order(operation)
         for thing in self.of(State.ALIVE)[-_LOOKED:] if not self._is_shown_otherwise else ():
             self._compare(thing, operation)
+
+    def _twin(self, thing: Thing, before: WholeList, now: WholeList) -> str:
+        """Return the identifier of another new item with the values of a thing that was just created; else nothing."""
+        known = {*before.ids, *(one.id for one in self.things)}
+        for item, id_ in zip(now.items, now.ids, strict=True):
+            shared = thing.kept.keys() & item.keys() if id_ and id_ not in known else ()
+            if len(shared) > 1 and not self._differ(thing, thing.kept, item):
+                return f"{id_} as well, with the same values"
+        return ""
 
     def _look_at_order(self, operation: str) -> None:
         """Compare the order of the list with that in which its things were created, if its description tells it."""

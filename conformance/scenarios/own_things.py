@@ -319,6 +319,7 @@ class _Thing:
                 earlier = [octets for _, octets in files[:-1]]
                 earlier += [file_of(other, octets) for other in others[:1] for octets in _FILES[:2]]
                 self._look_again(read, whole, earlier)
+                self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), replace(request, body=b""))
                 self._end_file(put, read, operations.get(("DELETE", template)), request, whole)
                 self.uploads.append((read, request, [octets for _, octets in files]))
 
@@ -365,7 +366,23 @@ class _Thing:
                 both = [item for item in after[1] if item in page.items and item not in before[1]]
                 expected, fault = f"no item that was created at {outgoing.target}", f"{clip(both[0])}" if both else ""
                 self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
+                self._read_elsewhere(operations, template, page.items[-1], other)
             self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
+
+    def _read_elsewhere(
+        self, operations: Mapping[tuple[str, str], Operation], template: str, value: Any, other: str
+    ) -> None:
+        """Read what is in a list below this thing as if it were below another one."""
+        for (method, path), item in operations.items():
+            id_ = identifier_of(value, item) if method == "GET" and collection_of(path) == template else ""
+            if id_:
+                found = self.api.send(Outgoing("GET", f"{other}/{quote(id_, safe='')}"))
+                expected, fault = (
+                    f"a refusal, as {id_} is not below that thing",
+                    found.came if found.response.ok else "",
+                )
+                doubt = "identifiers may be unique among all things"
+                self.surveyor.paged.append(Paged(item.label, ANOTHER, found, expected, fault, doubt))
 
     def _at(self, operation: Operation, inputs: Inputs, below: str) -> tuple[Outgoing, Inputs]:
         """Return a request to what is below it, with the inputs that it has."""

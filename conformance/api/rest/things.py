@@ -324,6 +324,8 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
     if is_number(value):
         try:
             near = {} if isinstance(value, int) and "number" not in kinds_of(schema) else _NEAR
+            step: Any = schema.get("multipleOf", 0)
+            near = {"abs_tol": step / 2} if near and is_number(step) and step > 0 else near
             return math.isclose(value, float(other), **near)
         except (TypeError, ValueError):
             return other is not None

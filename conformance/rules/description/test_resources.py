@@ -12,7 +12,7 @@ from conformance.scenarios.own_things import ANOTHER, own_things
 from conformance.scenarios.rule import Outcome, Rule, rule
 from conformance.scenarios.scenario import Scenario
 from conformance.scenarios.survey import Survey
-from conformance.verdict.evidence import SENTENCE, Case
+from conformance.verdict.evidence import Case
 
 
 def _player(name: str, scenario: Scenario) -> Rule:
@@ -41,8 +41,8 @@ def test_parameters_of_lists(api: RestInterface, values: Values) -> None:
 def list_pages(trace: tuple[Paged, ...]) -> Iterable[Outcome]:
     """Judge whether the parts of a list are the list, each item once."""
     for paging in trace:
-        cause, doubt = f"{paging.operation} {paging.way}", SENTENCE if paging.is_said else ""
-        yield Case(not paging.fault, paging.found, paging.expected, paging.fault, cause=cause, doubt=doubt)
+        cause, fault = f"{paging.operation} {paging.way}", paging.fault
+        yield Case(not fault, paging.found, paging.expected, fault, cause=cause, doubt=paging.doubt)
 
 
 @rule("description/list-pages", on=(own_things,))

@@ -60,6 +60,7 @@ def _of(value):
     if isinstance(value, list):
         return {"type": "array", "items": _ITEM}
     inner = {name: _of(one) for name, one in value.items() if isinstance(one, dict | list)}
+    inner |= {"total_items": {"type": "integer", "description": "How many, whatever the page."}}
     return {"type": "object", "properties": inner}
 
 
@@ -345,6 +346,22 @@ _SORT = _text("sort", enum=["name", "-name", "size", "opened:desc", "state", "id
 def test_orders(parameters, query, order, blamed, tmp_path):
     items = [VALVES[int(number) - 1] for number in order]
     assert (ORDER in Seen(tmp_path, parameters).read(VALVES).read(items, **query).broken) == blamed
+
+
+@pytest.mark.parametrize("told", [4, 2])
+def test_a_total_of_all_pages(told, tmp_path):
+    def wrapped(items, total=4):
+        return {"items": items, "total_items": total, "next": "/valves?offset=2"}
+
+    seen = Seen(tmp_path, [_whole("limit"), _whole("offset")], wrapped)
+    seen.read(VALVES).read(VALVES[2:], body=wrapped(VALVES[2:3], told), limit=1, offset=2).read(VALVES)
+    assert (TOTAL in seen.broken) == (told != 4)
+
+
+@pytest.mark.parametrize(("count", "blamed"), [(2, False), (3, True)])
+def test_a_limit_that_holds_on_the_first_page_holds_on_all(count, blamed, tmp_path):
+    seen = Seen(tmp_path, [_whole("limit"), _whole("offset")]).read(VALVES).read(VALVES[:2], limit=2)
+    assert (LIMIT in seen.read(VALVES[1 : 1 + count], limit=2, offset=1).broken) == blamed
 
 
 @pytest.mark.parametrize(

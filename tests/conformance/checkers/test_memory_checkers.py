@@ -54,7 +54,7 @@ _PATHS = {
     "/jobs/{id}/start": {
         "parameters": [_ID],
         "post": {
-            "summary": "409 while another job is `running`. Archived is final.",
+            "summary": "409 while another job is `running`, and 409 unless the job is queued. Archived is final.",
             "responses": {**_OK, "409": {"description": "no"}},
         },
     },
@@ -187,6 +187,10 @@ BROKEN = {
         [("GET", "/notes/1", None, 200, {"rank": 5}), ("GET", "/notes/1", None, 200, {"rank": 4})], STATES,
     ),
     "told archived, and then queued": ([_cancel(phase="archived"), _cancel(act="retry", phase="queued")], STATES),
+    "a cancelled job is started": (
+        [_status("cancelled"), ("POST", "/jobs/1/start", None, 200, {"id": "1", "phase": "running"})], STATES,
+    ),
+    "refused, and cancelled": ([_status("running"), _cancel(409), _status("cancelled")], STATES),
     "laps fall": ([_get("1", laps=5), _get("1", laps=3)], STATES),
     "two run where one may": (
         [_get("1", phase="running"), *_started("2"), _get("1", phase="running")], STATES,

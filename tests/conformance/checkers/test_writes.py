@@ -184,6 +184,13 @@ BROKEN = {
             *(_patch("/merge", {"note": "b"}), _get("/merge", note="b", mode="off")),
         ], PATCH,
     ),
+    "a PATCH takes each gain but 0": (
+        [
+            *(_get("/merge"), _patch("/merge", {"gain": 2.5}), _get("/merge", gain=2.5)),
+            *(_patch("/merge", {"gain": 0, "mode": "off"}), _get("/merge", gain=2.5, mode="off")),
+            *(_patch("/merge", {"gain": 0, "mode": "auto"}), _get("/merge", gain=2.5)),
+        ], READ,
+    ),
     "refused, and the valid members taken, by PUT": (
         [_get(), _put(status=422, gain=9.5, mode="x"), _get(gain=9.5)],
         KEPT,
