@@ -3,7 +3,7 @@
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from toy_server import serving
@@ -22,7 +22,7 @@ def _serving() -> Iterator[Callable[[Callable[[socket.socket], None]], str]]:
 
     def serve(handle: Callable[[socket.socket], None]) -> str:
         server = socket.create_server(("127.0.0.1", 0))
-        open_sockets: list[socket.socket] = []
+        served: list[tuple[socket.socket, threading.Thread]] = []
 
         def accept() -> None:
             while True:
@@ -30,14 +30,20 @@ def _serving() -> Iterator[Callable[[Callable[[socket.socket], None]], str]]:
                     connection, _ = server.accept()
                 except OSError:
                     return
-                open_sockets.append(connection)
-                threading.Thread(target=_quietly, args=(handle, connection), daemon=True).start()
+                thread = threading.Thread(target=_quietly, args=(handle, connection), daemon=True)
+                served.append((connection, thread))
+                thread.start()
 
         def stop() -> None:
             server.shutdown(socket.SHUT_RDWR)
             server.close()
-            for connection in open_sockets:
-                connection.close()
+            for connection, thread in served:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+                # A thread that is about to read would read what the next test's socket of the same number gets.
+                thread.join(0.5)
+                if not thread.is_alive():
+                    connection.close()
 
         threading.Thread(target=accept, daemon=True).start()
         stops.append(stop)

@@ -33,13 +33,14 @@ def certified(statement, requirement, tmp_path):
 
 
 def _misspelt(monkeypatch):
-    make = calls._example  # noqa: SLF001 - whose mistake it is to be
+    fit = calls._fit  # noqa: SLF001 - whose mistake it is to be
 
-    def wrong(api, operation, media_type):
-        call = make(api, operation, media_type)
-        return replace(call, body=call.body.replace(b'"linear"', b'"liner"')) if call.body else call
+    def wrong(api, operation, value):
+        found = fit(api, operation, value)
+        is_velocity = isinstance(found, dict) and "linear" in found
+        return {name.replace("linear", "liner"): one for name, one in found.items()} if is_velocity else found
 
-    monkeypatch.setattr(calls, "_example", wrong)
+    monkeypatch.setattr(calls, "_fit", wrong)
 
 
 def _with_letters(monkeypatch):
