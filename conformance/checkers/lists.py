@@ -296,7 +296,7 @@ def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[
     descending = said[1] is not None
     wrong = [(one, other) for one, other, before in pairs if before is descending]
     if any(before is not None for _, _, before in pairs) and not _comes_first(page, made[0], descending):
-        expected, found = f"the {said[0].lower()}, by the description of the list", ""
+        expected = f"the {said[0].lower()}, by the description of the list"
         found = f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])} as {made[0]}" if wrong else ""
         cause = f"{listing.operation.label} {made[0]} said"
         yield occasion.case("description/list-order", not wrong, expected, found, cause=cause, doubt=SENTENCE)

@@ -377,10 +377,8 @@ class _Thing:
             id_ = identifier_of(value, item) if method == "GET" and collection_of(path) == template else ""
             if id_:
                 found = self.api.send(Outgoing("GET", f"{other}/{quote(id_, safe='')}"))
-                expected, fault = (
-                    f"a refusal, as {id_} is not below that thing",
-                    found.came if found.response.ok else "",
-                )
+                expected = f"a refusal, as {id_} is not below that thing"
+                fault = found.came if found.response.ok else ""
                 doubt = "identifiers may be unique among all things"
                 self.surveyor.paged.append(Paged(item.label, ANOTHER, found, expected, fault, doubt))
 
