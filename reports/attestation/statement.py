@@ -224,7 +224,8 @@ def _subject(name: str, digest: str) -> Subject:
 def run_of(result: Mapping[str, Any]) -> Run:
     """Return the facts that are signed for a valid `roaas-result/1` document."""
     requirements = result["requirements"]
-    robot = result["statement"]["robot"]
+    api = result.get("api", {})
+    robot = {"name": api.get("title"), "version": api.get("version")} | result["statement"]["robot"]
     baseline = result.get("baseline") or {}
     return Run(
         robot=Robot(robot.get("name"), robot.get("vendor"), robot.get("version")),

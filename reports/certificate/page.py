@@ -170,11 +170,8 @@ class Certificate:
         """Return what the page calls itself: a certificate of conformance to a contract, or a report."""
         if self.described:
             return "Report on a device and its own description"
-        return f"{self.subject} {self._title}"
-
-    @property
-    def _title(self) -> str:
-        return "Certificate of conformance" if self.result["verdict"] == "conformant" else "Conformance report"
+        conformant = self.result["verdict"] == "conformant"
+        return f"{self.subject} {'Certificate of conformance' if conformant else 'Conformance report'}"
 
     @property
     def described(self) -> Described | None:

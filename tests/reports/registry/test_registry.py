@@ -357,3 +357,11 @@ def test_a_private_key_among_the_keys_is_left_alone(host):
     private.write_bytes((host.folder / "stranger" / "signing-key.pem").read_bytes())
     done = host.build()
     assert (done.exit_code, "signing-key.pem is a private key" in done.stderr) == (0, True), done.stderr
+
+
+def test_a_described_device_without_a_name_goes_by_its_descriptions_title(host, described_result):
+    described_result["statement"]["robot"] = {}
+    host.sign_as_it_is("described", described_result)
+    host.build()
+    assert described_result["api"]["title"] in index(host)
+    assert f"firmware {described_result['api']['version']}" in host.text()
