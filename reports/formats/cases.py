@@ -151,13 +151,14 @@ def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[
     verdict, reason = requirement["verdict"], requirement["untestable"] or requirement["reason"]
     outcome = _OUTCOMES[verdict]
     if outcome in {Outcome.FAILED, Outcome.WARNING}:
-        return outcome, _headline(found) or requirement["reason"] or requirement["text"]
+        return outcome, headline(found) or requirement["reason"] or requirement["text"]
     if verdict == "not-claimed":
         return outcome, "The class is not claimed."
     return outcome, "" if outcome is Outcome.PASSED else reason or _UNEXPLAINED[outcome]
 
 
-def _headline(found: Sequence[Finding]) -> str:
+def headline(found: Sequence[Finding]) -> str:
+    """Return the first finding in words, with how many more there are; empty without one."""
     if not found:
         return ""
     more = f" (and {counted(len(found) - 1, 'more finding')})" if len(found) > 1 else ""

@@ -1,6 +1,7 @@
 """Write what code hosts show beside a change: SARIF, GitLab's code quality report, and GitHub's annotations.
 
-SARIF 2.1.0 (OASIS, errata 01) has a result for each case that needs attention. Passed and skipped cases are left out,
+SARIF 2.1.0 (OASIS, errata 01) has a result for each case that needs attention. Of a failed requirement, the findings
+that a right device may show too are a result of their own, a warning. Passed and skipped cases are left out,
 because some hosts show every result as a problem, whatever its kind. A case without a verdict is of kind `open`; the
 run is then another result of level `error`, so that a host that counts errors does not show an inconclusive run as
 green. Failures that the baseline accepts are warnings, because hosts hide suppressed results.
@@ -12,11 +13,12 @@ values the robot returned. A requirement without a verdict is an entry as well.
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
 
 from reports.certificate.page import certificate
-from reports.formats.cases import MESSAGE, STOP, Case, Outcome, Place, cases, places_of, worst_first
+from reports.formats.cases import MESSAGE, STOP, Case, Outcome, Place, cases, headline, places_of, worst_first
 from reports.pages.untrusted import excerpt, on_a_line, visible
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -52,7 +54,7 @@ def sarif(result: Mapping[str, Any]) -> str:
         "automationDetails": {"id": "roaas/"},
         "invocations": [_invocation(result, found)],
         "columnKind": "unicodeCodePoints",
-        "results": [_result(result, case, index) for index, case in enumerate(found)],
+        "results": [_result(result, part, index) for index, case in enumerate(found) for part in _parts(case)],
         "properties": {"verdict": result["verdict"], "suiteDigest": result["suite"]["digest"], "seed": result["seed"]},
     }
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=1) + "\n"
@@ -95,8 +97,19 @@ def _rule(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
     }
 
 
+def _parts(case: Case) -> list[Case]:
+    """Return a failed case with its sure findings, and one with its doubtful findings, which only warns."""
+    sure = [finding for finding in case.findings if "doubt" not in finding.failure]
+    doubtful = [finding for finding in case.findings if "doubt" in finding.failure]
+    if case.outcome is not Outcome.FAILED or not (sure and doubtful):
+        return [case]
+    parts = ((Outcome.FAILED, sure), (Outcome.WARNING, doubtful))
+    return [replace(case, outcome=outcome, message=headline(found), findings=found) for outcome, found in parts]
+
+
 def _result(result: Mapping[str, Any], case: Case, index: int) -> dict[str, Any]:
     first, *others = places_of(result, case)
+    is_doubtful = case.outcome is Outcome.WARNING and case.requirement and case.requirement["verdict"] == "fail"
     undecided = case.outcome is Outcome.ERROR and case.requirement is not None
     return {
         "ruleId": case.rule,
@@ -109,7 +122,7 @@ def _result(result: Mapping[str, Any], case: Case, index: int) -> dict[str, Any]
             {"id": number, "physicalLocation": _location(place), "message": {"text": "What the contract asks for"}}
             for number, place in enumerate(others)
         ],
-        "partialFingerprints": {"roaas/v1": case.fingerprint},
+        "partialFingerprints": {"roaas/v1": case.fingerprint, **({"roaas/doubts": "1"} if is_doubtful else {})},
         "properties": {"outcome": case.outcome, "detail": visible(case.detail[:_DETAIL])},
     }
 

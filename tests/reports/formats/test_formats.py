@@ -157,6 +157,18 @@ def test_fingerprints_stay_the_same_and_are_of_one_requirement_each(result):
     assert {entry["check_name"]: entry["fingerprint"] for entry in gitlab(result)} == before
 
 
+def test_doubtful_findings_of_a_failed_requirement_are_a_sarif_warning(result):
+    failed = next(item for item in result["requirements"] if item["verdict"] == "fail" and item["failures"])
+    first = failed["failures"][0]
+    for number, levels in ((0, ["error"]), (1, ["error", "warning"])):
+        failed["failures"] = [first, *[{**first, "message": "again", "doubt": "it may be so"}] * number]
+        shown = [item for item in sarif(result)["results"] if item["ruleId"] == failed["id"]]
+        assert [item["level"] for item in shown] == levels
+        assert len({json.dumps(item["partialFingerprints"]) for item in shown}) == len(shown)
+    assert "again" in shown[1]["message"]["text"]
+    assert "more finding" not in shown[0]["message"]["text"]
+
+
 @pytest.mark.parametrize("format_", ["junit", "sarif", "ctrf", "gitlab", "annotations", "markdown"])
 @pytest.mark.parametrize("age", ["result", "older"])
 def test_every_format_says_what_was_done_expected_and_seen(request, format_, age):
