@@ -39,6 +39,9 @@ _QUERY = [
 _FIRST = {"area": "front", "minutes": 10, "litres": 0, "starts": "2026-01-31T12:00:00Z", "valves": [], "rounds": []}
 _SENT = {"type": "object", "required": ["name"], "properties": _WRITABLE, "additionalProperties": False}
 _PATCH = {"type": "object", "properties": _WRITABLE, "additionalProperties": False, "minProperties": 1}
+_SETTING = {"season": {"enum": ["summer", "winter"]}, "rain_stop": {"type": "boolean"}}
+_SETTING["pressure"] = {"type": "number", "minimum": 0, "maximum": 9}
+_SETTINGS = {"type": "object", "required": [*_SETTING], "additionalProperties": False, "properties": _SETTING}
 _STATES = ["idle", "running", "paused", "done"]
 _SAID = "A retry with its key gets the first answer. A request that is refused does not use up its key."
 _LOG = "".join(f"{number:04} valve opened\n" for number in range(40)).encode()
@@ -472,14 +475,7 @@ class Sprinklers:
             value = json.loads(await request.read())
         except (ValueError, RecursionError):
             return error(400, "no JSON")
-        rules = {
-            "season": lambda one: one in ("summer", "winter"),
-            "rain_stop": lambda one: isinstance(one, bool),
-            "pressure": lambda one: type(one) in (int, float) and 0 <= one <= 9,
-        }
-        if not isinstance(value, dict) or rules.keys() != value.keys():
-            return error(422, "not these members")
-        if not all(rules[name](one) for name, one in value.items()):
+        if not jsonschema.Draft202012Validator(_SETTINGS).is_valid(value):
             return error(422, "not valid")
         self.settings = {**value, "season": self.settings["season"]} if self.has("the season stays") else value
         return web.json_response(value)
@@ -545,20 +541,12 @@ def sprinklers(style, faults=()):
     refusals = {"404": REFUSED, "406": REFUSED, "415": REFUSED, **conditions, **_BAD}
     listing = answers({"type": "array", "items": shape})
     listing["content"]["text/csv"] = {"schema": {"type": "string"}}
-    settings = {
-        "type": "object",
-        "required": ["season", "rain_stop", "pressure"],
-        "additionalProperties": False,
-        "properties": {
-            "season": {"enum": ["summer", "winter"]},
-            "rain_stop": {"type": "boolean"},
-            "pressure": {"type": "number", "minimum": 0, "maximum": 9},
-        },
-    }
+    settings = {"required": True, "content": {"application/json": {"schema": _SETTINGS}}}
     weather = {"type": "object", "properties": {"rain": {"type": "boolean"}, "at": {"type": "string"}}}
     prints = {"409": REFUSED, "422": REFUSED} if style.get("prints", True) else {}
     key = [_KEY] if style.get("keys", True) else []
     act = {"parameters": [_ID], "post": {"responses": {"200": answers(shape), "404": REFUSED, "409": REFUSED, **_BAD}}}
+    changed = {"200": answers(shape), **refusals}
     cached = {"200": answers(shape), "304": {"description": "as it was"}, **_BAD}
     document = described(
         {
@@ -574,16 +562,8 @@ def sprinklers(style, faults=()):
             "/zones/{id}": {
                 "parameters": [_ID],
                 "get": {"parameters": [_NONE_MATCH], "responses": cached},
-                "put": {
-                    "parameters": [_MATCH, _NONE_MATCH],
-                    "requestBody": sent,
-                    "responses": {"200": answers(shape), **refusals},
-                },
-                "patch": {
-                    "parameters": [_MATCH],
-                    "requestBody": patch,
-                    "responses": {"200": answers(shape), **refusals},
-                },
+                "put": {"parameters": [_MATCH, _NONE_MATCH], "requestBody": sent, "responses": changed},
+                "patch": {"parameters": [_MATCH], "requestBody": patch, "responses": changed},
                 "delete": {"parameters": [_MATCH], "responses": {"204": {"description": "gone"}, **refusals}},
             },
             "/zones/{id}/start": act,
@@ -596,11 +576,8 @@ def sprinklers(style, faults=()):
             },
             "/log": {"get": {"responses": {"200": answers({"type": "string"}, "text/plain"), **_BAD}}},
             "/settings": {
-                "get": {"responses": {"200": answers(settings), **_BAD}},
-                "put": {
-                    "requestBody": {"required": True, "content": {"application/json": {"schema": settings}}},
-                    "responses": {"200": answers(settings), **_BAD},
-                },
+                "get": {"responses": {"200": answers(_SETTINGS), **_BAD}},
+                "put": {"requestBody": settings, "responses": {"200": answers(_SETTINGS), **_BAD}},
             },
             "/weather": {"get": {"responses": {"200": answers(weather), **_BAD}}},
         }
@@ -617,6 +594,3 @@ def sprinklers(style, faults=()):
         "/weather": {"GET": device.weather},
     }
     return document, routes
-
-
-#: Right devices: what is free in each.

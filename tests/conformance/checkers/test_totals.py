@@ -1,0 +1,177 @@
+"""Totals of lists: one that counts the items as it did is never blamed, and one that does not is."""
+
+import pytest
+from valve_lists import STATES, TOTAL, VALVES, Seen, whole, word
+
+
+@pytest.mark.parametrize("told", [4, 2])
+def test_a_total_of_all_pages(told, tmp_path):
+    def wrapped(items, total=4):
+        return {"items": items, "total_items": total, "next": "/valves?offset=2"}
+
+    seen = Seen(tmp_path, [whole("limit"), whole("offset")], wrapped)
+    seen.read(VALVES).read(VALVES[2:], body=wrapped(VALVES[2:3], told), limit=1, offset=2).read(VALVES)
+    assert (TOTAL in seen.broken) == (told != 4)
+
+
+def _totalled(name, of=len):
+    return lambda items: {"items": items, name: of(items)}
+
+
+def test_a_total_that_counts_what_was_deleted_is_noticed(tmp_path):
+    for name in ("total", "totalElements", "count"):
+        seen = Seen(tmp_path / name, [whole("limit"), whole("offset")], _totalled(name)).read(VALVES).write()
+        assert not seen.read(VALVES[1:], body={"items": VALVES[1:], name: 4}).broken, "it may be late"
+        assert seen.read(VALVES[1:], body={"items": VALVES[1:], name: 4}, after=4.0).broken == {TOTAL}
+
+
+def test_a_total_that_is_wrong_now_and_then_is_noticed(tmp_path):
+    seen = Seen(tmp_path, [], _totalled("total")).read(VALVES)
+    for _ in range(2):
+        seen.read(VALVES).read(VALVES, body={"items": VALVES, "total": 5}, after=4.0)
+    assert seen.broken == {TOTAL}
+
+
+def test_a_header_and_a_filtered_total_are_judged_alike(tmp_path):
+    def many(number):
+        return [("X-Total-Count", str(number))]
+
+    seen = Seen(tmp_path, [word("state", enum=STATES)])
+    seen.read(VALVES, many(4)).read([VALVES[1]], many(1), state="closed")
+    assert not seen.broken
+    seen.read([VALVES[1]], many(4), after=4.0, state="closed").read([VALVES[1]], many(4), after=4.0, state="closed")
+    assert seen.broken == {TOTAL}
+
+
+def test_a_total_that_is_wrong_beside_a_part_is_noticed(tmp_path):
+    for name in ("total", "count"):
+        seen = Seen(tmp_path / name, [whole("limit"), whole("offset")], _totalled(name)).read(VALVES)
+        for number in (4, 5, 4, 3):
+            assert not seen.broken
+            seen.read(VALVES[:2], body={"items": VALVES[:2], name: number}, limit=2).read(VALVES)
+        assert seen.broken == {TOTAL}
+
+
+@pytest.mark.parametrize("query", [{}, {"state": "open"}], ids=["all", "filtered"])
+def test_a_total_that_is_the_size_of_the_page_is_noticed(query, tmp_path):
+    seen = Seen(tmp_path, [whole("limit"), word("state", enum=STATES)], _totalled("total")).read(VALVES)
+    every = [*VALVES, {**VALVES[0], "id": 9}]
+    seen.read(every)
+    of = [one for one in every if one["state"] == "open"] if query else every
+    seen.read(of, **query).read(of[:1], limit=1, **query)
+    assert not seen.broken, "once may be chance"
+    assert seen.read(of[:2], limit=2, **query).broken == {TOTAL}
+
+
+def test_a_list_that_grows_and_shrinks_by_itself_has_another_total(tmp_path):
+    seen = Seen(tmp_path, [whole("limit", default=3)], _totalled("total"))
+    for count in (2, 3, 3, 2, 3, 3):
+        seen.read(VALVES[:count])
+    assert not seen.broken
+
+
+def _changed_beside(seen):
+    for number in range(5):
+        seen.read(VALVES[:3]).read(VALVES[:1], body={"items": VALVES[:1], "total": 3}, limit=1)
+        seen.write().read(VALVES[:1], body={"items": VALVES[:1], "total": 4}, limit=1).write()
+        seen.read(VALVES[: 3 + number % 2])
+
+
+def _page_count(seen):
+    seen.read(VALVES).read(VALVES[2:], offset=2).read(VALVES[:1], limit=1).read(VALVES[1:2], limit=1, offset=1)
+
+
+def _all_unfiltered(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[:1], body={"items": VALVES[:1], "total": 4}, after=4.0, state="open")
+
+
+def _estimated(seen):
+    for number in (3, 5, 9):
+        seen.read(VALVES, body={"items": VALVES, "total": number}, after=4.0)
+
+
+def _capped(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[2:], body={"items": VALVES, "total": 50}, after=4.0, offset=60, limit=4)
+
+
+def _late(seen):
+    seen.read(VALVES).write()
+    for total in (4, 4, 3):
+        seen.read(VALVES[1:], body={"items": VALVES[1:], "total": total}, after=0.5)
+    seen.read(VALVES[1:], after=9.0)
+
+
+def _cut_by_server(seen):
+    many = [{"id": number} for number in range(20)]
+    seen.read(many, body={"items": many, "total": 20}).write()
+    for _ in range(3):
+        seen.read(many, body={"items": many, "total": 21}, after=4.0)
+
+
+def test_a_list_without_parts_may_be_cut_at_many_items(tmp_path):
+    for size, blamed in ((20, set()), (15, {TOTAL})):
+        seen = Seen(tmp_path / str(size), [word("state", enum=STATES)], _totalled("count"))
+        items = [{"id": number} for number in range(size)]
+        seen.read(items).write()
+        for _ in range(3):
+            seen.read(items, body={"items": items, "count": size + 1}, after=4.0)
+        assert seen.broken == blamed
+
+
+def _cursor(seen):
+    for _ in range(3):
+        seen.read(VALVES[:2], body={"items": VALVES[:2], "total": 4, "next_cursor": "x"}, after=4.0)
+        seen.read(VALVES[2:], body={"items": VALVES[2:], "total": 4}, after=4.0, cursor="x")
+
+
+def _sliding(seen):
+    for number in range(9):
+        items = [{"id": number + one} for one in range(4)]
+        seen.read(items, body={"items": items, "total": 4 + number % 2}, after=0.5)
+        seen.read(items, body={"items": items, "total": 4}, after=0.5)
+
+
+def _beyond(seen):
+    for _ in range(3):
+        seen.read(VALVES).read([], body={"items": [], "total": 4}, after=4.0, offset=99)
+
+
+def _nothing(seen):
+    seen.read(VALVES)
+    for query in ({"limit": 0}, {"offset": 10**12}, {"limit": 10**12, "offset": 5}) * 3:
+        seen.read([], body={"items": [], "total": 4}, after=4.0, **query)
+
+
+def _from_the_end(seen):
+    seen.read(VALVES)
+    for _ in range(3):
+        seen.read(VALVES[3:], body={"items": VALVES[3:], "total": 4}, after=4.0, offset=-1)
+        seen.read(VALVES[:3], body={"items": VALVES[:3], "total": 4}, after=4.0, limit=-1)
+
+
+@pytest.mark.parametrize(
+    ("name", "play"),
+    [
+        ("total", _nothing),
+        ("total", _from_the_end),
+        ("count", _page_count),
+        ("total", _changed_beside),
+        ("total", _all_unfiltered),
+        ("total", _estimated),
+        ("total", _capped),
+        ("total", _late),
+        ("total", _cut_by_server),
+        ("total", _cursor),
+        ("total", _sliding),
+        ("total", _beyond),
+    ],
+)
+def test_a_total_that_means_something_else_is_not_blamed(name, play, tmp_path):
+    parameters = [whole("limit"), whole("offset"), word("cursor"), word("state", enum=STATES)]
+    seen = Seen(tmp_path, parameters, _totalled(name))
+    play(seen)
+    assert TOTAL not in seen.broken, [one for one in seen.cases if not one.holds]
