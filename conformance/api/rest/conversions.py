@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from conformance.api.rest.inputs import NOTHING
@@ -25,11 +25,11 @@ _YEAR_3000 = 32_503_680_000
 _Place = tuple[Steps, list[Any]]
 
 
-def is_converted(schema: Schema, sent: bytes, response: bytes) -> bool:
+def is_converted(schema: Schema, sent: bytes, response: bytes, unkept: Collection[str] = ()) -> bool:
     """Return whether a forbidden body has an allowed one of the same meaning, and the response shows no other values.
 
     Each value is allowed in another JSON type: 0 for false, "5" for 5, one item for a list of one, a set that repeats
-    an item, null for an optional member.
+    an item, null for an optional member. The response may show anything for ``unkept`` members.
     """
     body = read_json(sent)
     if body.problem or fits(schema, body.value):
@@ -41,7 +41,16 @@ def is_converted(schema: Schema, sent: bytes, response: bytes) -> bool:
     for steps, meanings in found:
         meant = with_member(meant, steps, meanings[0]) if steps else meanings[0]
     said = read_json(response).value
-    return fits(schema, meant) and all(_shows(said, steps, meanings) for steps, meanings in found)
+    return fits(schema, meant) and all(
+        (steps[:1] and steps[0] in unkept) or _shows(said, steps, meanings) for steps, meanings in found
+    )
+
+
+def unkept_members(sent: bytes, response: bytes) -> set[str]:
+    """Return the members of a body for which the response shows another value, as another setting may decide it."""
+    body, said = read_json(sent).value, read_json(response).value
+    members = body.items() if isinstance(body, dict) else ()
+    return {name for name, value in members if not _shows(said, (name,), [value])}
 
 
 def _conversions(schema: Schema, value: Any, here: Steps) -> Iterator[_Place]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from conformance.api.rest.conversions import is_converted
+from conformance.api.rest.conversions import is_converted, unkept_members
 from conformance.api.rest.invalid_variations import NO_WHOLE_NUMBER
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
@@ -89,7 +89,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
 
     yield from held_back(sure)
-    converted = _convertible(sure, run)
+    converted = _convertible(trace, sure, run)
     acted = [one for one in sure if one.status not in HELD and id(one) not in converted]
     yield from told_once(acted, "status 4xx for a request that the description forbids", fault)
 
@@ -98,7 +98,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
 def types(trace: Survey, run: Run) -> Iterable[Outcome]:
     """Judge whether a value of another type is refused, also where the device converts it without loss."""
     sure = _forbidden(trace)
-    converted = _convertible(sure, run)
+    converted = _convertible(trace, sure, run)
 
     def fault(probe: Probe) -> Fault | None:
         why = "" if probe.says else f", although {probe.why}"
@@ -118,16 +118,25 @@ def _forbidden(trace: Survey) -> list[Probe]:
     return [one for one in sure if _place_of(one).lower() not in _OF_HTTP]
 
 
-def _convertible(probes: Iterable[Probe], run: Run) -> set[int]:
+def _convertible(trace: Survey, probes: Iterable[Probe], run: Run) -> set[int]:
     """Return the `id()` of each probe whose JSON body was accepted, as a value of the declared type means the same."""
     bodies = {operation.label: operation.bodies for operation in operations_of(run.contract)}
-    found = set()
+    found, unkept = set(), defaultdict[str, set[str]](set)
+    for probe in trace.probes:
+        if probe.ok and probe.exchange and probe.validity == VALID and is_json(probe.attempt.request.media_type):
+            unkept[probe.operation] |= unkept_members(probe.attempt.request.body, probe.exchange.response.body)
     for probe in probes:
         request = probe.attempt.request
-        media_type = request.media_type
-        given = bodies.get(probe.operation, {}).get(media_type)
-        if probe.ok and probe.exchange and given and is_json(media_type) and _place_of(probe).startswith("body"):
-            found |= {id(probe)} if is_converted(given.schema, request.body, probe.exchange.response.body) else set()
+        given = bodies.get(probe.operation, {}).get(request.media_type)
+        if (
+            probe.ok
+            and probe.exchange
+            and given
+            and is_json(request.media_type)
+            and _place_of(probe).startswith("body")
+        ):
+            said, own = probe.exchange.response.body, unkept[probe.operation]
+            found |= {id(probe)} if is_converted(given.schema, request.body, said, own) else set()
     return found
 
 

@@ -319,6 +319,14 @@ def test_a_device_that_converts_types_without_loss_is_warned_once(text, run):
     assert failed == ([1, 0] if text == "5" else [0, 1])
 
 
+def test_another_setting_may_decide_a_converted_value(run):
+    said = {"body": {"n": 100}, "operation": _OTHER}
+    odd = _probe(**said, kind=Kind.INVALID, says="a text as body /n", place="body /n", sent=b'{"n": "5"}')
+    allowed = _probe(**said, validity="valid", sent=b'{"n": 5}')
+    failed = [len(_failed(requests.invalid_refused, Survey(probes), run)) for probes in ((odd,), (allowed, odd))]
+    assert failed == [1, 0]
+
+
 def test_fractions_that_a_framework_cuts_are_told_once(run):
     says = {"says": "1.5 as body /n, which is no whole number", "place": "body /n", "kind": Kind.INVALID}
     probes = [_probe(operation=one, **says) for one in (_LABEL, _OTHER)]
