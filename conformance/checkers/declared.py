@@ -200,25 +200,34 @@ def _shown_of(schema: Schema, value: Any, depth: int = 0) -> str | None:
     return max(told) if told else None
 
 
-def negotiation(occasion: Occasion) -> Iterator[Case]:
-    """Judge the format of a successful read by Accept, and Vary where there are several."""
-    operation, answer, context = occasion.operation, occasion.response, occasion.context
-    if operation is None or operation.method != "GET" or not answer.ok or not operation.formats:
-        return
-    if answer.media_type and context.usual:
-        # A format excluded by q=0 breaks another rule than a format that Accept does not mention.
-        ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
-        yield occasion.case(
-            "http/q-zero" if ruled_out else "http/not-acceptable",
-            quality(answer.media_type, context.accept) > 0,
-            f"an acceptable format or status 406 when Accept is {context.accept}",
-            f"status {answer.status} with {answer.media_type}",
-            cause="not acceptable",
-        )
-    # If an operation may have other formats for other values, only a response to Accept shows that the device chooses.
-    is_chosen = answer.media_type == (context.accept or "") != operation.formats[0]
-    if len(operation.formats) > 1 and (is_chosen or are_data(operation.formats)) and not context.is_head:
-        vary = (answer.header("vary") or "").lower()
-        names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
-        found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
-        yield occasion.case("rest-formats/vary", names_accept, "Vary: Accept", found)
+class Negotiation:
+    """Judges the format of a successful read by Accept, and Vary where the device chooses among several formats."""
+
+    def __init__(self) -> None:
+        self._sent: dict[str, set[str]] = defaultdict(set)
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, answer, context = occasion.operation, occasion.response, occasion.context
+        if operation is None or operation.method != "GET" or not answer.ok or not operation.formats:
+            return
+        if answer.media_type and context.usual:
+            # A format excluded by q=0 breaks another rule than a format that Accept does not mention.
+            ruled_out = "q=0" in (context.accept or "").lower().replace(" ", "")
+            yield occasion.case(
+                "http/q-zero" if ruled_out else "http/not-acceptable",
+                quality(answer.media_type, context.accept) > 0,
+                f"an acceptable format or status 406 when Accept is {context.accept}",
+                f"status {answer.status} with {answer.media_type}",
+                cause="not acceptable",
+            )
+        if len(operation.formats) == 1 or context.is_head:
+            return
+        # An operation may have other formats for other values, and a description may name a format that is never sent.
+        sent = self._sent[context.target]
+        sent.add(answer.media_type)
+        if len(sent) > 1 or are_data(operation.formats):
+            vary = (answer.header("vary") or "").lower()
+            names_accept = "*" in vary or "accept" in [name.strip() for name in vary.split(",")]
+            found = f"Vary: {answer.header('vary')}" if vary else "no header field Vary"
+            yield occasion.case("rest-formats/vary", names_accept, "Vary: Accept", found)

@@ -29,7 +29,7 @@ from conformance.verdict.evidence import Case
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
-    declared.crash, declared.server_error, declared.status, declared.body, declared.negotiation,
+    declared.crash, declared.server_error, declared.status, declared.body,
 )  # fmt: skip
 
 # What a device may show later, or as what is in effect, if its description says so.
@@ -51,6 +51,7 @@ class RestCheckers:
         # Checkers that remember earlier exchanges of the run.
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._untouched, self._codings = Untouched(contract), Codings()
+        self._documents = (*_DOCUMENTS, declared.Negotiation())
         self._over_time = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
@@ -88,5 +89,5 @@ class RestCheckers:
             resource = resource_at(self._contract, context.target.partition("?")[0]) if is_stored else None
             late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
             yield replace(case, doubt=case.doubt or late)
-        for check in () if context.is_own_of(attempt.response) else _DOCUMENTS:
+        for check in () if context.is_own_of(attempt.response) else self._documents:
             yield from check(occasion)

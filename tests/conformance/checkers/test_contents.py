@@ -60,7 +60,7 @@ def _broken(tmp_path, exchanges):
     document = {"openapi": "3.1.0", "info": {"title": "d", "version": "1"}, "paths": _PATHS}
     judges = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), _BASE)
     ids = ("http/range", "description/digest", "description/written-is-read", "description/entity-tag")
-    named = {*ids, "description/problem-status", "description/if-match", "description/required"}
+    named = {*ids, "description/problem-status", "description/if-match", "description/required", "rest-formats/vary"}
     return {case.requirement for exchange in exchanges for case in judges(exchange) if not case.holds} & named
 
 
@@ -98,6 +98,7 @@ def _put(sent):
 
 
 _GET_LATE = _one("GET /map 200", _WHOLE, at_s=9.0)
+_PHOTOS = [_one("GET /photo 200", file_of(kind, b"x"), kind=kind, accept=kind) for kind in ("image/png", "image/jpeg")]
 _STATE = _one("GET /state 200", b"{}", kind="application/json", _etag='"s"')
 _STATE_NOW = _one("GET /state 200", b"{ }", kind="application/json", _etag='"t"')
 _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
@@ -146,6 +147,8 @@ _STALE = _one("GET /state 304", if_none_match='"r"', _etag='"r"')
         _stored("/icon", *_WRITTEN_ANEW, kind="image/png"),
         _stored("/photo", (_JPEG, _JPEG), kind="image/jpeg"),
         _stored("/photo", (_JPEG, _IMAGES[0]), kind="image/png"),
+        # The other format is declared, and never sent.
+        [_PHOTOS[1], _PHOTOS[1]],
         # A problem need not state a status.
         [_one("GET /state 404", b"{}", kind="application/problem+json")],
         [_one("GET /state 404", b'{"status": 404}', kind="application/problem+json")],
@@ -173,6 +176,7 @@ def test_right_devices_are_not_blamed(tmp_path, exchanges):
             ("description/written-is-read", _stored("/icon", *pairs, kind="image/png"))
             for pairs in (_AS_TEXT, _HALF, _OTHER_PIXEL)
         ),
+        ("rest-formats/vary", _PHOTOS),
         ("description/entity-tag", [_STATE, _STALE, _STATE]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _repr_digest=_digest(b"other"))]),
         ("description/digest", [_one("GET /map 200", _WHOLE, _content_digest=f"{_digest(_WHOLE)[:-3]}A=:")]),
