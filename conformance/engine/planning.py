@@ -14,7 +14,7 @@ from conformance.scenarios.plan import Step, plan_lines
 from conformance.verdict.finding import count_of
 
 _SUITE = Path(__file__).parents[1]
-_UNUSED = ("terminal", "cacheprovider", "logging", "junitxml", "unraisableexception", "threadexception")
+_UNUSED = ("terminal", "cacheprovider", "doctest", "logging", "junitxml", "unraisableexception", "threadexception")
 
 
 def pytest_options() -> list[str]:
@@ -22,6 +22,7 @@ def pytest_options() -> list[str]:
     return [
         f"--config-file={os.devnull}",
         f"--rootdir={_SUITE}",
+        f"--confcutdir={_SUITE}",  # otherwise pytest would list every folder above the suite
         "--import-mode=importlib",
         "--noconftest",  # otherwise pytest would also run the conftest files above the checks; see conftests()
         "--capture=no",

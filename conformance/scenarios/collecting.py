@@ -29,6 +29,7 @@ class RulesPlugin:
 
     def __init__(self, recordings: Recordings) -> None:
         self.recordings = recordings
+        self._fixtures = dict[pytest.Collector, Any]()
 
     def pytest_pycollect_makeitem(
         self, collector: pytest.Module | pytest.Class, name: str, obj: object
@@ -43,9 +44,14 @@ class RulesPlugin:
         marks += [pytest.mark.scenario(scenario), pytest.mark.rule(rule, scenario)]
         marks += [pytest.mark.needs(*map(str, scenario.needs - {Need.MOTION}))]
         marks += [pytest.mark.motion] if Need.MOTION in scenario.needs else []
-        item: pytest.Item = pytest.Function.from_parent(
-            collector, name=f"{name}[{scenario.name}]", callobj=self._check_of(rule, scenario)
+        # The checks of a module have the same arguments, so that their fixtures are found once.
+        item = pytest.Function.from_parent(
+            collector,
+            name=f"{name}[{scenario.name}]",
+            callobj=self._check_of(rule, scenario),
+            fixtureinfo=self._fixtures.get(collector),
         )
+        self._fixtures[collector] = item._fixtureinfo  # noqa: SLF001
         for mark in marks:
             item.add_marker(mark)
         return item
