@@ -56,13 +56,15 @@ def ended(
         options: of `subprocess.run`.
     """
     given = {"capture_output": True, "text": True, "timeout": 240} | options
-    weighed = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb) if peak_mb else ()
-    anew = fresh or peak_mb or not {"env", "preexec_fn"}.isdisjoint(options)
+    anew = fresh or not {"env", "preexec_fn"}.isdisjoint(options) or sys.platform != "linux"
     if command[:3] in _WARM and not anew:
         if command[:3] == LOAD or "load" in command:
             os.environ[warm_commands.MEASURING] = warm_commands.beginning("measuring")[-1]
         command = (*warm_commands.beginning(), *command[1:])
-    return subprocess.run([str(word) for word in (*weighed, *command)], check=check, **given)
+        given |= {"env": os.environ | {warm_commands.PEAK: str(peak_mb)}} if peak_mb else {}
+    elif peak_mb:
+        command = (sys.executable, "-I", "-S", "-c", _WEIGHED, peak_mb, *command)
+    return subprocess.run([str(word) for word in command], check=check, **given)
 
 
 @contextmanager

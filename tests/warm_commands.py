@@ -2,7 +2,8 @@
 
 These imports take two thirds of a short certification's processor time. A server does them once, and forks twice for
 each command. The second process runs the command; the first waits for it. The command gets the arguments, the working
-directory, the environment and the streams of its client, and the client ends with its exit code.
+directory, the environment and the streams of its client, and the client ends with its exit code. Its peak memory is at
+least that of all modules.
 """
 
 import _socket
@@ -19,7 +20,7 @@ import tempfile
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
-from os import close, fork, waitpid
+from os import close, fork
 from pathlib import Path
 from pkgutil import walk_packages
 from select import select
@@ -29,6 +30,8 @@ from conformance.commandline.endings import PARENT_VARIABLE
 
 #: The environment variable with the name of the server for the process of `roaas load` that measures.
 MEASURING = "ROAAS_TESTS_MEASURING"
+#: The environment variable with the file to which the client writes the command's peak memory, in MB.
+PEAK = "ROAAS_TESTS_PEAK"
 
 _IMPORTED = (
     "anyio", "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "h2.connection",
@@ -40,13 +43,16 @@ _IMPORTED = (
 _NOT_IMPORTED = "conformance.api.rest.guard_process"
 _CLIENT = """
 import array, json, os, socket, sys
+peak = os.environ.pop("ROAAS_TESTS_PEAK", None)
 words = json.dumps([sys.argv[2:], os.getcwd(), dict(os.environ)]).encode()
 with socket.socket(socket.AF_UNIX) as server:
     server.connect("\\0" + sys.argv[1])
     fds = array.array("i", [0, 1, 2])
     server.sendmsg([b"%20d" % len(words)], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, fds)])
     server.sendall(words)
-    code = int(server.makefile().read())
+    code, peak_kb = map(int, server.makefile().read().split())
+if peak:
+    open(peak, "w").write(str(peak_kb >> 10))
 if code < 0:
     os.kill(os.getpid(), -code)
 sys.exit(code)
@@ -132,9 +138,9 @@ def _attend(connection: _socket.socket) -> None:
     ended = os.pidfd_open(command)
     if ended not in select([connection, ended], [], [])[0]:
         os.kill(command, signal.SIGKILL)
-    _, status = waitpid(command, 0)
+    _, status, used = os.wait4(command, 0)
     with suppress(OSError):
-        connection.sendall(str(os.waitstatus_to_exitcode(status)).encode())
+        connection.sendall(b"%d %d" % (os.waitstatus_to_exitcode(status), used.ru_maxrss))
     os._exit(0)
 
 

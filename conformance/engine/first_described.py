@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from conformance.api.call_rules import CallRules, Reason
+from conformance.api.call_rules import CallRules
 from conformance.commandline.out_folder import write_atomically
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
@@ -162,11 +162,8 @@ def _groups(operations: Sequence[Operation], rules: CallRules) -> Iterator[str]:
         yield f"# -- {_one_line(name)}"
         for operation in items:
             reason, label = rules.decide(operation), basic_string(operation.label)
-            yield f"# called: {_one_line(operation.label)}" if reason.may else f"# {label},  # {_why(reason)}"
-
-
-def _why(reason: Reason) -> str:
-    return str(reason).partition(":")[0]
+            why, _, _ = str(reason).partition(":")
+            yield f"# called: {_one_line(operation.label)}" if reason.may else f"# {label},  # {why}"
 
 
 def _group(operation: Operation, shared: set[tuple[str, ...]]) -> str:

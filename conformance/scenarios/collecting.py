@@ -44,12 +44,9 @@ class RulesPlugin:
         marks += [pytest.mark.scenario(scenario), pytest.mark.rule(rule, scenario)]
         marks += [pytest.mark.needs(*map(str, scenario.needs - {Need.MOTION}))]
         marks += [pytest.mark.motion] if Need.MOTION in scenario.needs else []
-        # The checks of a module have the same arguments, so that their fixtures are found once.
+        known = self._fixtures.get(collector)  # the checks of a module have the same arguments
         item = pytest.Function.from_parent(
-            collector,
-            name=f"{name}[{scenario.name}]",
-            callobj=self._check_of(rule, scenario),
-            fixtureinfo=self._fixtures.get(collector),
+            collector, name=f"{name}[{scenario.name}]", callobj=self._check_of(rule, scenario), fixtureinfo=known
         )
         self._fixtures[collector] = item._fixtureinfo  # noqa: SLF001
         for mark in marks:
@@ -57,10 +54,8 @@ class RulesPlugin:
         return item
 
     def _check_of(self, rule: Rule, scenario: Scenario) -> Any:
-        recordings = self.recordings
-
         def check(request: pytest.FixtureRequest, judge: Judge) -> None:
-            recording = recordings.of(scenario, request.getfixturevalue)
+            recording = self.recordings.of(scenario, request.getfixturevalue)
             if recording.trace is not None:
 
                 def report(operation: str, error: Exception) -> None:

@@ -65,16 +65,13 @@ def read_traces(path: Path, scenarios: Iterable[Scenario], report: Callable[[str
     for scenario in scenarios:
         if scenario.name in raw and scenario.name not in played:
             try:
-                trace = msgspec.json.decode(raw[scenario.name], type=_type_of(scenario), dec_hook=_rich)
+                kind = typing.get_type_hints(scenario.play)["return"]
+                trace = msgspec.json.decode(raw[scenario.name], type=kind, dec_hook=_rich)
             except (ValueError, RecursionError) as error:
                 report(f"the trace of {scenario.name}", error)
             else:
                 played[scenario.name] = Recording(trace)
     return Recordings(played)
-
-
-def _type_of(scenario: Scenario) -> Any:
-    return typing.get_type_hints(scenario.play)["return"]
 
 
 def _plain(value: Any) -> Any:
