@@ -5,10 +5,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from small_device import small_device
+from small_device import contract_of, small_device
 
 from conformance.api.rest.interface import RestInterface
-from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Calls, Statement
@@ -51,7 +50,7 @@ class Kept(Listener):
 @contextmanager
 def driven(description: Any, routes: Any, folder: Path) -> Iterator[tuple[RestInterface, Contract, Kept]]:
     """Serve a device that lets a run call all; yields its interface at effort quick, its contract, and what is sent."""
-    contract = Contract.load(write_described_pack(folder, description, description))
+    contract = contract_of(folder, description)
     with small_device(description, routes) as url, closing(HttpClient(url, Connection(timeout_s=30.0))) as client:
         allowed = Calls(allow=("POST *", "PUT *", "PATCH *", "DELETE *"))
         statement = Statement(endpoints=Endpoints(rest=url), calls=allowed)

@@ -16,6 +16,9 @@ from urllib.parse import unquote_to_bytes
 from aiohttp import web
 from processes import ended
 
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+
 Handle = Callable[[web.Request], Awaitable[web.StreamResponse]]
 _KNOWN = {"GET", "HEAD", "PUT", "POST", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT"}
 REFUSED = {
@@ -31,6 +34,11 @@ REFUSED = {
 def described(paths: Mapping[str, Any], version: str = "3.0.3", **members: Any) -> dict[str, Any]:
     """Return an OpenAPI description of these paths."""
     return {"openapi": version, "info": {"title": "device", "version": "1"}, "paths": dict(paths), **members}
+
+
+def contract_of(folder: Path, description: dict[str, Any]) -> Contract:
+    """Return the contract of a description, which is written into a folder."""
+    return Contract.load(write_described_pack(folder, description, description))
 
 
 def answers(schema: Any, media_type: str = "application/json") -> dict[str, Any]:

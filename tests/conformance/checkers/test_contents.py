@@ -4,10 +4,9 @@ import hashlib
 from base64 import b64encode
 
 import pytest
+from small_device import contract_of
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.files import file_of
 from conformance.transport.exchange import Exchange, Request, Response
 
@@ -58,7 +57,7 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, at_s=0.0, **fields):
 
 def _broken(tmp_path, exchanges):
     document = {"openapi": "3.1.0", "info": {"title": "d", "version": "1"}, "paths": _PATHS}
-    judges = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), _BASE)
+    judges = RestCheckers(contract_of(tmp_path, document), _BASE)
     ids = ("http/range", "description/digest", "description/written-is-read", "description/entity-tag")
     named = {*ids, "description/problem-status", "description/if-match", "description/required", "rest-formats/vary"}
     return {case.requirement for exchange in exchanges for case in judges(exchange) if not case.holds} & named

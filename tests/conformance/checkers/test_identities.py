@@ -3,10 +3,9 @@
 import json
 
 import pytest
+from small_device import contract_of
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:80"
@@ -22,7 +21,7 @@ def _paths(name, schema):
 @pytest.fixture(scope="module", params=[("id", {"type": "integer"}), ("thing_id", {}), ("name", {"type": "string"})])
 def contract(request, tmp_path_factory):
     document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": _paths(*request.param)}
-    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document)), request.param[0]
+    return contract_of(tmp_path_factory.mktemp("pack"), document), request.param[0]
 
 
 def _wrong(contract, reads):
@@ -115,10 +114,7 @@ def test_what_is_unique_stays_unique(name, tmp_path):
     body = {"content": {"application/json": {"schema": _CODE}}}
     paths["/things"]["post"] = {"requestBody": body, **paths["/things"]["get"]}
     document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
-    checkers, wrong = (
-        RestCheckers(Contract.load(write_described_pack(tmp_path / "pack", document, document)), _BASE),
-        [],
-    )
+    checkers, wrong = (RestCheckers(contract_of(tmp_path / "pack", document), _BASE), [])
     for method, last, value, status in steps:
         sent = json.dumps(value).encode() if method in {"POST", "PUT", "PATCH"} else b""
         fields = (("Host", "device"), ("Content-Type", "application/json")) if sent else (("Host", "device"),)

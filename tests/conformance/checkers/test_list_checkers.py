@@ -1,7 +1,7 @@
 """Lists in every style: parameters that do what they say are never blamed, and those that do not are."""
 
 import pytest
-from small_device import answers, described
+from small_device import answers, contract_of, described
 from valve_lists import (
     BASE,
     FILTER,
@@ -22,8 +22,6 @@ from valve_lists import (
 from conformance.api.rest.listing import items_of
 from conformance.checkers.lists import is_before
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 
@@ -129,7 +127,7 @@ def test_a_list_in_xml_is_judged_by_the_names_of_its_schema(style, count, blamed
         "parameters": [whole("limit"), word("state", enum=STATES)],
     }
     document = described({"/valves": {"get": get}}, "3.1.0")
-    checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+    checkers = RestCheckers(contract_of(tmp_path, document), BASE)
     rows = [
         f"<valve><id>{number}</id><state>{state}</state></valve>"
         for number, state in enumerate(["open"] * 3 + ["closed"])

@@ -3,10 +3,9 @@
 import json
 
 import pytest
+from small_device import contract_of
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 BASE = "http://device:80"
@@ -50,7 +49,7 @@ def one(line, value=None, body=None, **fields):
 def _all(tmp_path, exchanges, **described):
     """Return the requirements that are not met in some exchanges."""
     document, folder = _described(**described), tmp_path / str(len(list(tmp_path.iterdir())))
-    judges = RestCheckers(Contract.load(write_described_pack(folder, document, document)), BASE)
+    judges = RestCheckers(contract_of(folder, document), BASE)
     return {case.requirement for exchange in exchanges for case in judges(exchange) if not case.holds}
 
 

@@ -3,11 +3,9 @@
 import json
 
 import pytest
-from small_device import REFUSED, answers, described
+from small_device import REFUSED, answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
@@ -35,7 +33,7 @@ def _contract(tmp_path_factory):
     }
     paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}}
     document = described(paths, "3.1.0")
-    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+    return contract_of(tmp_path_factory.mktemp("pack"), document)
 
 
 def _broken(contract, steps):

@@ -3,11 +3,9 @@
 import json
 
 import pytest
-from small_device import REFUSED, answers, described
+from small_device import REFUSED, answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
@@ -38,7 +36,7 @@ def _contracts(tmp_path_factory):
     for text in (_SAYS, ""):
         document = described(_PATHS, "3.1.0")
         document["info"]["description"] = text
-        found[bool(text)] = Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+        found[bool(text)] = contract_of(tmp_path_factory.mktemp("pack"), document)
     return found
 
 

@@ -3,11 +3,9 @@
 import json
 
 import pytest
-from small_device import answers, described
+from small_device import answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device"
@@ -28,7 +26,7 @@ def _wrapped(kind, user):
 
 def _blamed(kind, user, folder):
     document = described({"/it": {"get": {"responses": {"200": answers(_SCHEMAS[kind])}}}}, "3.1.0")
-    contract = Contract.load(write_described_pack(folder, document, document))
+    contract = contract_of(folder, document)
     response = Response(200, (("Content-Type", "application/json"),), json.dumps(_wrapped(kind, user)).encode(), 1.0)
     cases = RestCheckers(contract, _BASE)(Exchange(Request("GET", f"{_BASE}/it", (), b""), response))
     return [one.observed for one in cases if one.requirement == "description/read-only" and not one.holds]

@@ -3,11 +3,9 @@
 import json
 
 import pytest
-from small_device import answers, described
+from small_device import answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 BASE = "http://device:8000/api"
@@ -358,7 +356,7 @@ RIGHT = {
 @pytest.fixture(name="contract", scope="module")
 def _contract(tmp_path_factory):
     document = described(_PATHS, "3.1.0")
-    return Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document))
+    return contract_of(tmp_path_factory.mktemp("pack"), document)
 
 
 def _broken(contract, steps):

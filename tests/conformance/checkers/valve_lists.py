@@ -3,11 +3,9 @@
 import json
 from urllib.parse import urlencode
 
-from small_device import answers, described
+from small_device import answers, contract_of, described
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 BASE = "http://device:8000"
@@ -69,7 +67,7 @@ class Seen:
         document = described(
             {"/valves": {"get": get, "post": {"responses": {"201": {"description": "made"}}}}}, "3.1.0"
         )
-        self.checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+        self.checkers = RestCheckers(contract_of(tmp_path, document), BASE)
         self.wrapped, self.now, self.cases = wrapped, 1000.0, []
 
     def read(self, items, headers=(), after=1.0, body=None, **query):

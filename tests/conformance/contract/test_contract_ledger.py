@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from small_device import contract_of
 
 from conformance.contract.classes import Topic
 from conformance.contract.described import write_described_pack
@@ -123,7 +124,7 @@ def test_what_judges_one_that_asks_the_same_judges_the_contract_s_own():
 
 def test_a_contract_has_one_of_two_generic_requirements_that_ask_the_same(tmp_path):
     document = {"openapi": "3.1.0", "info": {"title": "Door", "version": "1"}, "paths": {}}
-    ledger = Contract.load(write_described_pack(tmp_path, document, document)).ledger
+    ledger = contract_of(tmp_path, document).ledger
     generic = generic_ledger()
     twice = {id_ for id_, item in generic.items() if item.same_as}
     assert {"http/declared-status", "http/declared-body"} <= twice

@@ -7,9 +7,9 @@ from urllib.parse import urlsplit
 
 import msgspec
 import pytest
+from small_device import contract_of
 
 from conformance.api.permission import Permission
-from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.engine.certification import certify
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -178,7 +178,7 @@ def test_a_slash_in_a_value_is_no_other_path(tmp_path, path, sent):
             "/stop/now": {"post": {"responses": {"200": {"description": "it"}}}},
         },
     }
-    contract = Contract.load(write_described_pack(tmp_path, document, document))
+    contract = contract_of(tmp_path, document)
     statement = Statement(endpoints=Endpoints(rest="http://h"), calls=Calls(allow=("POST /play/{set}/{move}",)))
     refusal = Permission(Run(statement=statement, contract=contract)).refusal("POST", f"http://h{path}")
     assert (not refusal) == sent

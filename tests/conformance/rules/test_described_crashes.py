@@ -4,11 +4,10 @@ import itertools
 import json
 
 import pytest
+from small_device import contract_of
 from toy_server import serving
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Statement
 from conformance.transport.client import Connection, HttpClient
@@ -29,7 +28,7 @@ _DOCUMENT = {
 )
 def test_a_crash_that_any_check_meets_is_one_finding(tmp_path, status, path, found):
     turns = itertools.count(1)
-    contract = Contract.load(write_described_pack(tmp_path, _DOCUMENT, _DOCUMENT))
+    contract = contract_of(tmp_path, _DOCUMENT)
     with serving(lambda *_: (status if next(turns) % 3 == 0 else 200, {})) as url:
         run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
         client = HttpClient(url, Connection())
@@ -64,7 +63,7 @@ def test_an_error_that_shows_insides_is_a_finding(tmp_path, status, body, found)
 
 def _judged(folder, answers):
     """Return a judge of responses to GET /door."""
-    contract = Contract.load(write_described_pack(folder, _DOCUMENT, _DOCUMENT))
+    contract = contract_of(folder, _DOCUMENT)
     judge, checkers = Judge(contract.ledger), RestCheckers(contract, "http://door")
     for status, body in answers:
         response = Response(status, (("Content-Type", "application/json"),), json.dumps(body).encode(), 1.0)

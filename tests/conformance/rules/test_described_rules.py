@@ -4,11 +4,10 @@ import json
 from dataclasses import replace
 
 import pytest
+from small_device import contract_of
 
 from conformance.api.rest.conversions import is_converted
 from conformance.api.rest.variations import Kind
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.json_shape import shape_of
 from conformance.rules.description import test_answers as answers
 from conformance.rules.description import test_requests as requests
@@ -46,7 +45,7 @@ def run(tmp_path_factory):
         "/c": {"get": {"responses": {"200": {"description": ""}}}},
     }
     document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
-    return Run(contract=Contract.load(write_described_pack(tmp_path_factory.mktemp("pack"), document, document)))
+    return Run(contract=contract_of(tmp_path_factory.mktemp("pack"), document))
 
 
 def _probe(

@@ -3,13 +3,12 @@
 from contextlib import closing
 
 import pytest
+from small_device import contract_of
 from toy_messages import exchange
 from toy_server import Handler, server_of, serving
 
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.rules.description.test_answers import security
 from conformance.scenarios.anonymous import anonymous_requests
 from conformance.statement.endpoints import Endpoints
@@ -39,7 +38,7 @@ def test_what_requires_credentials_is_sent_without_them_and_with_wrong_ones(tmp_
         seen.append((method, path))
         return 401, None
 
-    contract = Contract.load(write_described_pack(tmp_path, _DOCUMENT, _DOCUMENT))
+    contract = contract_of(tmp_path, _DOCUMENT)
     with serving(answer) as url:
         statement = Statement(endpoints=Endpoints(rest=url), calls=Calls(allow=allow))
         run = Run(statement=statement, contract=contract)
@@ -89,7 +88,7 @@ class _Bays(Handler):
 @pytest.mark.parametrize("created", [201, 202])
 @pytest.mark.parametrize("unguarded", [(), ("DELETE", 2), ("POST", 3)])
 def test_a_thing_that_is_there_shows_whether_credentials_are_needed(tmp_path, unguarded, created):
-    contract = Contract.load(write_described_pack(tmp_path, _BAYS, _BAYS))
+    contract = contract_of(tmp_path, _BAYS)
     with server_of(_Bays, bays=[], open={unguarded}, created=created) as server:
         statement = Statement(endpoints=Endpoints(rest=server.url), calls=Calls(allow=("*",)))
         run = Run(statement=statement, contract=contract)

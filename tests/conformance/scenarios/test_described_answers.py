@@ -3,10 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
+from small_device import contract_of
 
 from conformance.api.rest.variations import Kind
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.rules.description.test_answers import status_declared
 from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Exchange, Request, Response
@@ -24,7 +23,7 @@ _DESCRIPTION = {
 )
 def test_a_part_or_a_304_needs_no_declaration_only_where_it_was_asked_for(tmp_path, status, field, expected):
     """Judge statuses that HTTP has for conditional requests alone (RFC 9110 13, 14)."""
-    run = SimpleNamespace(contract=Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION)))
+    run = SimpleNamespace(contract=contract_of(tmp_path, _DESCRIPTION))
     request = Request("GET", "http://127.0.0.1:1/lamp", ((field, "x"),), b"")
     exchange = Exchange(request, Response(status, (), b"", 1.0))
     trace = Survey((Probe("GET /lamp", Kind.USUAL, exchange=exchange),))

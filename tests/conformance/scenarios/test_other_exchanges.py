@@ -3,11 +3,9 @@
 import pytest
 from aiohttp import web
 from driven_device import driven
-from small_device import REFUSED, answers, described, error, reading
+from small_device import REFUSED, answers, contract_of, described, error, reading
 
 from conformance.api.rest.interface import RestInterface
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.scenarios.other_exchanges import OtherExchanges, others
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.client import Connection, HttpClient
@@ -29,7 +27,7 @@ _DESCRIPTION = {
 
 @pytest.fixture
 def api(tmp_path):
-    run = Run(contract=Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION)))
+    run = Run(contract=contract_of(tmp_path, _DESCRIPTION))
     api = RestInterface(run, HttpClient("http://h", Connection()))
     api.working.update(dict.fromkeys(("GET /lamp", "GET /key")))
     return api

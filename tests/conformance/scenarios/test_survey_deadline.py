@@ -4,14 +4,13 @@ import threading
 from contextlib import closing
 
 import pytest
+from small_device import contract_of
 from toy_server import serving
 
 from conformance.api.rest.inputs import usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.rules.robustness.test_robustness import no_hang
 from conformance.scenarios.survey import Surveyor
@@ -36,7 +35,7 @@ def test_a_response_just_after_the_deadline_is_no_hang(tmp_path, waits_s, hangs)
         over.wait(waits_s)
         return 408, {}
 
-    contract = Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION))
+    contract = contract_of(tmp_path, _DESCRIPTION)
     with serving(answer) as url, closing(HttpClient(url, Connection(timeout_s=_DEADLINE_S))) as client:
         run = Run(statement=Statement(endpoints=Endpoints(rest=url)), contract=contract)
         surveyor = Surveyor(RestInterface(run, client, alive=lambda: True), Values({}, ()))

@@ -8,6 +8,7 @@ from contextlib import closing, contextmanager
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_device import contract_of
 from toy_server import Handler, server_of
 
 from conformance.api.rest.inputs import whole_body
@@ -16,8 +17,6 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.unique import with_number
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import operations_of
 from conformance.scenarios.survey import Surveyor
@@ -127,7 +126,7 @@ class _Tubes:
 def _surveyor(tmp_path, device, *headers):
     """Yield what surveys a device at quick, and the operations by label."""
     description = _description(*headers)
-    contract = Contract.load(write_described_pack(tmp_path, description, description))
+    contract = contract_of(tmp_path, description)
     with device.server() as server, closing(HttpClient(server.url, Connection())) as client:
         statement = Statement(endpoints=Endpoints(rest=server.url), calls=Calls(allow=("*",)))
         run = Run(statement=statement, contract=contract, seed=1)

@@ -5,9 +5,8 @@ from pathlib import Path
 from urllib.parse import parse_qsl
 
 import pytest
+from small_device import contract_of
 
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
 from proof.selftest.comparison import Comparison, ToolResult
 from proof.selftest.generated.described import described_mutants
@@ -56,7 +55,7 @@ _GOOD = {"id": 3, "state": "on", "note": None}
 @pytest.fixture(name="mutants")
 def mutants_fixture(tmp_path: Path) -> dict[str, GeneratedMutant]:
     """Return the mutants of a lamp, by name."""
-    contract = Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION))
+    contract = contract_of(tmp_path, _DESCRIPTION)
     return {one.name.replace("GET /lamps/{id}", "lamp"): one for one in described_mutants(contract, "/v1")}
 
 

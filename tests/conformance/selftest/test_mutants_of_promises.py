@@ -5,11 +5,9 @@ import json
 import re
 
 import pytest
-from small_device import small_device
+from small_device import contract_of, small_device
 from sprinklers import sprinklers
 
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
 from proof.selftest.generated.described import described_mutants
 from proof.selftest.generated.mutant import Tally
@@ -66,7 +64,7 @@ _ROWS = {
 @pytest.mark.parametrize("name", _ROWS)
 def test_a_mutant_breaks_a_promise(name, tmp_path):
     document, routes = sprinklers({})
-    mutants = described_mutants(Contract.load(write_described_pack(tmp_path, document, document)))
+    mutants = described_mutants(contract_of(tmp_path, document))
     mutant, tally, tags = {one.name: one for one in mutants}[f"{name}:promise"], Tally(), [""]
     change = mutant.make(tally)
     before, (method, path, fields, body), status = _ROWS[name]

@@ -3,9 +3,8 @@
 import json
 
 import pytest
+from small_device import contract_of
 
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
 from proof.selftest.generated.described import described_mutants
 from proof.selftest.generated.mutant import Tally
@@ -36,7 +35,7 @@ _ROWS = [
 
 @pytest.mark.parametrize(("name", "requests", "left", "altered"), _ROWS)
 def test_a_request_reaches_another_item(name, requests, left, altered, tmp_path):
-    contract = Contract.load(write_described_pack(tmp_path, _DESCRIPTION, _DESCRIPTION))
+    contract = contract_of(tmp_path, _DESCRIPTION)
     mutant = {one.name: one for one in described_mutants(contract, "/v1")}[name]
     there, tally = {"1": "a", "2": "b"}, Tally()
 

@@ -1,11 +1,9 @@
 """By which values a run has named what it may have moved, and how a stop names them again."""
 
 import pytest
-from small_device import described
+from small_device import contract_of, described
 
 from conformance.api.rest.driven import Driven
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Exchange, Request, Response
 
@@ -33,7 +31,7 @@ def _driven(folder, stop, path):
             path: stop | {"post": stop["post"] | {"x-roaas-stop": True}},
         }
     )
-    contract = Contract.load(write_described_pack(folder, document, document))
+    contract = contract_of(folder, document)
     operation = next(one for one in operations_of(contract) if one.stop)
     return Driven(contract, _BASE), operation
 

@@ -1,9 +1,9 @@
 """What a run sent to the operations of a described API."""
 
+from small_device import contract_of
+
 from conformance.api.call_rules import CallRules
 from conformance.api.rest.operation_log import OperationLog
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.finding import Finding, Showing
 
@@ -40,7 +40,7 @@ def finding(number, attempt, *operations):
 
 
 def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
-    log = OperationLog(Contract.load(write_described_pack(tmp_path, API, API)), BASE)
+    log = OperationLog(contract_of(tmp_path, API), BASE)
     log.on_response(exchange("/joints/a?unit=rad", body=b'{"x": 1}'))
     log.on_response(exchange("/joints/b", status=404))
     log.by_hand(exchange("/joints/b", status=304))
