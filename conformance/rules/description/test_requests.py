@@ -28,6 +28,8 @@ _REFUSED = frozenset({400, 415, 422})
 _INVALID = frozenset({400, 422})
 # Doubt about a refusal of what the description allows.
 _FIT = "the values of a request may have to fit each other, or what the device does at the moment"
+# Methods whose requests' content has no meaning (RFC 9110 9.3.1, 9.3.2, 9.3.5).
+_WITHOUT_CONTENT = frozenset({"GET", "HEAD", "DELETE"})
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
 # Header fields whose wrong values a server may ignore (RFC 9110 12.5, 13.1, 14.2; RFC 7240 2), whatever is declared.
 _OF_HTTP = frozenset(
@@ -86,7 +88,7 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
             cause = f"{given} {converted[2]}"
         else:
             cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
-        return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""))
+        return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""), doubt=_ignored(probe))
 
     yield from held_back(sure)
     converted = _convertible(trace, sure, run)
@@ -120,23 +122,21 @@ def _forbidden(trace: Survey) -> list[Probe]:
 
 def _convertible(trace: Survey, probes: Iterable[Probe], run: Run) -> set[int]:
     """Return the `id()` of each probe whose JSON body was accepted, as a value of the declared type means the same."""
-    bodies = {operation.label: operation.bodies for operation in operations_of(run.contract)}
+    operations = {operation.label: operation for operation in operations_of(run.contract)}
     found, unkept = set(), defaultdict[str, set[str]](set)
     for probe in trace.probes:
         if probe.ok and probe.exchange and probe.validity == VALID and is_json(probe.attempt.request.media_type):
             unkept[probe.operation] |= unkept_members(probe.attempt.request.body, probe.exchange.response.body)
     for probe in probes:
         request = probe.attempt.request
-        given = bodies.get(probe.operation, {}).get(request.media_type)
-        if (
-            probe.ok
-            and probe.exchange
-            and given
-            and is_json(request.media_type)
-            and _place_of(probe).startswith("body")
-        ):
+        operation = operations.get(probe.operation)
+        given = operation.bodies.get(request.media_type) if operation else None
+        is_body = is_json(request.media_type) and _place_of(probe).startswith("body")
+        if operation and given and probe.ok and probe.exchange and is_body:
             said, own = probe.exchange.response.body, unkept[probe.operation]
-            found |= {id(probe)} if is_converted(given.schema, request.body, said, own) else set()
+            # As with an optional member, null stands for an optional body that is absent.
+            is_absent = not operation.body_required and request.body == b"null"
+            found |= {id(probe)} if is_absent or is_converted(given.schema, request.body, said, own) else set()
     return found
 
 
@@ -149,6 +149,12 @@ def _deletes_the_absent(trace: Survey) -> set[str]:
         for probe in deleted
         if probe.exchange and (probe.invents or sent[probe.exchange.request.url] > 1)
     }
+
+
+def _ignored(probe: Probe) -> str:
+    """Return the doubt about a wrong content of a request whose method gives it no meaning."""
+    is_content = probe.attempt.request.method in _WITHOUT_CONTENT and _place_of(probe).startswith("body")
+    return "HTTP gives the content of this method no meaning, so a server may ignore it" if is_content else ""
 
 
 def _place_of(probe: Probe) -> str:
@@ -184,7 +190,8 @@ def required(trace: Survey) -> Iterable[Outcome]:
     probes = [one for one in missing if one.exchange is not None]
 
     def fault(probe: Probe) -> Fault | None:
-        return Fault(f"{probe.operation} {probe.place}", f"status {probe.status}") if probe.ok else None
+        what = f"{probe.operation} {probe.place}"
+        return Fault(what, f"status {probe.status}", doubt=_ignored(probe)) if probe.ok else None
 
     yield from held_back(probes)
     acted = [one for one in probes if one.status not in HELD]

@@ -326,11 +326,27 @@ def test_another_setting_may_decide_a_converted_value(run):
     assert failed == [1, 0]
 
 
+def test_null_stands_for_an_optional_body(run):
+    null = _probe(kind=Kind.INVALID, operation=_OTHER, says="null as body", place="body", sent=b"null")
+    failed = [len(_failed(rule, Survey((null,)), run)) for rule in (requests.types, requests.invalid_refused)]
+    assert failed == [1, 0]
+
+
+@pytest.mark.parametrize(("operation", "is_doubtful"), [(_LABEL, True), (_OTHER, False)])
+@pytest.mark.parametrize(
+    ("rule", "kind"), [(requests.invalid_refused, Kind.INVALID), (requests.required, Kind.MISSING)]
+)
+def test_a_server_may_ignore_the_content_of_a_get(rule, kind, operation, is_doubtful, run):
+    wrong = _probe(kind=kind, operation=operation, says="a wrong body", place="body", sent=b"[1]")
+    (finding,) = _failed(rule, Survey((wrong,)), run)
+    assert bool(finding.doubt) == is_doubtful
+
+
 def test_fractions_that_a_framework_cuts_are_told_once(run):
     says = {"says": "1.5 as body /n, which is no whole number", "place": "body /n", "kind": Kind.INVALID}
-    probes = [_probe(operation=one, **says) for one in (_LABEL, _OTHER)]
-    (finding,) = _failed(requests.invalid_refused, Survey(tuple(probes)), run)
-    assert {one.operation for one in finding.operations} == {_LABEL, _OTHER}
+    both = {"PUT /a/{id}", _OTHER}
+    (finding,) = _failed(requests.invalid_refused, Survey(tuple(_probe(operation=one, **says) for one in both)), run)
+    assert {one.operation for one in finding.operations} == both
 
 
 def test_what_an_operation_does_not_check_in_one_place_is_told_once(run):
