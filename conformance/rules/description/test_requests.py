@@ -88,7 +88,9 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
             cause = f"{given} {converted[2]}"
         else:
             cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
-        return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""), doubt=_ignored(probe))
+        return Fault(
+            cause, f"status {probe.status}" + (f", although {why}" if why else ""), doubt=_doubt_of_content(probe)
+        )
 
     yield from held_back(sure)
     converted = _convertible(trace, sure, run)
@@ -151,7 +153,7 @@ def _deletes_the_absent(trace: Survey) -> set[str]:
     }
 
 
-def _ignored(probe: Probe) -> str:
+def _doubt_of_content(probe: Probe) -> str:
     """Return the doubt about a wrong content of a request whose method gives it no meaning."""
     is_content = probe.attempt.request.method in _WITHOUT_CONTENT and _place_of(probe).startswith("body")
     return "HTTP gives the content of this method no meaning, so a server may ignore it" if is_content else ""
@@ -191,7 +193,7 @@ def required(trace: Survey) -> Iterable[Outcome]:
 
     def fault(probe: Probe) -> Fault | None:
         what = f"{probe.operation} {probe.place}"
-        return Fault(what, f"status {probe.status}", doubt=_ignored(probe)) if probe.ok else None
+        return Fault(what, f"status {probe.status}", doubt=_doubt_of_content(probe)) if probe.ok else None
 
     yield from held_back(probes)
     acted = [one for one in probes if one.status not in HELD]
