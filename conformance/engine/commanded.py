@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, Final
+from urllib.parse import quote
 
 from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.openapi import Operation, is_json
@@ -18,7 +21,7 @@ _TURNS: Final = re.compile(
 )
 # Names of numbers that are no axis: times, counts and ids.
 NO_AXIS: Final = re.compile(
-    r"^(?:n?anosec|nsec|sec|secs|stamp|timestamp|time|seq|sequence|id|uid|number|count|index|version|covariance"
+    r"^(?:n?anosec|nsec|sec|secs|stamp|timestamp|time|seq|sequence|id|uid|number|count|index|version|covariance|axis"
     r"|clientid|transactionid|clienttransactionid|servertransactionid|errornumber|battery|uptime)$|_(?:id|count)$|uuid$|number$|index$",
     re.IGNORECASE,
 )
@@ -26,21 +29,26 @@ HOLDS: Final = re.compile(r"^(?:timeout|ttl|hold|valid_for)(?:_(?:m?s|sec|second
 _MILLI: Final = re.compile(r"_ms$", re.IGNORECASE)
 _ID: Final = re.compile(r"[a-z0-9]I[dD]$")
 # Operations that command velocities; numbers that are velocities; numbers that only say how a move is made.
-_DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis", re.IGNORECASE)
-FAST: Final = re.compile(r"speed|velocit|(?:^|_)vel(?:_|$)|throttle", re.IGNORECASE)
+_DRIVES: Final = re.compile(r"velocit|twist|cmd_?vel|drive|speed|jog|continuous|moveaxis|\brates?\b", re.IGNORECASE)
+FAST: Final = re.compile(r"speed|velocit|(?:^|_)vel(?:_|$)|throttle|(?:^|_|/)rate$", re.IGNORECASE)
 _HOW: Final = re.compile(r"accel|decel|jerk|torque|force|effort|ramp", re.IGNORECASE)
 _TWIST: Final = re.compile(r"(?:linear|angular)[/_]?[xyz]$", re.IGNORECASE)
 # Greatest values of what is a share.
 _SHARES: Final = frozenset({1.0, 100.0})
 _MOVES_BY: Final = re.compile(r"relative|move_?by|nudge", re.IGNORECASE)
 _RELATIVE: Final = re.compile(r"relative|distance|delta|offset|step", re.IGNORECASE)
+# Names of numbers that say where a device is.
+POSITION: Final = re.compile(
+    r"position|(?:^|_)pos(?:_|$)|angle|location|height|level|actual|current|count", re.IGNORECASE
+)
 _UNITS: Final = {
     "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
     "deg": r"_deg(?:rees)?(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",
 }  # fmt: skip
 # What the name of a way, a position or a velocity has beside the name of its axis.
 _BESIDE: Final = re.compile(
-    r"(?:^|_)(?:position|pos|distance|delta|offset|relative|target|velocity|vel|speed|mm|cm|m|deg|degrees|rad|s)(?=_|$)",
+    r"(?:^|_)(?:positions?|pos|distance|delta|offset|relative|target|velocity|vel|speed|rate|mm|cm|m|deg|degrees|rad|s)"
+    r"(?=_|$)",
     re.IGNORECASE,
 )
 # Words of an enumeration that say the sign of a number, the positive one first.
@@ -49,9 +57,19 @@ _OPPOSITES: Final = (
     ("up", "down"), ("left", "right"), ("in", "out"), ("ccw", "cw"), ("positive", "negative"), ("plus", "minus"),
 )  # fmt: skip
 _DEPTH: Final = 6
+# A list of names in a description, as "[left, right]"; a longer list is no body of a command.
+_LISTED: Final = re.compile(r"[\[(]\s*[a-z]\w*(?:\s*,\s*[a-z]\w*)+\s*[\])]", re.IGNORECASE)
+_MOST_ITEMS: Final = 8
+# Words of a description that name the items of a list in their order, a heading by one or two of them.
+_WORDS: Final = re.compile(
+    r"\b(?:x|y|z|left|right|front|rear|roll|pitch|pan|tilt|(?:heading|orientation|angle|yaw)\W+theta|theta|yaw|heading)\b",
+    re.IGNORECASE,
+)
 _FORMS: Final = ("application/x-www-form-urlencoded", "multipart/form-data")
 # _PART: share of the declared limit at which the robot is driven. Without limits: _TURN rad, _WAY m.
 _PART, _TURN, _WAY = 0.1, 0.1, 0.05
+# By unit, how many of them are in one m, or about so many in one rad.
+_IN_UNITS: Final = {"mm": 1000.0, "cm": 100.0, "deg": 50.0}
 
 
 @dataclass(frozen=True)
@@ -107,10 +125,11 @@ class Commanded:
     @property
     def little(self) -> float:
         """A small change of the number: a tenth of the declared range, or 0.05 m/s or 0.1 rad/s."""
-        usual = _TURN if self.turns else _WAY
+        unit = unit_of(self.place, self.schema)
+        usual = (_TURN if self.turns else _WAY) * _IN_UNITS.get(unit, 1.0)
         if self.bounds is None:
             return usual
-        part = _PART * max(map(abs, self.bounds))
+        part = min(_PART * max(map(abs, self.bounds)), 10 * usual if unit else math.inf)
         return max(1.0, part) if self.schema.get("type") == "integer" else part
 
     @property
@@ -158,7 +177,7 @@ def _bound(schema: Schema, word: str) -> float | None:
 def commanded_by(operation: Operation) -> list[Commanded]:
     """Return the numbers that a request commands, without durations, ids, times, and how fast a move is made."""
     schema = body_schema(operation) or {}
-    inside = [(at, at, part) for at, part in numbers_in(schema) if is_axis(at.rpartition("/")[2])]
+    inside = [(at, at, part) for at, part in numbers_in(schema) if is_axis(member_name(at))]
     found = [
         (f"{{{parameter.name}}}", parameter.name, parameter.schema)
         for parameter in operation.parameters
@@ -169,7 +188,7 @@ def commanded_by(operation: Operation) -> list[Commanded]:
     found += inside
     velocities = _DRIVES.search(f"{operation.template} {operation.id}")
     found = [one for one in found if not (_HOW.search(one[1]) or (not velocities and FAST.search(one[1])))] or found
-    names = unique_names([at for at, _, _ in found])
+    names = unique_names([at for at, _, _ in found], titles_in(schema))
     signs = _signs(schema) if len(found) == 1 else None
     called = f"{operation.template} {operation.id}"
     return [
@@ -178,6 +197,23 @@ def commanded_by(operation: Operation) -> list[Commanded]:
         )
         for at, said, part in found
     ]
+
+
+def with_query(operation: Operation, lease: str = "") -> Operation:
+    """Return an operation whose path has the query that a command needs; ``lease``: the parameter that carries one."""
+    given = []
+    for item in operation.parameter("query"):
+        if item.name == lease:
+            given.append(f"{item.name}={{lease}}")
+        elif is_numeric(item.schema) and is_axis(item.name):
+            given.append(f"{item.name}={{{item.name}}}")
+        elif HOLDS.search(item.name):
+            given.append(f"{item.name}={_lasting(item.name, item.schema):g}")
+        elif is_numeric(item.schema) and _LASTS.search(item.name):
+            given.append(f"{item.name}={{seconds}}")
+        elif item.required:
+            given.append(f"{item.name}={quote(str(usual_value(item.schema)), safe='')}")
+    return replace(operation, template=f"{operation.template}?{'&'.join(given)}") if given else operation
 
 
 def _signs(schema: Schema) -> tuple[str, str, str] | None:
@@ -193,9 +229,16 @@ def _signs(schema: Schema) -> tuple[str, str, str] | None:
     return None
 
 
+def member_name(place: str) -> str:
+    """Return the name of a member at a JSON pointer; of an item of a list that of the list."""
+    return next((part for part in reversed(place.split("/")) if not part.isdecimal()), "")
+
+
 def axis_of(place: str) -> str:
     """Return what a number is called, without its unit and without words for a position or a velocity."""
-    return _BESIDE.sub("", place.rpartition("/")[2]).strip("_").lower()
+    last = place.rpartition("/")[2]
+    item = f"_{last}" if last.isdecimal() else ""
+    return f"{_BESIDE.sub('', member_name(place)).strip('_').lower()}{item}"
 
 
 def is_axis(name: str) -> bool:
@@ -203,9 +246,19 @@ def is_axis(name: str) -> bool:
     return not (NO_AXIS.search(name) or _LASTS.search(name) or _ID.search(name))
 
 
-def unique_names(places: Sequence[str]) -> dict[str, str]:
-    """Return a name for each place, as short as possible and unique."""
-    parts = {at: [part for part in re.split(r"[/#]", at.strip("{}")) if part] or ["value"] for at in places}
+def titles_in(schema: Schema | None) -> dict[str, str]:
+    """Return the names of the items of lists that a schema describes, by JSON pointer."""
+    numbers = numbers_in(schema or {})
+    return {at: str(part["title"]) for at, part in numbers if at.rpartition("/")[2].isdecimal() and "title" in part}
+
+
+def unique_names(places: Sequence[str], titles: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
+    """Return a name for each place, as short as possible and unique; ``titles``: the names of items of lists."""
+    called = {at: f"{at.rpartition('/')[0]}/{titles[at]}" if at in titles else at for at in places}
+    parts = {
+        at: [part for part in re.split(r"[/#]", text.strip("{}")) if part] or ["value"] for at, text in called.items()
+    }
+    parts = {at: ["axis", *own] if all(map(str.isdecimal, own)) else own for at, own in parts.items()}
     for length in range(1, _DEPTH + 2):
         names = {at: "_".join(one[-_least(one, length) :]) for at, one in parts.items()}
         if len(set(names.values())) == len(names):
@@ -244,21 +297,22 @@ def parts_of(schema: Any) -> Iterator[Schema]:
 
 def lasting(schema: Schema | None) -> dict[str, float]:
     """Return a second for each member of a body that says for how long a velocity holds, by JSON pointer."""
-    found = {}
-    for at, part in numbers_in(schema or {}):
-        if HOLDS.search(at.rpartition("/")[2]):
-            least, most = bounds_of(part) or (0.0, 1e6)
-            found[at] = min(max(1000.0 if _MILLI.search(at) else 1.0, least), most)
-    return found
+    return {at: _lasting(at, part) for at, part in numbers_in(schema or {}) if HOLDS.search(member_name(at))}
+
+
+def _lasting(name: str, schema: Schema) -> float:
+    """Return a second, in the unit of a number, or the nearest that its schema allows."""
+    least, most = bounds_of(schema) or (0.0, 1e6)
+    return min(max(1000.0 if _MILLI.search(name) else 1.0, least), most)
 
 
 def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:
-    """Yield the JSON pointers of the numbers in an object, with their schemas, each once."""
+    """Yield the JSON pointers of the numbers in an object or a list, with their schemas, each once."""
     seen = set[str]()
     for part in parts_of(schema) if depth else ():
-        for name, member in part.get("properties", {}).items():
-            place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
-            if not isinstance(member, dict) or place in seen:
+        for name, member in _members(part):
+            place = f"{at}/{name}"
+            if place in seen:
                 continue
             seen.add(place)
             if is_numeric(member):
@@ -267,7 +321,42 @@ def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tu
                 yield from numbers_in(member, place, depth - 1)
 
 
-def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: int = _DEPTH) -> dict[str, Any]:
+def _members(part: Schema) -> Iterator[tuple[str, Schema]]:
+    """Yield the members of an object, or the items of a list whose length is known, each with its step of a pointer."""
+    for name, member in part.get("properties", {}).items():
+        if isinstance(member, dict):
+            yield name.replace("~", "~0").replace("/", "~1"), member
+    first, length = part.get("prefixItems", ()), _length(part)
+    said = _WORDS.findall(str(part.get("description", "")))
+    names = [str(name).lower() for name in (_item_names(part) or said)]
+    for index in range(length):
+        item = first[index] if index < len(first) else part.get("items")
+        if isinstance(item, dict):
+            yield str(index), {**({"title": names[index]} if len(names) == length else {}), **item}
+
+
+def _item_names(part: Schema) -> list[str]:
+    """Return the names of a list's items, as a description such as "[left, right]" has them; or none."""
+    found = _LISTED.search(str(part.get("description", "")))
+    return re.findall(r"\w+", found[0]) if found else []
+
+
+def _length(part: Schema) -> int:
+    """Return the length of a list, as its schema, an example or a description such as "[left, right]" says; or 0."""
+    if not {"items", "prefixItems"} & part.keys():
+        return 0
+    lengths: tuple[int, ...] = (
+        len(part.get("prefixItems", ())),
+        part.get("minItems", 0),
+        *(len(part[key]) for key in ("default", "example") if isinstance(part.get(key), list)),
+        len(_item_names(part)),
+    )
+    most: int = part.get("maxItems", _MOST_ITEMS)
+    length = min(next(filter(None, lengths), 0), most)
+    return length if length <= _MOST_ITEMS else 0
+
+
+def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: int = _DEPTH) -> Any:
     """Return a body with a template at some places, and values for the other required members.
 
     Args:
@@ -277,25 +366,27 @@ def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: i
         depth: so deep at most.
     """
     made: dict[str, Any] = {}
+    is_list = False
     for part in _choose_parts(schema, names, at) if depth else ():
-        required = part.get("required", ())
-        for name, member in part.get("properties", {}).items():
-            place = f"{at}/{name.replace('~', '~0').replace('/', '~1')}"
-            if not isinstance(member, dict) or name in made:
+        required, is_list = part.get("required", ()), is_list or bool(_length(part))
+        for step, member in _members(part):
+            place, name = f"{at}/{step}", step.replace("~1", "/").replace("~0", "~")
+            is_needed = name in required or is_list
+            if name in made:
                 continue
             if place in names:
                 made[name] = names[place]
             elif is_numeric(member) and re.search(r"duration|seconds", name, re.IGNORECASE):
                 made[name] = "{seconds}"
-            elif any(one.startswith(f"{place}/") for one in names) or (name in required and _is_object(member)):
+            elif any(one.startswith(f"{place}/") for one in names) or (is_needed and _has_members(member)):
                 made[name] = template_of(member, names, place, depth - 1)
-            elif name in required:
+            elif is_needed:
                 made[name] = usual_value(member)
-    return made
+    return list(made.values()) if is_list else made
 
 
-def _is_object(schema: Schema) -> bool:
-    return any("properties" in part for part in parts_of(schema))
+def _has_members(schema: Schema) -> bool:
+    return any("properties" in part or _length(part) for part in parts_of(schema))
 
 
 def _choose_parts(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, Final
 
 from conformance.measures.samples import Sample
@@ -73,10 +74,19 @@ def _angles(value: Mapping[str, Any]) -> dict[str, float]:
 
 
 class Looks:
-    """Readings of a device by operation: the middle of each reading's time, and its numbers."""
+    """Readings of a device by operation: the middle of each reading's time, and its numbers.
 
-    def __init__(self) -> None:
+    Args:
+        titles: the names of items of lists, by JSON pointer.
+    """
+
+    def __init__(self, titles: Mapping[str, str] = MappingProxyType({})) -> None:
         self._seen: dict[str, list[tuple[float, Numbers]]] = {}
+        self.titles = titles
+
+    def is_heading(self, place: str) -> bool:
+        """Return whether the name of a number says that it turns without end."""
+        return bool(HEADING.search(self.titles.get(place, place.rpartition("/")[2])))
 
     def add(self, operation: str, moment: float, numbers: Numbers) -> None:
         """Keep one reading."""
@@ -91,7 +101,7 @@ class Looks:
         """Return what a whole turn is at a place; 0: it is no angle that begins anew."""
         if ANGLE in place:
             return math.tau
-        if not HEADING.search(place.rpartition("/")[2]):
+        if not self.is_heading(place):
             return 0.0
         return 360.0 if self.is_in_degrees(operation, place) else math.tau
 

@@ -19,7 +19,16 @@ import msgspec
 from conformance.api.call_rules import CallRules, harmful_words
 from conformance.api.rest.interface import RestInterface
 from conformance.documents.openapi import Operation, is_json
-from conformance.engine.commanded import Commanded, body_schema, commanded_by, is_velocity, numbers_in, template_of
+from conformance.engine.commanded import (
+    Commanded,
+    body_schema,
+    commanded_by,
+    is_velocity,
+    numbers_in,
+    template_of,
+    titles_in,
+    with_query,
+)
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.engine.found_preparation import (
     NOTHING,
@@ -27,6 +36,7 @@ from conformance.engine.found_preparation import (
     is_excluded,
     lease_header,
     lease_place,
+    lease_query,
     members_of,
     named_preparing,
     preparing_of,
@@ -39,22 +49,31 @@ from conformance.scenarios.motion.binding import Binding
 from conformance.scenarios.motion.preparing import Preparation
 from conformance.scenarios.motion.templates import NoValueError, fill
 from conformance.scenarios.scenario import NotPossibleError
-from conformance.statement.motion_calls import named_by, names_operation
+from conformance.statement.motion_calls import NAME, named_by, names_operation
 from conformance.transport.exchange import Exchange, Outgoing
 
 _PACE_S: Final = 0.02
 _MOST_NUMBERS, _MOST_READS = 8, 6
-# _READY_S: how long a device may take to get ready; _AT_ONCE_S: so soon it is ready at once, s. _LONG: no state is a
+#: READY_S: how long a device may take to get ready; _AT_ONCE_S: so soon it is ready at once, s. _LONG: no state is a
 # text of so many characters.
-_READY_S, _AT_ONCE_S, _LONG = 20.0, 0.3, 40
+READY_S, _AT_ONCE_S, _LONG = 20.0, 0.3, 40
+# Members of a response that say whether the request failed, with what they have if it did not.
+_FAILED: Final = (
+    (re.compile(r"/error_?(?:number|code|no)?|/errno", re.IGNORECASE), 0),
+    (re.compile(r"/ok|/success", re.IGNORECASE), True),
+)
 _STATE: Final = re.compile(
-    r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle", re.IGNORECASE
+    r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle|azimuth|altitude|heading|height",
+    re.IGNORECASE,
 )
 #: Names of members that repeat a command and measure nothing.
 ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
-_STOP: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
+_STOPS: Final = re.compile(
+    r"(?:stop|halt|cancel|abort)(?:[-_]?(?:slew|goto|go|mov(?:e|es|ing|ement)|motion|all|ax[ie]s|drives?|robot|now))?",
+    re.IGNORECASE,
+)
 #: The robot is kept within ROOM_M of its start, m; a fast robot as near as it can get in ROOM_S, s.
-ROOM_M, ROOM_S = 0.5, 1.5
+ROOM_M, ROOM_S = 0.5, 2.5
 #: How fast a device may seem to move at rest, as a share of its fastest. _REST_S: how long it is watched at first, s.
 AT_REST, _REST_S = 0.005, 1.0
 #: Statuses with which an operation declares that it refuses invalid requests.
@@ -129,56 +148,73 @@ def plan_of(
     named = _operation_named(operations, drive, "--drive")
     if is_excluded(named, rules):
         raise NotPossibleError(f"{named.label} must never be called: the description or --never says so")
-    chosen, values = _with_values(named, drive)
+    values = _values_in(named, drive)
+    known = [_with_values(operation, values) for operation in operations]
+    chosen = known[operations.index(named)]
+    preparing = named_preparing(known, before, rules) if before else preparing_of(known, chosen, rules)
+    chosen = with_query(chosen, lease_query(chosen) if preparing.lease else "")
     numbers = commanded_by(chosen)[:_MOST_NUMBERS]
     if not numbers:
         bodies = ", ".join(chosen.bodies) or "none"
-        raise NotPossibleError(f"--drive {drive!r}: its path and body (declared: {bodies}) have no numbers to command")
+        raise NotPossibleError(
+            f"--drive {drive!r}: its path, query and body (declared: {bodies}) have no numbers to command"
+        )
+    commanded = {number.place for number in numbers}
     if missing := [
-        parameter.name
-        for parameter in chosen.parameters
-        if f"{{{parameter.name}}}" in chosen.template
-        and f"{{{parameter.name}}}" not in {number.place for number in numbers}
+        item.name
+        for item in chosen.parameter("path")
+        if f"{{{item.name}}}" in chosen.template and f"{{{item.name}}}" not in commanded
     ]:
         raise NotPossibleError(
             f"--drive {drive!r}: write the path with a value for {{{missing[0]}}}, "
             f"as in {drive.replace(f'{{{missing[0]}}}', '1')!r}"
         )
-    reads = [_with_values(_operation_named(operations, read, "--read"), read)[0]] if read else []
+    reads = []
+    if read:
+        told = _operation_named(operations, read, "--read")
+        reads = [_with_values(told, {**values, **_values_in(told, read)})]
     # A position is read by its name; a number called as a velocity may only repeat what was commanded.
     drives = is_velocity(chosen, numbers)
     named_alike = () if drives else numbers
     names = frozenset(command.place.strip("{}").rpartition("/")[2].lower() for command in named_alike)
-    reads = reads or list(_reads(operations, rules, values, chosen.template, names))[:_MOST_READS]
+    reads = reads or list(_reads(known, rules, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    preparing = named_preparing(operations, before, rules) if before else preparing_of(operations, named, rules)
-    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(operations, chosen), named, preparing, bool(before))
+    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(known, chosen), named, preparing, bool(before))
 
 
-def _with_values(operation: Operation, call: str) -> tuple[Operation, dict[str, str]]:
-    """Return an operation with the values that a call has in its path, and these by parameter."""
+def _values_in(operation: Operation, call: str) -> dict[str, str]:
+    """Return the values that a call has in an operation's path, by parameter."""
     if names_operation(operation.label, call) or " " not in call:
-        return operation, {}
+        return {}
     path = call.strip().partition(" ")[2]
     pairs = zip(operation.template.split("/"), path.split("/"), strict=True)
-    values = {name.strip("{}"): value for name, value in pairs if name != value and "{" not in value}
-    return replace(operation, template=path), values
+    return {name.strip("{}"): value for name, value in pairs if name != value and "{" not in value}
+
+
+def _with_values(operation: Operation, values: Mapping[str, str]) -> Operation:
+    """Return an operation with values of parameters in its path, which are then no parameters any more."""
+    if not any(item.name in values for item in operation.parameter("path")):
+        return operation
+    path = NAME.sub(lambda name: values.get(name[1], name[0]), operation.template)
+    left = tuple(item for item in operation.parameters if item.where != "path" or item.name not in values)
+    return replace(operation, template=path, parameters=left)
 
 
 def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
-    """Return the operation in the same folder that is called stop or the like and does not latch."""
-    folder = posixpath.dirname(drive.template)
-    for operation in operations:
-        named = posixpath.basename(operation.template)
-        if (
-            posixpath.dirname(operation.template) == folder
-            and _STOP.fullmatch(named)
-            and operation.method in {"POST", "PUT"}
-        ):
-            wanted = [one.name for one in operation.parameters if one.name != lease_header(operation)]
-            return None if operation.never or wanted else operation
-    return None
+    """Return the operation in the same folder, or in one around it, that is called stop or the like; the nearest."""
+    path = drive.template.partition("?")[0]
+    stops = [
+        operation
+        for operation in operations
+        if _STOPS.fullmatch(posixpath.basename(operation.template))
+        and operation.method in {"POST", "PUT"}
+        and path.startswith(f"{posixpath.dirname(operation.template).rstrip('/')}/")
+    ]
+    found = max(stops, key=lambda operation: operation.template.count("/"), default=None)
+    if found is None or found.never:
+        return None
+    return None if any(one.required and one.name != lease_header(found) for one in found.parameters) else found
 
 
 def _operation_named(operations: Sequence[Operation], label: str, option: str) -> Operation:
@@ -193,15 +229,12 @@ def _operation_named(operations: Sequence[Operation], label: str, option: str) -
     return found
 
 
-def _reads(
-    operations: Sequence[Operation], rules: CallRules, values: Mapping[str, str], drive: str, names: frozenset[str]
-) -> Iterator[Operation]:
+def _reads(operations: Sequence[Operation], rules: CallRules, drive: str, names: frozenset[str]) -> Iterator[Operation]:
     """Yield readable operations with JSON: first those with these names, those in the same folder, or a state.
 
     Args:
         operations: of the description.
         rules: what may be called.
-        values: of parameters in paths.
         drive: the path of the operation that commands.
         names: of the numbers that it commands, in lower case.
     """
@@ -212,17 +245,14 @@ def _reads(
         and rules.decide(operation).may
         and not harmful_words(operation)
         and any(map(is_json, operation.formats))
-        and not any(item.required and item.name not in values for item in operation.parameters)
-    ]
-    filled_in = [
-        replace(operation, template=re.sub(r"\{([^{}]+)\}", lambda name: values[name[1]], operation.template))
-        for operation in found
+        and not any(item.required for item in operation.parameters)
     ]
     beside = posixpath.dirname(drive)
     yield from sorted(
-        filled_in,
+        found,
         key=lambda operation: (
             -len(names & {at.rpartition("/")[2].lower() for at, _ in numbers_in(operation.shape or {})}),
+            posixpath.basename(operation.template).lower() not in names,
             not operation.template.startswith(f"{beside.rstrip('/')}/"),
             not _STATE.search(f"{operation.template.removeprefix(beside)} {operation.id}"),
         ),
@@ -250,10 +280,12 @@ class Finder(ABC):
         self._answer: Any = None
         self._left, self._used, self._is_accepted = plan.preparing, NOTHING, False
         self._asked, self._words = 0.0, dict[str, Any]()
+        self._failed: tuple[str, Any] | None = None
         self._ready = Preparation(self._used, binding, self._exchange, clock)
 
     def _begin(self) -> None:
-        self._looks, self._turn, self._reads, self._found = Looks(), 0, list(self._plan.reads), Found()
+        titles = {at: name for one in self._plan.reads for at, name in titles_in(one.shape).items()}
+        self._looks, self._turn, self._reads, self._found = Looks(titles), 0, list(self._plan.reads), Found()
 
     def find(self) -> Found:
         """Return the map of the device, which is made ready first if it wants that, and left as it was.
@@ -280,7 +312,7 @@ class Finder(ABC):
                 self._ready.end()
             except NotPossibleError as problem:
                 self._found.notes.append(f"{problem}.")
-        self._found.lines = [*self._used.lines(), *self._found.lines]
+        self._found.lines = [*self._used.lines(self._failed), *self._found.lines]
         return self._found
 
     @abstractmethod
@@ -310,7 +342,7 @@ class Finder(ABC):
             self._left = replace(self._left, steps=tuple(rest))
             self._words = self._states()
             exchange = self._send(step.send, step.body)
-            if exchange.response.ok:
+            if self._took(exchange):
                 self._used = replace(self._used, steps=(*self._used.steps, (step, ends)))
                 self._ready.motion, self._asked = self._used, self._clock.now()
                 return True
@@ -320,7 +352,7 @@ class Finder(ABC):
     def _waits(self) -> bool:
         """Wait a little while the device gets ready; return whether it still has time for that."""
         self._clock.sleep(_PACE_S)
-        return bool(self._used.steps) and self._clock.now() < self._asked + _READY_S
+        return bool(self._used.steps) and self._clock.now() < self._asked + READY_S
 
     def _note_ready(self) -> None:
         """Note what shows that the device is ready, if it had to be awaited after the last step: what changed since."""
@@ -343,19 +375,20 @@ class Finder(ABC):
             at: word for at, word in members if isinstance(word, bool) or (isinstance(word, str) and len(word) < _LONG)
         }
 
-    def _template(self, names: Mapping[str, Any]) -> dict[str, Any] | None:
+    def _template(self, names: Mapping[str, Any]) -> Any:
         """Return the body of a command with templates at some places, and with the lease where it belongs there."""
         schema = body_schema(self._plan.drive)
         if schema is None:
             return None
         lease = self._used.lease
-        at = lease_place(self._plan.drive) if lease and lease.token and not lease.header else ""
+        is_elsewhere = lease is None or not lease.token or lease.header or "{lease}" in self._plan.drive.template
+        at = "" if is_elsewhere else lease_place(self._plan.drive)
         return template_of(schema, {**names, at: "{lease}"} if at else names)
 
     @property
     @abstractmethod
-    def _body(self) -> dict[str, Any] | None:
-        """The body of a command."""
+    def _body(self) -> Any:
+        """The body of a command; None: it has none."""
 
     def _look(self) -> None:
         """Read one operation; an operation without numbers is not read again."""
@@ -390,6 +423,17 @@ class Finder(ABC):
         """Return the samples of a place before the device was driven."""
         return self._looks.samples(operation, place, *self._rested)
 
+    def _took(self, exchange: Exchange) -> bool:
+        """Return whether a command was accepted: by its status, and by what the content says of an error."""
+        if not exchange.response.ok:
+            return False
+        for at, said in members_of(self._binding.content(exchange.response.body), depth=0):
+            for words, right in _FAILED:
+                if words.fullmatch(at) and type(said) is type(right):
+                    self._failed = at, right
+                    return bool(said == right)
+        return True
+
     def _send(self, call: str, body: Any) -> Exchange:
         self._ready.keep()
         return self._exchange(self._ready.with_lease(self._binding.make(call, body)))
@@ -413,7 +457,8 @@ class Finder(ABC):
                 exchange = self._send(fill(self._plan.drive.label, written), fill(self._body, written))
             except NoValueError as error:
                 raise NotPossibleError(str(error)) from error
-            self._is_accepted = self._is_accepted or exchange.response.ok
-            if not wants_more(exchange) or self._is_accepted or not (self._prepare() or self._waits()):
+            took = self._took(exchange)
+            self._is_accepted = self._is_accepted or took
+            if took or not wants_more(exchange) or self._is_accepted or not (self._prepare() or self._waits()):
                 self._note_ready()
                 return exchange

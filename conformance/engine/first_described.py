@@ -111,8 +111,11 @@ def _motion(operations: Sequence[Operation]) -> list[str]:
     lead = "Names in the description suggest this map. Complete it, and take the # away:"
     if found:
         return [lead, *found]
-    reasons = list(why_no_map(operations))[:_MOST_REASONS]
-    return ["No map is proposed.", *map(_one_line, reasons)] if reasons else []
+    reasons = list(why_no_map(operations))
+    more = [f"{len(reasons) - _MOST_REASONS} more operations."] if len(reasons) > _MOST_REASONS else []
+    states = "If operations are allowed in some states alone, a map of states judges them: [states] in docs/motion.md."
+    lines = ["No map is proposed.", *map(_one_line, reasons[:_MOST_REASONS]), *more, states]
+    return lines if reasons else ["No map is proposed: no operation changes anything."]
 
 
 def _api(folder: Path, found: Description, api: Api) -> Iterator[str]:

@@ -22,6 +22,7 @@ from conformance.engine.commanded import (
     parts_of,
     template_of,
     unit_of,
+    with_query,
 )
 from conformance.engine.map_text import inline, key
 
@@ -32,11 +33,12 @@ _MEASURED: Final = re.compile(r"twist|velocit|speed", re.IGNORECASE)
 
 
 class _Pair(NamedTuple):
-    """What is sent and where it is read: the numbers that are commanded, by their places in the state."""
+    """What is sent and where it is read: the numbers that are commanded, by their places in a state, or in one each."""
 
     state: Operation
     sent: Operation
     places: Mapping[str, Commanded]
+    reads: Mapping[str, Operation] = {}
 
 
 def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
@@ -44,16 +46,24 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
 
     What is sent and what is read are taken for one axis if they have the same name.
     """
-    reading = [item for item in operations if item.method == "GET" and not item.parameter("path") and item.shape]
-    sending = [(item, numbers) for item in operations if _acts(item) and (numbers := commanded_by(item))]
+    reading = [item for item in operations if item.method == "GET" and item.shape]
+    sending = [
+        (item, numbers) for item in map(with_query, operations) if _acts(item) and (numbers := commanded_by(item))
+    ]
     goes = _best(reading, [one for one in sending if not is_velocity(*one) and _GOES.search(one[0].label)], _position)
     drives = _best(reading, [one for one in sending if is_velocity(*one)], _velocity)
+    goes = goes or max(
+        (pair for item in sending if not is_velocity(*item) if (pair := _axis_by_axis(reading, *item))),
+        key=lambda pair: len(pair.places),
+        default=None,
+    )
     first = goes or drives
     if first is None:
         return
     # One reading tells all of a map.
     drives = drives if drives and drives.state is first.state else None
     schemas = dict(numbers_in(first.state.shape or {}))
+    schemas |= {at: one.shape or {} for at, one in first.reads.items()}
     driven = {at: one for at, one in (drives.places if drives else {}).items() if not _MEASURED.search(at)}
     axes = {at: one.name for at, one in {**driven, **(goes.places if goes else {})}.items()}
     yield "[motion.state]"
@@ -66,7 +76,10 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
         least, most = (number and not number.is_relative and number.bounds) or bounds_of(schemas[at]) or (-0.1, 0.1)
         own = "" if goes else ", tolerance = 0.05"
         unit = basic_string(unit_of(at, schemas[at]))
-        yield f"{key(name)} = {{ at = {basic_string(at)}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
+        read = first.reads.get(at, first.state)
+        own += "" if read is first.state else f", read = {basic_string(read.label)}"
+        place = basic_string(at.rpartition("#")[2])
+        yield f"{key(name)} = {{ at = {place}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
     if goes:
         yield ""
         yield "[motion.goto]"
@@ -93,7 +106,7 @@ def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
     """Yield a sentence on each operation that may move the device, where no map is proposed."""
     for operation in operations:
         numbers = [] if operation.safe else commanded_by(operation)
-        if operation.safe or not (_GOES.search(operation.label) or (numbers and is_velocity(operation, numbers))):
+        if operation.safe:
             continue
         if operation.never or not numbers:
             yield f"{operation.label}: {'it must never be called' if operation.never else 'it takes no numbers'}."
@@ -127,7 +140,26 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
 
 
 def _acts(operation: Operation) -> bool:
-    return not operation.safe and not operation.never and not operation.parameter("path")
+    return not operation.safe and not operation.never
+
+
+def _belongs(state: Operation, sent: Operation) -> bool:
+    """Return whether whoever knows the path of what is sent can read a state."""
+    return {item.name for item in state.parameters if item.required} <= {item.name for item in sent.parameter("path")}
+
+
+def _axis_by_axis(reading: Sequence[Operation], sent: Operation, numbers: Sequence[Commanded]) -> _Pair | None:
+    """Return a pair of which an operation of its own, called as the number, tells each; None: some have none."""
+    folder, reads, places = posixpath.dirname(sent.template), dict[str, Operation](), dict[str, Commanded]()
+    for number in numbers:
+        for state in reading:
+            named = posixpath.basename(state.template).lower() == axis_of(number.place)
+            values = [at for at, _ in numbers_in(state.shape or {}) if at.rpartition("/")[2].lower() == "value"]
+            if named and values and posixpath.dirname(state.template) == folder and _belongs(state, sent):
+                at = f"{number.name}#{values[0]}"
+                reads[at], places[at] = state, number
+                break
+    return _Pair(next(iter(reads.values())), sent, places, reads) if len(places) == len(numbers) else None
 
 
 def _best(
@@ -139,7 +171,7 @@ def _best(
     found = []
     for state in reading:
         told = [at for at, _ in numbers_in(state.shape or {})]
-        for sent, numbers in sending:
+        for sent, numbers in ((sent, numbers) for sent, numbers in sending if _belongs(state, sent)):
             places = {at: command for command in numbers if (at := place_of(command, told)) is not None}
             found.append(_Pair(state, sent, places))
     best = max(found, key=lambda pair: len(pair.places), default=None)

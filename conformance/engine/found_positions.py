@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 from statistics import median
 from typing import Any, Final
 
-from conformance.engine.commanded import FAST, Commanded, axis_of, body_schema, bounds_of, numbers_in, parts_of, unit_of
+from conformance.engine.commanded import (
+    FAST,
+    POSITION,
+    Commanded,
+    axis_of,
+    body_schema,
+    bounds_of,
+    direction_line,
+    is_axis,
+    member_name,
+    numbers_in,
+    parts_of,
+    unit_of,
+)
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import AT_REST, ECHO, REFUSED, Finder
+from conformance.engine.finding import AT_REST, ECHO, READY_S, REFUSED, Finder
 from conformance.engine.map_text import inline, key, string
-from conformance.measures.samples import SEVERAL, Noise, slope
+from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.transport.exchange import Exchange
@@ -22,6 +35,20 @@ _BEFORE_S, _MOVES_S = 0.25, 3.0
 _BUDGET_S: Final = 16.0
 # _PARTS: shares of a small move that are tried. _FOLLOWS: share by which an axis may miss its target or move along.
 _PARTS, _FOLLOWS = (0.2, 1.0), 0.15
+# _SHARES: of axes that move at once, how far each is sent. _DEGREES: share of a small move for an angle in degrees.
+_SHARES: Final = (1.0, -1.0, 0.8, -0.8, 0.6, -0.6, 0.5, -0.5)
+_DEGREES: Final = 10.0
+# What a reading has beside a position for its least and its greatest value.
+_LIMITS: Final = (
+    ("limits/0", "limits/1"),
+    ("limits/min", "limits/max"),
+    ("limits/lower", "limits/upper"),
+    ("min", "max"),
+)
+# How long a way may take by what a small move took, so that the limits are tried, s.
+_FULL_WAY_S: Final = 5.0
+# _LONGEST_S: how long a device that still moves is watched. _PAUSES_S: how long it may stand on its way, s.
+_LONGEST_S, _PAUSES_S = 12.0, 1.0
 # No angle is limited to so many rad; the status of a move that must wait for another one.
 _RAD, _CONFLICT = 7.0, 409
 
@@ -31,7 +58,6 @@ class Moved:
     """How an axis followed a target.
 
     Attributes:
-        place: where it is read.
         took_s: time until it was there, s.
         off: how far from its target it rested.
         sigma: the standard deviation of its noise.
@@ -39,12 +65,21 @@ class Moved:
         ways: the ways on which it followed, with signs.
     """
 
-    place: str
     took_s: float
     off: float
     sigma: float
     way: float
     ways: tuple[float, ...] = ()
+
+
+def _worst(tries: Sequence[Moved]) -> Moved:
+    """Return how an axis followed at worst."""
+    took_s, off, sigma, way = (max(values) for values in zip(*(astuple(one)[:4] for one in tries), strict=True))
+    return Moved(took_s, off, sigma, way, tuple(way for one in tries for way in one.ways))
+
+
+def _spread(samples: Sequence[Sample]) -> float:
+    return max(value for _, value in samples) - min(value for _, value in samples)
 
 
 class PositionFinder(Finder):
@@ -55,49 +90,64 @@ class PositionFinder(Finder):
     def _find(self) -> None:
         self._refused: list[str] = []
         self._watch_at_rest()
-        counts = {operation.label: self._named_places(operation.label) for operation in self._reads}
-        read = max(counts, key=lambda label: (len(counts[label]), self._is_called_alike(label)))
-        if not counts[read]:
+        self._places = self._chosen_places()
+        if not self._places:
             wanted = ", ".join(command.name for command in self._plan.numbers)
             raise NotPossibleError(
-                f"{self._plan.drive.label} takes {wanted}, and {', '.join(counts)} tell no number of such a name: "
-                "give --read, or write a map (docs/motion.md)"
+                f"{self._plan.drive.label} takes {wanted}, and {', '.join(one.label for one in self._reads)} tell no "
+                "number of such a name: give --read, or write a map (docs/motion.md)"
             )
-        self._reads = [operation for operation in self._reads if operation.label == read]
-        self._relative = all(command.is_relative for command in self._plan.numbers if command.name in counts[read])
-        schemas = dict(numbers_in(self._reads[0].shape or {}))
-        self._schemas = {name: schemas.get(place, {}) for name, place in counts[read].items()}
-        self._places = counts[read]
-        begun = self._clock.now() - _BEFORE_S
-        start = {
-            name: median(value for _, value in self._looks.samples(read, place, begun))
-            for name, place in counts[read].items()
-        }
-        moved: dict[str, Moved] = {}
+        used = {read for read, _ in self._places.values()}
+        self._reads = [operation for operation in self._reads if operation.label in used]
+        self._numbers = {command.name: command for command in self._plan.numbers if command.name in self._places}
+        numbers = list(self._numbers.values())
+        self._relative, self._refuses = all(command.is_relative for command in numbers), False
+        schemas = {one.label: dict(numbers_in(one.shape or {})) for one in self._reads}
+        self._schemas = {name: schemas[read].get(place, {}) for name, (read, place) in self._places.items()}
+        # A move to where it is shows what the device wants before it moves, which may move it.
+        self._command(dict.fromkeys(self._places, 0.0) if self._relative else self._ends())
+        self._watch(_BEFORE_S)
+        while self._used.steps and self._clock.now() < self._asked + READY_S and self._moves():
+            self._watch(_BEFORE_S)
+        start, self._stood = self._ends(), False
+        self._turned = False
+        self._gone, self._why = dict.fromkeys(start, 0.0), dict[str, str]()
         until = self._clock.now() + _BUDGET_S
         try:
-            for number in self._plan.numbers:
-                if number.name in start and self._clock.now() > until:
-                    self._found.notes.append(f"{number.name} stays where it is: {_BUDGET_S:g} s were over.")
-                elif number.name in start:
-                    found = self._try_axis(number, counts[read], start)
-                    if found is not None:
-                        moved[number.name] = found
+            moved = self._try_axes(numbers, start)
+            for number in numbers if len(numbers) > 1 else ():
+                if number.name not in moved and self._clock.now() < until:
+                    moved |= self._try_axes([number], start)
         finally:
             if not self._relative:
                 self._command(start)
+        left = [number.name for number in numbers if number.name not in moved]
+        self._found.notes += [f"{name} stays where it is: {self._why.get(name, 'there was no time')}." for name in left]
         if not moved and self._refused:
             raise NotPossibleError(self._refused[0])
         if not moved:
             said = " ".join(self._found.notes)
-            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and {read} followed no target: {said}")
-        self._found.lines = list(self._goto_lines(read, start, moved))
+            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and no axis followed a target: {said}")
+        self._found.lines = list(self._goto_lines(start, moved))
+
+    def _chosen_places(self) -> dict[str, tuple[str, str]]:
+        """Return operation and place of each commanded number: of one operation, as far as it tells them."""
+        told = {operation.label: self._named_places(operation.label) for operation in self._reads}
+        ranked = sorted(told, key=lambda label: (len(told[label]), self._is_called_alike(label)), reverse=True)
+        found: dict[str, tuple[str, str]] = {}
+        for label in ranked:
+            found = {name: (label, place) for name, place in told[label].items()} | found
+        return found
+
+    def _ends(self) -> dict[str, float]:
+        """Return where each axis is, by the last readings."""
+        return {name: median(value for _, value in self._samples(name, 0.0)[-SEVERAL:]) for name in self._places}
 
     @property
-    def _body(self) -> dict[str, Any] | None:
+    def _body(self) -> Any:
         """The body of a move: optional inputs are left out, so that other parts of the robot stay where they are."""
         own = (number for number in self._plan.numbers if number.name in self._places)
-        return self._template({number.place: f"{{{number.name}}}" for number in own})
+        return self._template({at: value for number in own for at, value in number.templates.items()})
 
     def _is_called_alike(self, operation: str) -> bool:
         """Return whether an operation is called as something that is commanded."""
@@ -110,123 +160,208 @@ class PositionFinder(Finder):
         for number in self._plan.numbers:
             words = number.place.strip("{}").split("/")
             own = words[-1].lower()
-            same = [place for place in places if place.rpartition("/")[2].partition(ANGLE)[0].lower() == own]
-            same = same or [place for place in places if not FAST.search(place) and axis_of(place) == axis_of(own)]
-            if own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
+            is_item = own.isdecimal()
+            same = [
+                place for place in places if not is_item and place.rpartition("/")[2].partition(ANGLE)[0].lower() == own
+            ]
+            same = same or [
+                place for place in places if not FAST.search(place) and axis_of(place) == axis_of(number.place)
+            ]
+            if not is_item and own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
                 same += [place for place in places if place.lower() in {"", "/value", f"/{own}/value"}]
-            # Of several members, prefer the one whose path is most like the command's.
-            same.sort(key=lambda text: (bool(ECHO.search(text)), -len(set(words) & set(text.split("/")))))
+            same = same or self._only_position(places, own)
+            # Of several members, prefer the one whose path is most like the command's; of things, that of the command.
+            same.sort(
+                key=lambda text: (
+                    bool(ECHO.search(text) or FAST.search(text)),
+                    -len(set(words) & set(text.split("/"))),
+                    not self._is_of_thing(operation, text),
+                )
+            )
             if same and same[0] not in found.values():
                 found[number.name] = same[0]
         return found
 
-    def _try_axis(self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float]) -> Moved | None:
-        """Move one axis a little to each side, less far if it does not arrive; return how it followed, or None."""
-        found, why = None, "its limits leave no room"
-        # With declared limits, a part of them is safe; without, start with the smallest move.
-        for part in _PARTS[1:] if number.bounds else _PARTS:
-            little = part * number.little
-            tries: list[Moved] = []
-            for way in (little, -little) if part == _PARTS[-1] else (little,):
-                limits = self._limits(number)
-                if limits and not limits[0] <= start[number.name] + way <= limits[1]:
-                    continue
-                one = self._move_axis(number, places, start, way)
-                if isinstance(one, str):
-                    why = one
-                    tries.clear()
-                    break
-                tries.append(one)
-            if not tries:
+    def _only_position(self, places: Sequence[str], own: str) -> list[str]:
+        """Return the place of the only position, where a number has another name; of an item the one in its place."""
+        known = [place for place in places if POSITION.search(member_name(place)) and is_axis(member_name(place))]
+        known = [place for place in known if not (FAST.search(place) or ECHO.search(place))]
+        if own.isdecimal():
+            known = [place for place in known if place.rpartition("/")[2] == own]
+        elif len(self._plan.numbers) > 1:
+            return []
+        return known if len(known) == 1 else []
+
+    def _is_of_thing(self, operation: str, place: str) -> bool:
+        """Return whether a place is within an object with an id that the path of the command has."""
+        thing, ids = place.rpartition("/")[0], self._plan.drive.template.partition("?")[0].split("/")
+        seen = self._looks.samples(operation, f"{thing}/id", 0.0)[-1:]
+        return any(f"{value:g}" in ids for _, value in seen)
+
+    def _try_axes(self, numbers: Sequence[Commanded], start: Mapping[str, float]) -> dict[str, Moved]:
+        """Move axes at once, a little to each side; return how each followed. Without limits, first less far."""
+        found: dict[str, list[Moved]] = {}
+        parts = _PARTS[all(number.bounds for number in numbers) :]
+        # An angle that stays where it is may be one in degrees.
+        parts += (_DEGREES,) if all(number.turns and not self._limits(number) for number in numbers) else ()
+        for part in parts:
+            if part != parts[0] and (part == _DEGREES if found else not self._stood):
                 break
-            found = Moved(
-                tries[0].place,
-                max(move.took_s for move in tries),
-                max(move.off for move in tries),
-                max(move.sigma for move in tries),
-                little,
-                tuple(move.ways[0] for move in tries),
-            )
-        if found is None:
-            self._found.notes.append(f"{number.name} stays where it is: {why}.")
-        return found
+            left, found, lost = [number for number in numbers if number.name in found] or numbers, {}, set[str]()
+            # No two axes go as far, so that exchanged ones show.
+            ways = {one.name: part * share * one.little for one, share in zip(left, _SHARES, strict=False)}
+            for side in (1, -1) if part >= 1 else (1,):
+                room = {
+                    name: side * way for name, way in ways.items() if self._has_room(name, start[name] + side * way)
+                }
+                moved = self._move_axes(start, room) if room else None
+                lost |= room.keys() - moved.keys() if moved is not None else set()
+                for name, one in (moved or {}).items():
+                    found.setdefault(name, []).append(one)
+            self._send_by(start, {})
+            self._watch(max((one.took_s for own in found.values() for one in own), default=_BEFORE_S))
+            found = {name: own for name, own in found.items() if name not in lost}
+        return {name: _worst(own) for name, own in found.items()}
+
+    def _has_room(self, name: str, goal: float) -> bool:
+        """Return whether a target is within the declared limits; without any, it is."""
+        limits = self._limits(self._numbers[name])
+        if limits is None or limits[0] <= goal <= limits[1]:
+            return True
+        self._why.setdefault(name, "its limits leave no room")
+        return False
 
     def _limits(self, number: Commanded) -> tuple[float, float] | None:
-        """Return the limits of a position that are declared, where it is read or where it is commanded; or None."""
-        return bounds_of(self._schemas[number.name]) or (None if self._relative else number.bounds)
+        """Return the limits of a position that are declared, or read beside it; or None."""
+        declared = bounds_of(self._schemas[number.name]) or (None if self._relative else number.bounds)
+        return declared or self._limits_beside(number.name)
 
-    def _sent_by(self, start: Mapping[str, float], name: str, way: float) -> Exchange:
-        """Send one axis farther by a way; a device that is still busy with its last move gets time to end that."""
-        values = {name: way} if self._relative else {**start, name: start[name] + way}
+    def _limits_beside(self, name: str) -> tuple[float, float] | None:
+        """Return the limits that a reading has beside a position; or None."""
+        read, place = self._places[name]
+        beside = place.rpartition("/")[0]
+        for least, most in _LIMITS:
+            ends = [self._looks.samples(read, f"{beside}/{at}", 0.0)[-1:] for at in (least, most)]
+            if all(ends) and ends[0][0][1] < ends[1][0][1]:
+                return ends[0][0][1], ends[1][0][1]
+        return None
+
+    def _send_by(self, start: Mapping[str, float], ways: Mapping[str, float]) -> Exchange:
+        """Send axes by ways from where they were at first; a device that is busy gets time to end its last move."""
+        goals = {name: ways.get(name, 0.0) for name in start}
+        values = {name: way - (self._gone[name] if self._relative else -start[name]) for name, way in goals.items()}
         until = self._clock.now() + _MOVES_S
-        while True:
-            exchange = self._command(values)
-            if exchange.response.status != _CONFLICT or not self._relative or self._clock.now() > until:
-                return exchange
+        exchange = self._command(values)
+        while exchange.response.status == _CONFLICT and self._clock.now() < until:
+            self._refuses = True
             self._look()
+            exchange = self._command(values)
+        self._gone = goals if self._took(exchange) else self._gone
+        return exchange
 
-    def _move_axis(
-        self, number: Commanded, places: Mapping[str, str], start: Mapping[str, float], way: float
-    ) -> Moved | str:
-        """Send one axis a little farther, and back; return how it followed, or why it counts as no axis of its own."""
-        place, read, goal = places[number.name], self._reads[0].label, start[number.name] + way
+    def _move_axes(self, start: Mapping[str, float], ways: Mapping[str, float]) -> dict[str, Moved] | None:
+        """Send axes by ways, and watch; return how each followed, and keep why others count as no axes of their own.
+
+        Returns:
+            None: it was refused.
+        """
         rested = self._clock.now()
         self._watch(_BEFORE_S)
-        sigma = Noise.of([value for _, value in self._looks.samples(read, place, rested)]).sigma
-        exchange = self._sent_by(start, number.name, way)
+        before, goals = self._ends(), {name: start[name] + way for name, way in ways.items()}
+        sigmas = {name: Noise.of([value for _, value in self._samples(name, rested)]).sigma for name in ways}
+        exchange = self._send_by(start, ways)
         sent = self._clock.now()
-        if not exchange.response.ok:
-            said = exchange.response.body[:300].decode("utf-8", "replace")
-            self._refused.append(f"{self._plan.drive.label} with {number.name} {goal:.4g} got {exchange.came}: {said}")
-            return self._refused[-1]
+        said = " and ".join(f"{name} {goal:.4g}" for name, goal in goals.items())
+        if not self._took(exchange):
+            words = exchange.response.body[:300].decode("utf-8", "replace")
+            self._refused.append(f"{self._plan.drive.label} with {said} got {exchange.came}: {words}")
+            self._why |= dict.fromkeys(ways, self._refused[-1])
+            self._stood = False
+            return None
         self._answer = self._binding.content(exchange.response.body)
-        near = max(_FOLLOWS * abs(way), 6 * sigma)
-
-        def is_there() -> bool:
-            last = [value for _, value in self._looks.samples(read, place, sent)[-SEVERAL:]]
-            return len(last) == SEVERAL and all(abs(number - goal) < near for number in last)
-
-        while self._clock.now() < sent + _MOVES_S and not is_there():
+        near = {name: max(_FOLLOWS * abs(way), 6 * sigmas[name]) for name, way in ways.items()}
+        took_s: dict[str, float] = {}
+        while (now := self._clock.now()) < sent + _MOVES_S or (now < sent + _LONGEST_S and self._moves()):
             self._look()
-        took_s = self._clock.now() - sent
+            for name in ways:
+                last = [value for _, value in self._samples(name, sent)[-SEVERAL:]]
+                if len(last) == SEVERAL and all(abs(value - goals[name]) < near[name] for value in last):
+                    took_s.setdefault(name, self._clock.now() - sent)
+            if len(took_s) == len(ways):
+                break
         self._watch(_BEFORE_S)
-        ends = {
-            name: median(value for _, value in self._looks.samples(read, at, sent)[-SEVERAL:])
-            for name, at in places.items()
+        ends = self._ends()
+        self._gone = {name: ends[name] - start[name] for name in ends} if self._relative and not took_s else self._gone
+        self._stood = all(abs(ends[name] - before[name]) < near[name] / 2 for name in ways)
+        beside = {
+            one.name: f"with it {one.name} went from {start[one.name]:.4g} to {ends[one.name]:.4g}"
+            for one in self._numbers.values()
+            if one.name not in ways
+            and abs(ends[one.name] - start[one.name]) > _FOLLOWS * max(one.little, *map(abs, ways.values()))
         }
-        self._sent_by(start, number.name, -way if self._relative else 0.0)
-        self._watch(max(_BEFORE_S, took_s))
-        if abs(ends[number.name] - goal) > near:
-            return f"sent to {goal:.4g}, it came to {ends[number.name]:.4g}"
-        for name, end in ends.items():
-            own = next(command.little for command in self._plan.numbers if command.name == name)
-            if name != number.name and abs(end - start[name]) > max(_FOLLOWS * own, _FOLLOWS * abs(way)):
-                return f"with it {name} went from {start[name]:.4g} to {end:.4g}"
-        return Moved(place, took_s, abs(ends[number.name] - goal), sigma, abs(way), (way,))
+        if self._turn_words({name: (ends[name] - before[name], way) for name, way in ways.items()}):
+            ways = {name: -way for name, way in ways.items()}
+            goals = {name: start[name] + way for name, way in ways.items()}
+        found: dict[str, Moved] = {}
+        for name, way in ways.items():
+            off = abs(ends[name] - goals[name])
+            if off > near[name] or beside:
+                came = f"sent to {goals[name]:.4g}, it came to {ends[name]:.4g}"
+                self._why[name] = next(iter(beside.values()), came) if off <= near[name] else came
+            else:
+                found[name] = Moved(took_s.get(name, self._clock.now() - sent), off, sigmas[name], abs(way), (way,))
+        return found
 
-    def _goto_lines(self, read: str, start: Mapping[str, float], moved: Mapping[str, Moved]) -> Iterator[str]:
+    def _turn_words(self, ways: Mapping[str, tuple[float, float]]) -> bool:
+        """Exchange the words for both directions of a number that went the other way by as much; return whether."""
+        (gone, way), (name, *more) = next(iter(ways.values())), ways
+        number = self._numbers[name]
+        if more or self._turned or number.direction is None or abs(gone + way) > _FOLLOWS * abs(way):
+            return False
+        at, positive, negative = number.direction
+        self._turned, self._numbers[name] = True, replace(number, direction=(at, negative, positive))
+        self._plan = replace(self._plan, numbers=tuple(self._numbers.get(one.name, one) for one in self._plan.numbers))
+        self._gone = {name: gone}
+        return True
+
+    def _samples(self, name: str, begin: float) -> list[Sample]:
+        return self._looks.samples(*self._places[name], begin)
+
+    def _moves(self) -> bool:
+        """Return whether any number that may be an axis still changes: a device may have to turn before it drives."""
+        since = self._clock.now() - _PAUSES_S
+        for read in (operation.label for operation in self._reads):
+            for place in filter(lambda text: is_axis(member_name(text)), self._looks.places(read)):
+                seen, rest = self._looks.samples(read, place, since), self._at_rest(read, place)
+                if len(seen) > SEVERAL and _spread(seen) > 3 * _spread(rest):
+                    return True
+        return False
+
+    def _goto_lines(self, start: Mapping[str, float], moved: Mapping[str, Moved]) -> Iterator[str]:
         numbers = {command.name: command for command in self._plan.numbers if command.name in moved}
         still = {name: round(start[name], 5) for name in start.keys() - moved.keys()}
+        read = self._places[next(iter(moved))][0]
         yield "[motion.state]"
         yield f"read = {string(read)}"
         yield "fresh_s = 1.0  # the suite's"
         yield ""
         yield "[motion.state.axes]"
-        widest = 0.0
+        limits = {name: self._tried_limits(numbers[name], start[name], found) for name, found in moved.items()}
         for name, found in moved.items():
-            number, here = numbers[name], start[name]
-            near = (here + min(0.0, *found.ways), here + max(0.0, *found.ways))
-            declared = self._limits(number)
-            limits = [round(one, 4) for one in declared or near]
-            widest = max(widest, (limits[1] - limits[0]) / found.way)
-            pointer, _, angle = found.place.partition(ANGLE)
-            given: dict[str, Any] = {"at": pointer, "unit": self._unit(number, found), "limits": limits}
-            drift = slope(self._at_rest(read, found.place)) or 0.0
+            own, place = self._places[name]
+            pointer, _, angle = place.partition(ANGLE)
+            given: dict[str, Any] = {"at": pointer, "unit": self._unit(numbers[name]), "limits": list(limits[name])}
+            given |= {"read": own} if own != read else {}
+            drift = slope(self._at_rest(own, place)) or 0.0
             given["rest"] = float(f"{max(AT_REST * found.way / found.took_s, 3 * abs(drift)):.3g}")
             given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
+            declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
             source = "as declared" if declared else "none are declared; so far it was seen to go"
+            if declared and limits[name] != declared:
+                given["accepts"], source = list(declared), "nearby, as the declared ones are far away"
             yield f"{key(name)} = {inline(given)}  # limits: {source}"
+        widest = max((limits[name][1] - limits[name][0]) / found.way for name, found in moved.items())
         yield ""
         yield "[motion.goto]"
         template, lasts = self._plan.drive.label, "{seconds}" in inline(self._body or {})
@@ -236,8 +371,10 @@ class PositionFinder(Finder):
         if self._body is not None:
             named = {name: f"{{{name}}}" for name in moved}
             yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': '{seconds}', 'lease': '{lease}'}))}"
+            yield from (direction_line(number) for number in numbers.values() if number.direction)
         if self._relative:
             yield "relative = true"
+        if self._relative or self._refuses:
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'
         slowest = max(move.took_s for move in moved.values())
         if lasts:
@@ -252,10 +389,17 @@ class PositionFinder(Finder):
             yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
         yield from self._stop_lines()
 
-    def _unit(self, number: Commanded, found: Moved) -> str:
+    def _tried_limits(self, number: Commanded, here: float, found: Moved) -> tuple[float, float]:
+        """Return the limits that are declared, or those so far seen, if there are none or they are far away."""
+        declared = self._limits(number)
+        if declared and found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way:
+            return declared
+        return round(here + min(0.0, *found.ways), 4), round(here + max(0.0, *found.ways), 4)
+
+    def _unit(self, number: Commanded) -> str:
         """Return the unit of an axis by its name or description; of what turns, rad, which a turn of 7 is not."""
         declared = self._limits(number) or (0.0, 0.0)
-        said = unit_of(found.place, self._schemas[number.name]) or unit_of(number.place, number.schema)
+        said = unit_of(self._places[number.name][1], self._schemas[number.name]) or unit_of(number.place, number.schema)
         return said or ("rad" if number.turns and max(map(abs, declared)) < _RAD else "")
 
     def _stop_lines(self) -> Iterator[str]:

@@ -17,7 +17,7 @@ import msgspec
 
 from conformance.api.call_rules import CallRules, harmful_words, matches, words_of
 from conformance.documents.openapi import Operation
-from conformance.engine.commanded import body_schema, commanded_by, parts_of, template_of
+from conformance.engine.commanded import body_schema, commanded_by, parts_of, template_of, with_query
 from conformance.engine.map_text import inline
 from conformance.scenarios.motion.preparing import WANTS_LEASE
 from conformance.scenarios.motion.templates import fill
@@ -96,10 +96,11 @@ class Preparing:
             yield f"{when} the suite first sends {', '.join(first)},"
             yield f"and at the end {', '.join(last) or 'nothing, as no operation is known that ends it'}."
 
-    def lines(self) -> Iterator[str]:
-        """Yield the lines of a map."""
-        if self.steps:
+    def lines(self, failed: tuple[str, Any] | None = None) -> Iterator[str]:
+        """Yield the lines of a map; ``failed``: where a 2xx says whether the request failed, and what it has if not."""
+        if self.steps or failed:
             yield "[motion]"
+            yield from ([f"failed = {inline({'at': failed[0], 'not': failed[1]})}"] if failed else [])
             for name, steps in (("before", self.before), ("after", self.after)):
                 given = [
                     {at: said for at in _OF_STEP if (said := getattr(step, at)) not in (None, "")} for step in steps
@@ -164,7 +165,7 @@ def named_preparing(operations: Sequence[Operation], calls: Iterable[str], rules
     found = Preparing()
     for call in calls:
         label, brace, body = call.strip().partition(" {")
-        operation = next((one for one in known if names_operation(one.label, label)), None)
+        operation = next((one for one in known if names_operation(label, one.label)), None)
         if operation is None:
             raise NotPossibleError(f"--before {label!r} is no operation of the description that may be called")
         if not brace and found.lease is None and _is_lease(operation):
@@ -185,12 +186,17 @@ def is_excluded(operation: Operation, rules: CallRules) -> bool:
 
 def wants_lease(operation: Operation) -> bool:
     """Return whether a description says that an operation wants a lease: by a status, or a header that carries one."""
-    return bool(_LOCKED & operation.responses.keys()) or bool(lease_header(operation))
+    return bool(_LOCKED & operation.responses.keys() or lease_header(operation) or lease_query(operation))
 
 
 def lease_header(operation: Operation) -> str:
     """Return the name of the header in which an operation takes a lease; empty: in none."""
     return next((one.name for one in operation.parameter("header") if _carries_lease(one.name)), "")
+
+
+def lease_query(operation: Operation) -> str:
+    """Return the name of the query parameter in which an operation takes a lease; empty: in none."""
+    return next((one.name for one in operation.parameter("query") if _carries_lease(one.name)), "")
 
 
 def lease_place(operation: Operation) -> str:
@@ -204,8 +210,6 @@ def lease_place(operation: Operation) -> str:
 
 def wants_more(exchange: Exchange) -> bool:
     """Return whether a device refused a command for what it wants before, by status or words of the response."""
-    if exchange.response.ok:
-        return False
     said = exchange.response.body[:2000].decode("utf-8", "replace")
     return exchange.response.status in WANTS_LEASE | {_FORBIDDEN} or bool(_WANTS.search(said))
 
@@ -221,13 +225,14 @@ def _may_prepare(operation: Operation) -> bool:
 
 def _words(operation: Operation) -> set[str]:
     """Return the words of the last part of an operation's path, and of its id."""
-    named = "" if operation.id == operation.label else operation.id
+    # Of an id the first word says what is done: stopArm arms nothing.
+    named = "" if operation.id == operation.label else re.split(r"(?<=[a-z])(?=[A-Z])|[_\-. /]", operation.id)[0]
     return words_of(f"{posixpath.basename(operation.template)} {named}")
 
 
 def _is_lease(operation: Operation) -> bool:
     is_acquired = bool(_words(operation) & _LEASES) and not _words(operation) & (_RELEASES | _KEEPS)
-    return is_acquired and not lease_header(operation)
+    return is_acquired and not (lease_header(operation) or lease_query(operation))
 
 
 def _lease_of(acquire: Operation, operations: Sequence[Operation]) -> Lease:
@@ -246,6 +251,7 @@ def _lease_of(acquire: Operation, operations: Sequence[Operation]) -> Lease:
         renew=_with_token(renew) if renew else "",
         renew_body=_body(renew) if renew else None,
         release=_with_token(release) if release else "",
+        release_body=_body(release) if release else None,
     )
 
 
@@ -255,7 +261,8 @@ def _names_lease(operation: Operation, path: str) -> bool:
 
 
 def _with_token(operation: Operation) -> str:
-    return f"{operation.method} {NAME.sub('{lease}', operation.template)}"
+    named = with_query(operation, lease_query(operation)).template
+    return f"{operation.method} {NAME.sub('{lease}', named)}"
 
 
 def _body(operation: Operation, *, on: bool | None = None) -> Any:
@@ -263,8 +270,9 @@ def _body(operation: Operation, *, on: bool | None = None) -> Any:
     schema = body_schema(operation)
     if schema is None:
         return None
-    made = fill(template_of(schema, {}), {"seconds": _ASKED_S})
-    for part in parts_of(schema):
+    at = lease_place(operation) if on is None and not _is_lease(operation) else ""
+    made = fill(template_of(schema, {at: "{lease}"} if at else {}), {"seconds": _ASKED_S, "lease": "{lease}"})
+    for part in parts_of(schema) if isinstance(made, dict) else ():
         for name, member in part.get("properties", {}).items():
             if on is not None and _SWITCHES.fullmatch(name) and (said := _switch_value(member, on=on)) is not None:
                 made[name] = said

@@ -17,11 +17,12 @@ from conformance.engine.commanded import (
     direction_line,
     is_axis,
     lasting,
+    member_name,
     numbers_in,
     unique_names,
     unit_of,
 )
-from conformance.engine.driven_numbers import ANGLE, HEADING
+from conformance.engine.driven_numbers import ANGLE
 from conformance.engine.finding import AT_REST, ECHO, REFUSED, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.responses import Response, agreement, response_to, rests_from
@@ -60,9 +61,9 @@ class VelocityFinder(Finder):
             shown = self._measures(responses)
             name, (place, response) = next(iter(shown.items()))
             settle_s = self._settle_s
-            hold_s = self._hold_s(
-                next(command for command in self._plan.numbers if command.name == name), place, response
-            )
+            numbers = {command.name: command for command in self._plan.numbers}
+            hold_s = self._hold_s(numbers[name], place, response)
+            settle_s = max(settle_s, *(self._rises_s(numbers[name], *seen) for name, seen in shown.items()))
         finally:
             self._command({})
         self._found.lines = list(self._lines(responses, shown, settle_s, hold_s))
@@ -79,7 +80,7 @@ class VelocityFinder(Finder):
             if self._clock.now() >= last + _KEPT_S:
                 exchange = self._command({number.name: speed})
                 last = self._clock.now()
-                if not exchange.response.ok:
+                if not self._took(exchange):
                     said = exchange.response.body[:300].decode("utf-8", "replace")
                     raise NotPossibleError(
                         f"{self._plan.drive.label} with {number.name} {speed:g} got {exchange.came}: {said}"
@@ -162,17 +163,12 @@ class VelocityFinder(Finder):
                 spans = ((rested, begun), ((begun + ended) / 2, ended), (now - _LATE_S, now))
                 seen = [self._looks.samples(operation, place, *span) for span in spans]
                 before, during, last = (abs(slope(one) or 0.0) for one in seen)
-                if (
-                    is_axis(place.rpartition("/")[2])
-                    and before < during / 4
-                    and last > during / 2
-                    and len(seen[2]) > SEVERAL
-                ):
+                if is_axis(member_name(place)) and before < during / 4 and last > during / 2 and len(seen[2]) > SEVERAL:
                     return True
         return False
 
     @property
-    def _body(self) -> dict[str, Any] | None:
+    def _body(self) -> Any:
         """The body of a command, which says for how long it holds, if it can."""
         numbers = {at: value for number in self._plan.numbers for at, value in number.templates.items()}
         return self._template({**lasting(body_schema(self._plan.drive)), **numbers})
@@ -227,7 +223,7 @@ class VelocityFinder(Finder):
                     )
                     for speed, rested, begun, ended, done in drives
                 ]
-                named = place.rpartition("/")[2].partition(ANGLE)[0]
+                named = member_name(place).partition(ANGLE)[0]
                 if ECHO.search(f"{operation} {place}") or not is_axis(named or "value"):
                     continue
                 if (response := agreement(seen)) is not None:
@@ -261,8 +257,13 @@ class VelocityFinder(Finder):
             for name, given in responses.items()
         }
         turns = {command.name for command in self._plan.numbers if command.turns and own[command.name]}
+        # What two wheels change alike is neither one's own.
+        shared = {
+            name: {place for other, seen in own.items() if other != name for place in given.keys() & seen.keys()}
+            for name, given in own.items()
+        }
         shown = {
-            command.name: self._choose(command, own[command.name], turning=bool(turns))
+            command.name: self._choose(command, own[command.name], shared[command.name], turning=bool(turns))
             for command in self._plan.numbers
         }
         if turns and not any(shown[name] for name in shown.keys() - turns):
@@ -289,12 +290,17 @@ class VelocityFinder(Finder):
         """What is said of numbers that moved against the sign of a velocity; empty: none did."""
         return f"; against the sign that was commanded moved {', '.join(self._other_way)}" if self._other_way else ""
 
-    def _choose(self, number: Commanded, own: Mapping[str, Response], *, turning: bool) -> tuple[str, Response] | None:
+    def _choose(
+        self, number: Commanded, own: Mapping[str, Response], shared: set[str], *, turning: bool
+    ) -> tuple[str, Response] | None:
         velocities = {place: one for place, one in own.items() if not one.is_position and 1 / _NEAR < one.ratio < _NEAR}
         position = self._shown_as_position(own)
+        if position and position[0] in shared and velocities.keys() - shared:
+            position = None
         # A joint is called as what commands it. Once a device has turned, x and y change otherwise.
         called = number.place.rpartition("/")[2].lower()
-        is_joint = position and called not in _COORDINATES and position[0].rpartition("/")[2].lower() == called
+        is_named = called not in _COORDINATES and not called.isdecimal()
+        is_joint = position and is_named and position[0].rpartition("/")[2].lower() == called
         if position and (number.turns or not turning or is_joint):
             return position
         if not position and not velocities:
@@ -308,7 +314,7 @@ class VelocityFinder(Finder):
         """Return the place of the position that alone shows a velocity."""
         positions = {place: one for place, one in own.items() if one.is_position and one.ratio > 0}
         # One wheel alone turns a device: then a coordinate changes otherwise the farther it drives.
-        turning = {at: one for at, one in own.items() if one.is_position and HEADING.search(at.rpartition("/")[2])}
+        turning = {at: one for at, one in own.items() if one.is_position and self._looks.is_heading(at)}
         if turning and max(abs(one.ratio) for one in turning.values()) > max(
             (abs(one.ratio) for at, one in positions.items() if at not in turning), default=0.0
         ):
@@ -349,6 +355,31 @@ class VelocityFinder(Finder):
         )
         return None
 
+    def _rises_s(self, number: Commanded, place: str, response: Response) -> float:
+        """Drive at the limit, back to where it came from; return how long it may take to reach that velocity, s.
+
+        Its acceleration shows there alone. 0: it was not seen to reach it.
+        """
+        least, most = number.limits
+        speed = least if self._first[number.name] > 0 and least < 0 else most
+        moving, read = response.ratio * speed, self._reads[0].label
+        ends = bounds_of(self._schema_at(place)) or (-math.inf, math.inf)
+        here = self._looks.samples(read, place, 0.0)[-1][1]
+        if response.is_position and not ends[0] < here + 2 * _DRIVEN_S * moving < ends[1]:
+            return 0.0
+        begun, _ = self._drive(number, speed)
+        ended = self._clock.now()
+        self._watch(_AFTER_S)
+        seen = self._looks.samples(read, place, begun, ended)
+        if not response.is_position:
+            full = (moment for moment, value in seen if value / moving >= _FULL)
+            return 1.5 * (next(full, begun) - begun)
+        last = slope(seen[len(seen) // 2 :]) or 0.0
+        if len(seen) < 2 * SEVERAL or last / moving < _FULL / 2:
+            return 0.0
+        # At a constant acceleration, half of the time is lost; an exponential one takes longer to be near its end.
+        return 3.0 * max(0.0, seen[-1][0] - seen[0][0] - (seen[-1][1] - seen[0][1]) / moving)
+
     def _schema_at(self, place: str) -> Schema:
         """Return what the description says of the number at a place."""
         return dict(numbers_in(self._reads[0].shape or {})).get(place.partition(ANGLE)[0], {})
@@ -380,9 +411,9 @@ class VelocityFinder(Finder):
             if operation == read and one.is_position and 1 / _OTHER < one.ratio / _unit(one.ratio)[0] < _OTHER
         }
         places |= {place: one for place, one in shown.values() if one.is_position}
-        if all(HEADING.search(place.rpartition("/")[2]) for place, _ in shown.values()):
-            # What can only turn stays near: it drives in circles.
-            places = {place: one for place, one in places.items() if HEADING.search(place.rpartition("/")[2])}
+        if all(self._turns_with(responses[name]) for name in shown):
+            # What turns with each number stays near: it drives in circles.
+            places = {place: one for place, one in places.items() if self._looks.is_heading(place)}
         # How fast each place changes at most.
         fastest = {
             place: max(
@@ -393,7 +424,8 @@ class VelocityFinder(Finder):
             )
             for place in places
         }
-        names = unique_names(list(places))
+        self._even(places, fastest)
+        names = unique_names(list(places), self._looks.titles)
         driven = {place: name for name, (place, one) in shown.items() if one.is_position}
         yield "[motion.state]"
         yield f"read = {string(read)}"
@@ -441,6 +473,18 @@ class VelocityFinder(Finder):
             source = "limits as declared" if number.bounds else "limits: the suite's, as none are declared"
             yield f"{key(name)} = {inline(given)}  # {source}; changed by {response.ratio:.3g} at velocity 1"
 
+    def _turns_with(self, responses: Mapping[tuple[str, str], Response]) -> bool:
+        """Return whether a number turns the device."""
+        return any(one.is_position and self._looks.is_heading(place) for (_, place), one in responses.items())
+
+    def _even(self, places: dict[str, Response], fastest: dict[str, float]) -> None:
+        """Give all coordinates of a device that turns the rate of the fastest: once turned, it drives along others."""
+        along = [place for place in places if not self._looks.is_heading(place)]
+        if 0 < len(along) < len(places):
+            lead = max(along, key=lambda place: fastest[place])
+            places |= {place: places[place]._replace(ratio=places[lead].ratio) for place in along}
+            fastest |= dict.fromkeys(along, fastest[lead])
+
     def _rest(self, place: str, response: Response, fastest: float) -> float:
         """Return how fast a number may seem to move at rest: a share of the fastest, or as before any drive."""
         seen = self._at_rest(self._reads[0].label, place)
@@ -452,16 +496,16 @@ class VelocityFinder(Finder):
         samples = self._looks.samples(self._reads[0].label, place, 0.0)
         here = samples[-1][1]
         scale, (way, turn) = _unit(response.ratio)
-        is_heading = ANGLE in place or bool(HEADING.search(place.rpartition("/")[2]))
+        is_heading = ANGLE in place or bool(self._looks.is_heading(place))
         turns = is_heading or (number is not None and number.turns)
         pointer, _, angle = place.partition(ANGLE)
         schema = self._schema_at(place)
         unit = unit_of(pointer, schema) or (turn if turns else way)
         if is_heading and not angle:
-            unit = "deg" if self._looks.is_in_degrees(self._reads[0].label, place) else unit
+            unit = "deg" if self._looks.is_in_degrees(self._reads[0].label, place) else unit or "rad"
         # One that was seen to turn in degrees is known by the same factor of a radian.
         scale = next((factor for factor, units in _UNITS.items() if unit and unit in units), scale)
-        if turns and unit in {"rad", "deg"} and not angle and HEADING.search(place):
+        if turns and unit in {"rad", "deg"} and not angle and self._looks.is_heading(place):
             angle = "yaw"
         room = _ROOM_RAD * scale if turns else max(ROOM_M * scale, ROOM_S * fastest)
         all_around = [round(end * scale, 1) for end in (-3.0, 3.0)]

@@ -28,6 +28,7 @@ _BROKEN: Final = frozenset({"fail", "warn"})
 # _DRIVES_ON: a released device that still has this share of its velocity drives on. _LONG: characters of an answer.
 _DRIVES_ON: Final = 0.5
 _LONG: Final = 240
+_ENDS: Final = "it is sent to positions, and each move ends at its target"
 _NO_LIMITS: Final = "no limits are declared that are refused"
 
 
@@ -51,13 +52,23 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
         said, picture = figure(motion, recordings)
         if value == "yes" and said == _NO_LIMITS:
             value = "not seen"
+        if value == "not seen" and ids == ("watchdog",) and motion.velocity is None:
+            said = _ENDS
         if value == "no":
             said, picture = _fault(own, picture)
         elif value == "not seen" and said.startswith("no: "):
             value, said = "no", said.removeprefix("no: ")
-        elif value == "not seen" and said != _NO_LIMITS:
+        elif value == "not seen" and said not in {_NO_LIMITS, _ENDS}:
             # A requirement that could not be tried says more than one that the map does not declare.
-            tried = sorted(own, key=lambda verdict: verdict.value is Value.NOT_CLAIMED)
+            # Of a device that is sent to positions, what is said of velocities does not matter.
+            of_velocity = motion.velocity is None
+            tried = sorted(
+                own,
+                key=lambda verdict: (
+                    verdict.value is Value.NOT_CLAIMED,
+                    of_velocity and "velocity" in verdict.requirement.id,
+                ),
+            )
             said = next((verdict.reason for verdict in tried if verdict.reason), "") or said or "nothing was tried"
         found.append({"question": question, "answer": value, "figure": said[:_LONG], "picture": picture})
     return found

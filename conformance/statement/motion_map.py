@@ -42,6 +42,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             number; empty: it does not. Its limits say which targets are tried.
         read: the operation that says where it is; empty: that of the state.
         bound: whether it must stay within its limits on its ways; else they only say which targets are tried.
+        accepts: least and greatest target that the device accepts, where ``limits`` only say which are tried.
     """
 
     at: Pointer
@@ -54,6 +55,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     angle: Angle | Literal[""] = ""
     read: Call | Literal[""] = ""
     bound: bool = True
+    accepts: tuple[Finite, Finite] | None = None
 
     def __post_init__(self) -> None:
         """Check the limits, and the unit of an angle.
@@ -65,6 +67,11 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"limits = {list(self.limits)} must be two numbers, the lesser one first")
         if self.angle and self.unit not in _TURNS:
             raise ValueError(f"unit = {self.unit!r} of what turns must be one of {', '.join(filter(None, _TURNS))}")
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The least and the greatest target that the device accepts."""
+        return self.accepts or self.limits
 
     def well_inside(self, position: float) -> float:
         """Return the position, or the nearest one that is a quarter of the range away from both limits."""
@@ -301,6 +308,7 @@ class Lease(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         renew_body: JSON of that, or None.
         every_s: so often it must be renewed, s.
         release: the operation that gives it back; empty: there is none.
+        release_body: JSON of that, or None.
     """
 
     acquire: Call
@@ -311,6 +319,7 @@ class Lease(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     renew_body: Any = None
     every_s: Positive = 5.0
     release: Call | Literal[""] = ""
+    release_body: Any = None
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

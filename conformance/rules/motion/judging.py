@@ -127,9 +127,10 @@ def _judge_drive(drive: Drive, motion: MotionMap, so_far: Sequence[Reading]) -> 
 
 def judge_renewed(drive: Drive, name: str, wanted: float, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a velocity that was sent again and again outlasts the hold time of the first command."""
-    hold_s = motion.velocity.hold_s if motion.velocity else None
-    first = drive.commands[0]
-    late = [reading for reading in drive.under_way if hold_s and reading.sent >= first.answered + hold_s]
+    hold_s, settle_s = (motion.velocity.hold_s, motion.velocity.settle_s) if motion.velocity else (None, 0.0)
+    # A device may need longer to reach a velocity than it holds one.
+    begun = max(drive.commands[0].answered + (hold_s or 0.0), drive.settled_at(settle_s))
+    late = [reading for reading in drive.under_way if hold_s and reading.sent >= begun]
     long_enough = bool(late) and late[-1].sent - late[0].sent >= _RENEWED_S
     found = speed_in(late, name, motion) if wanted and long_enough else None
     if found is not None:

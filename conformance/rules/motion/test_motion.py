@@ -67,7 +67,7 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
             if axis.angle or not axis.bound:
                 continue
             room = motion.tolerance(name)
-            least, greatest = axis.limits[0] - room, axis.limits[1] + room
+            least, greatest = axis.ends[0] - room, axis.ends[1] + room
             places = [middle_of(seen[i : i + SEVERAL], name) for i in range(len(seen) - SEVERAL + 1)]
             inside = next((i for i, one in enumerate(places) if least <= one <= greatest), len(places))
             beyond = [place for place in places[inside:] if not least <= place <= greatest]
@@ -76,7 +76,7 @@ def way(trace: Leg | tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
                 yield Case(
                     not beyond,
                     leg.commands[-1].exchange,
-                    f"{name} between {axis.limits[0]:g} and {axis.limits[1]:g} all the time ({leg.what})",
+                    f"{name} between {axis.ends[0]:g} and {axis.ends[1]:g} all the time ({leg.what})",
                     observed=found,
                     cause=name,
                 )

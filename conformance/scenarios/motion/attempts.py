@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
+from urllib.parse import quote
 
 from conformance.measures.samples import SEVERAL
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice
@@ -176,7 +177,7 @@ def _tries_of(sender: _Sender) -> Iterator[Attempts]:
     if sender.mapped.binding.has_credentials:
         yield partial(sender.send, "unauthorised", f"{sender.what} without credentials", away, authorized=False)
     lease = sender.mapped.motion.lease
-    if lease and (lease.header or "{lease}" in str(sender.given.body)):
+    if lease and (lease.header or "{lease}" in f"{sender.given.send} {sender.given.body}"):
         yield partial(sender.send_without_lease, away)
     if sender.given.body is not None:
         if not sender.is_form(away):  # almost any text is a valid form
@@ -217,8 +218,9 @@ class _Sender:
     def send_without_lease(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send a command of a client that has no lease."""
         made, ready = self.mapped.request_of(self.given, values), self.mapped.ready
+        target = made.target.replace(quote(ready.lease, safe=""), "")
         body = made.body.replace(ready.lease.encode(), b"")
-        made = replace(made, headers=ready.without_lease(made.headers), body=body)
+        made = replace(made, target=target, headers=ready.without_lease(made.headers), body=body)
         exchange = self.mapped.api.client.send(made.method, made.target, headers=made.headers, body=made.body)
         yield Tried("unauthorised", f"{self.what} without the lease", exchange, self.mapped.has_failed(exchange))
 

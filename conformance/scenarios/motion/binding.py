@@ -144,6 +144,8 @@ def _whole(value: Any, schema: Schema) -> Any:
     """Return a value with whole numbers where its schema has integers: no map has another way to write them."""
     if isinstance(value, float) and kinds_of(schema) == {"integer"}:
         return round(value)
+    if isinstance(value, list) and isinstance(schema.get("items"), dict):
+        return [_whole(item, schema["items"]) for item in value]
     if not isinstance(value, dict):
         return value
     members: dict[str, Schema] = {}

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from conformance.api.rest.interface import RestInterface
 from conformance.measures.samples import SEVERAL
@@ -203,8 +203,9 @@ class MappedDevice:
                 values |= quaternion_of(name, values[name], axis)
         elif isinstance(given, Velocity | Way):
             values = {**dict.fromkeys(self.drives.axes, 0.0), **values}
-        values = {**values, "lease": self.ready.lease}
-        return fill(given.send, values, self._answer), fill(given.body, values, self._answer)
+        held, in_path = {"lease": self.ready.lease}, {"lease": quote(self.ready.lease, safe="")}
+        path = fill(given.send, {**values, **in_path}, self._answer)
+        return path, fill(given.body, {**values, **held}, self._answer)
 
     def request_of(
         self, given: Goto | Velocity | Way | Switch | Stop, values: Mapping[str, Any], *, authorized: bool = True

@@ -99,10 +99,11 @@ def beyond(axes: Mapping[str, Axis | Speed]) -> Iterator[tuple[str, float, float
     for name, axis in axes.items():
         if isinstance(axis, Axis) and axis.angle:
             continue
+        least, most = axis.ends if isinstance(axis, Axis) else axis.limits
         for part in _BEYOND:
-            room = part * (axis.limits[1] - axis.limits[0])
-            yield name, axis.limits[0], axis.limits[0] - room
-            yield name, axis.limits[1], axis.limits[1] + room
+            room = part * (most - least)
+            yield name, least, least - room
+            yield name, most, most + room
 
 
 @dataclass(frozen=True)

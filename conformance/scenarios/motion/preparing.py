@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from typing import Any, Final, Protocol
+from urllib.parse import quote
 
 from conformance.observe.clock import Clock
 from conformance.scenarios.motion.binding import Binding
@@ -129,7 +130,7 @@ class Preparation:
         try:
             self._steps(self.motion.after)
             if self.motion.lease and self.lease and self.motion.lease.release:
-                self._call(self.motion.lease.release, None)
+                self._call(self.motion.lease.release, self.motion.lease.release_body)
         finally:
             self._busy, self.lease = False, ""
             self._is_ready = not self.motion.before
@@ -141,7 +142,7 @@ class Preparation:
             for step in self.motion.after:
                 self._call(step.send, step.body)
             if lease and lease.release:
-                self._call(lease.release, None)
+                self._call(lease.release, lease.release_body)
 
     def _acquire(self) -> None:
         lease = self.motion.lease
@@ -185,4 +186,5 @@ class Preparation:
 
     def _call(self, call: str, body: Any) -> Exchange:
         values = {"lease": self.lease}
-        return self._send(self.with_lease(self._binding.make(fill(call, values), fill(body, values))))
+        path = fill(call, {"lease": quote(self.lease, safe="")})
+        return self._send(self.with_lease(self._binding.make(path, fill(body, values))))

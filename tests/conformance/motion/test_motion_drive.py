@@ -23,12 +23,12 @@ from winch import Winch
 
 from conformance.api.call_rules import CallRules
 from conformance.documents.openapi import read_operations
-from conformance.engine.commanded import commanded_by, lasting
+from conformance.engine.commanded import commanded_by, lasting, template_of, titles_in, with_query
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.engine.finding import plan_of
 from conformance.engine.found_velocities import VelocityFinder
 from conformance.rules.motion.test_motion_attempts import unauthorised_still
-from conformance.rules.motion.test_velocities import stopped
+from conformance.rules.motion.test_velocities import stopped, velocity
 from conformance.scenarios.motion import attempts
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.velocities import velocities
@@ -225,8 +225,32 @@ class Late(Body):
             self.held_until = now + 0.6
 
 
-def _simulated(body_type, noise=0.0):
-    """Return the map that is found of a simulated rover, and the failures of its stops."""
+class Accelerating(Body):
+    """A rover that needs half a second to reach its greatest speed, and as long to stop."""
+
+    RATE = 2 * rover.FASTEST
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.here, self.seen, self.rates = dict(self.start), self.now(), dict.fromkeys(self.limits, 0.0)
+
+    def _at(self, now):
+        while self.seen + 0.002 <= now:
+            self.seen += 0.002
+            wanted = super().velocity(self.seen)
+            for name, rate in self.rates.items():
+                most = 0.002 * self.RATE
+                self.rates[name] = rate + max(-most, min(most, wanted[name] - rate))
+                self.here[name] += 0.002 * self.rates[name]
+        return dict(self.here)
+
+    def velocity(self, now):
+        self.at(now)
+        return dict(self.rates)
+
+
+def _simulated(body_type, noise=0.0, rule=stopped):
+    """Return the map that is found of a simulated rover, and the failures of a rule, first that on its stops."""
     clock = SimulatedClock()
     body = body_type(rover.LIMITS, clock.now, clock.sleep, noise)
     api = Api(Rover(body), clock, lambda: 0.002)
@@ -235,7 +259,7 @@ def _simulated(body_type, noise=0.0):
     mapped = MappedDevice(api, motion, clock, Binding(api))
     given = {"mapped": mapped, "effort": Effort("quick"), "run": Run(), "motion": motion}
     trace = velocities.play(**{name: given[name] for name in velocities.fixtures})
-    return motion, [case.observed for case in cases_of(stopped, trace, given) if not case.holds]
+    return motion, [case.observed for case in cases_of(rule, trace, given) if not case.holds]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.0005])
@@ -248,6 +272,13 @@ def test_what_stops_late_or_creeps_is_found_by_the_time_and_the_rest_of_a_right_
     assert motion.velocity.settle_s < 0.5, "how late it stopped is no time that it needs"
 
 
+@pytest.mark.parametrize("rule", [stopped, velocity])
+def test_a_rover_gets_the_time_that_it_needs_to_accelerate(rule):
+    motion, failures = _simulated(Accelerating, rule=rule)
+    assert failures == []
+    assert 0.4 < motion.velocity.settle_s < 1.0, "as it was seen at its greatest speed"
+
+
 _NUMBER = {"type": "number"}
 _BODY = {"type": "object", "properties": {"pan": _NUMBER, "timeout_ms": _NUMBER}}
 
@@ -258,6 +289,56 @@ def test_what_an_operation_is_called_says_whether_it_takes_ways():
     by, to = read_operations(document)
     assert [number.is_relative for one in (by, to) for number in commanded_by(one)] == [True, False]
     assert lasting(_BODY) == {"/timeout_ms": 1000.0}
+
+
+_WHEELS = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2, "description": "[left, right] in m/s"}
+_TOKEN = {"type": "object", "properties": {"token": {"type": "string"}}}
+_POSE = {
+    "type": "object",
+    "properties": {"pose": {**_WHEELS, "maxItems": 3, "minItems": 3, "description": "x, y, theta"}},
+}
+
+
+def _described(body, query, path="/lease", state=_POSE):
+    wanted = {"name": query, "in": "query", "required": True, "schema": {"type": "string"}}
+    drive = {
+        "parameters": [wanted],
+        "requestBody": {"content": {"application/json": {"schema": body}}},
+        "responses": {},
+    }
+    release = {"requestBody": {"content": {"application/json": {"schema": _TOKEN}}}, "responses": {}}
+    given = {"responses": {"200": {"content": {"application/json": {"schema": state}}}}}
+    paths = {
+        "/drive": {"post": drive},
+        path: {"post": given},
+        f"{path}/release": {"post": release},
+        "/state": {"get": given},
+    }
+    return read_operations({"openapi": "3.1.0", "info": {}, "paths": paths})
+
+
+def test_a_list_is_driven_by_the_names_of_its_items_and_carries_the_lease_in_the_query():
+    plan = plan_of(_described(_WHEELS, "token"), "POST /drive", None, CallRules())
+    assert [(number.name, number.place) for number in plan.numbers] == [("left", "/0"), ("right", "/1")]
+    assert plan.drive.label == "POST /drive?token={lease}"
+    lease = plan.preparing.lease
+    assert (lease.acquire, lease.release, lease.release_body) == (
+        "POST /lease",
+        "POST /lease/release",
+        {"token": "{lease}"},
+    )
+    assert template_of(_WHEELS, {"/0": "{left}", "/1": "{right}"}) == ["{left}", "{right}"]
+    assert Looks(titles_in(_POSE)).is_heading("/pose/2")
+
+
+def test_what_commands_in_the_query_is_found():
+    query = [{"name": name, "in": "query", "schema": _NUMBER} for name in ("x", "timeout_ms")]
+    operations = read_operations(
+        {"openapi": "3.1.0", "info": {}, "paths": {"/drive": {"put": {"parameters": query, "responses": {}}}}}
+    )
+    found = with_query(operations[0])
+    assert [number.place for number in commanded_by(found)] == ["{x}"]
+    assert found.label == "PUT /drive?x={x}&timeout_ms=1000"
 
 
 def test_numbers_in_texts_are_read_and_a_heading_in_degrees_begins_anew():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+import turntable
 from arm import DESCRIPTION, MAP, Arm
 from judged_devices import judged_by_map
 from processes import ended
@@ -82,3 +83,11 @@ def test_init_proposes_a_map_that_the_names_suggest():
     assert (motion.goto.send, motion.goto.body) == (given["goto"]["send"], given["goto"]["body"])
     assert motion.stop is not None
     assert motion.stop.send == "POST /stop"
+
+
+def test_init_proposes_a_read_for_each_axis_of_a_device_whose_paths_have_ids():
+    proposed = tomllib.loads("\n".join(proposed_map(read_operations(turntable.DESCRIPTION))))["motion"]
+    assert proposed["state"]["read"] == "GET /telescope/{device_number}/azimuth"
+    assert proposed["state"]["axes"]["Altitude"]["read"] == "GET /telescope/{device_number}/altitude"
+    assert proposed["goto"]["send"] == "PUT /telescope/{device_number}/slew"
+    assert proposed["stop"]["send"] == "PUT /telescope/{device_number}/abort"
