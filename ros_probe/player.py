@@ -69,12 +69,13 @@ class Player:
         self._node, self._name = self._made(name), name
         self._servant: Node | None = None
         self._executors: list[Executor] = []
+        self._ends = threading.Event()
         self._spin(SingleThreadedExecutor(context=self._context), self._node)
         self._entities: dict[str, Any] = {}
         self._steps: dict[str, _Steps] = {}
         self._timers: dict[str, Any] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
-        self._news, self._ends = threading.Condition(), threading.Event()
+        self._news = threading.Condition()
         self._commands: dict[str, Callable[..., dict[str, Any]]] = {
             "describe": lambda type: {"types": described(type)},  # noqa: A006 - the command's own word
             "complete": lambda type, value: {"value": plain(message_of(type, value))},  # noqa: A006 - as above
@@ -112,10 +113,13 @@ class Player:
 
     def _spin(self, executor: Executor, node: Node) -> None:
         def spin() -> None:
-            try:
-                executor.spin()
-            except (ExternalShutdownException, ShutdownException):
-                return
+            while not self._ends.is_set():
+                try:
+                    executor.spin()
+                except (ExternalShutdownException, ShutdownException):
+                    return
+                except Exception:  # noqa: BLE001, S112 - a callback's: of a call whose service was destroyed meanwhile
+                    continue
 
         executor.add_node(node)
         self._executors.append(executor)

@@ -137,8 +137,16 @@ def test_a_service_follows_its_script(players, client):
     assert [what for _, what, _ in events] == ["request", "response"] * 2 + ["request"]
     assert events[0][2] == {"data": True}
     assert not never.done()
+    # A response that comes when its service is destroyed ends no other: rclpy raises in the thread of all callbacks.
+    robot.tell("script", name="/reset", script=[{"delay_s": 0.1}])
+    caller.call_async(SetBool.Request())
+    assert [what for _, what, _ in robot.heard("/reset", 1)] == ["request"]
     robot.tell("forget", name="/reset")
     robot.tell("serve", service="/reset", type="std_srvs/srv/SetBool", script=[{}])
+    assert "response" in [what for _, what, _ in robot.heard("/reset", 1)]
+    assert caller.wait_for_service(20)
+    for _ in range(2):
+        assert done(caller.call_async(SetBool.Request())) == SetBool.Response()
 
 
 def test_an_action_follows_its_script(players, client):
