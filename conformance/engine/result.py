@@ -180,7 +180,7 @@ def _api(robot: RobotUnderTest, causes: list[Cause]) -> dict[str, Any]:
     findings = [cause.finding for cause in causes]
     return {
         "api": robot.log.document(robot.rest.call_rules, findings, robot.rest.usual_status),
-        **({"ros": robot.ros_ends.document(findings)} if robot.ros_ends else {}),
+        **({"ros": list(robot.ros_ends.document(findings))} if robot.ros_ends else {}),
     }
 
 

@@ -385,10 +385,13 @@ class RobotUnderTest:
 
     def _is_of_gateway(self, exchange: Exchange) -> bool:
         """Return whether a response has a status of gateways that the first requests of the run did not get."""
-        if exchange.response.status not in OF_GATEWAY or exchange.response.header("retry-after") is not None:
+        status = exchange.response.status
+        # A gateway to a ROS graph says by 503 and 504 that a publisher or a server is away, which a run orders.
+        is_own = self.run.ros and OF_GATEWAY.get(status) is not NoAnswer.BAD_GATEWAY
+        if status not in OF_GATEWAY or is_own or exchange.response.header("retry-after") is not None:
             return False
         before = {one.response.status for one in (self.rest.looked if self.rest else [])}
-        return bool(before) and exchange.response.status not in before
+        return bool(before) and status not in before
 
     def _is_away(self, exchange: Exchange) -> bool:
         """Return whether a gateway responded in the device's place, as to requests that worked before."""

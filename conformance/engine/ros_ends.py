@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from conformance.contract.described import ROS
 from conformance.statement.motion_calls import NAME, names_operation
-from conformance.statement.ros_map import Acts, RosMap
+from conformance.statement.ros_map import RosMap, followers
 from conformance.transport.exchange import Attempt, Request
 from conformance.verdict.finding import Finding
 
@@ -48,26 +48,20 @@ class RosEnds:
         labels = [*self._concerned(request), f"{request.method} {path}"]
         found: dict[str, str] = {}
         for call, one in self._ros.operations.items():
-            more = (one.state.read if one.state else "", one.cancel) if isinstance(one, Acts) else ()
-            found |= {each: call for each in (call, *more) if any(names_operation(each, label) for label in labels)}
+            found |= {
+                each: call for each in (call, *followers(one)) if any(names_operation(each, label) for label in labels)
+            }
         exact = [call for call in found if call == f"{request.method} {request.target}"]
         named = [found[each] for each in found if not NAME.search(each) and path.endswith(each.partition(" ")[2])]
         return list(dict.fromkeys(exact or named or found.values()))
 
-    def document(self, findings: Iterable[Finding]) -> list[dict[str, Any]]:
-        """Return a row for each operation: its end on ROS, how many cases were judged, and the first finding."""
-        of_ros = sorted(
-            (finding for finding in findings if finding.requirement.startswith(f"{ROS}/")),
-            key=lambda finding: finding.number,
-        )
-        return list(
-            self._rows([(finding, self._calls(finding.exchange.request)) for finding in of_ros if finding.exchange])
-        )
-
-    def _rows(self, findings: list[tuple[Finding, list[str]]]) -> Iterator[dict[str, Any]]:
+    def document(self, findings: Iterable[Finding]) -> Iterator[dict[str, Any]]:
+        """Yield a row for each operation: its end on ROS, how many cases were judged, and the first finding."""
+        of_ros = [one for one in findings if one.requirement.startswith(f"{ROS}/") and one.exchange]
+        calls_of = {one.number: self._calls(one.exchange.request) for one in of_ros if one.exchange}
         for call, one in self._ros.operations.items():
             key = next(key for key in _DOES if hasattr(one, key))
-            mine = [finding for finding, calls in findings if call in calls]
+            mine = sorted((each for each in of_ros if call in calls_of[each.number]), key=lambda each: each.number)
             row = {"operation": call, "does": _DOES[key], "name": getattr(one, key), "compared": self._compared[call]}
             row |= {"type": one.type} if key != "lists" else {}
             if mine:

@@ -204,6 +204,12 @@ _KINDS: Final[dict[str, type[Operation]]] = {
 }  # fmt: skip
 
 
+def followers(one: Operation) -> tuple[str, ...]:
+    """Return the operations that read the state of a goal or call, and cancel it."""
+    state = one.state.read if isinstance(one, Acts | Calls) and one.state else ""
+    return tuple(filter(None, (state, one.cancel if isinstance(one, Acts) else "")))
+
+
 class _Forms(msgspec.Struct, frozen=True, kw_only=True):
     """Where a robot is, and how all its messages are written.
 
@@ -241,13 +247,7 @@ class RosMap(_Forms, frozen=True):
     @property
     def calls(self) -> tuple[str, ...]:
         """The operations that the map names."""
-        found = [operation for operation in self.operations.values() if isinstance(operation, Acts | Calls)]
-        states = [one.state.read for one in found if one.state]
-        return (
-            *self.operations,
-            *states,
-            *(mapping.cancel for mapping in found if isinstance(mapping, Acts) and mapping.cancel),
-        )
+        return (*self.operations, *(call for one in self.operations.values() for call in followers(one)))
 
     @property
     def describable(self) -> tuple[str, ...]:

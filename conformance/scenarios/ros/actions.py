@@ -150,9 +150,13 @@ class _Sender:
             Course.FIRST: {},
         }
         for course, step in list(steps.items())[: None if self._body.cancel else 3]:
-            for _ in range(TRIES):
+            for turn in range(TRIES):
                 goals = self._two() if course is Course.FIRST else [self._follow_goal(course, step)]
-                if not any(gave_up(sent, self._body) for goal in goals for sent in (goal.exchange, goal.cancel)):
+                late = any(gave_up(sent, self._body) for goal in goals for sent in (goal.exchange, goal.cancel))
+                # rclpy's action client loses a response that comes before it has noted its request, if a busy machine
+                # pauses it in between.
+                lost = not turn and any(goal.looks and not self._has_ended(list(goal.looks)) for goal in goals[:1])
+                if not (late or lost):
                     break
             yield from goals
         self._gateway.robot.tell("forget", name=self._body.action)

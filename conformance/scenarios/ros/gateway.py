@@ -19,6 +19,7 @@ from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
 from conformance.scenarios.ros.web import document_for, document_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
+from conformance.statement.motion_calls import NAME
 from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange, Outgoing, Response
 from conformance.transport.rosbridge import Subscription
@@ -172,7 +173,8 @@ class Gateway:
         name = (exchange.response.header("Location") or "").rstrip("/").rpartition("/")[2] or None
         if body.id is not None:
             name = value_at(document_of(exchange.response.body).value, body.id)
-        values = {**body.values, "id": str(name)}
+        # The id may have the name that the description's path gives it.
+        values = {**dict.fromkeys(NAME.findall(template), str(name)), **body.values, "id": str(name)}
         return None if name is None else self.binding.make(fill(template, values), fill(content, values) or None)
 
     def read(self, call: str, reads: Reads) -> Exchange:

@@ -268,24 +268,18 @@ def _same(one: float, other: float) -> bool:
 
 def equal(own: Any, other: Any) -> bool:
     """Return whether a ROS message has all values of another one, which may lack fields; NaN equals NaN."""
-    if isinstance(other, dict):
-        return isinstance(own, dict) and all(name in own and equal(own[name], one) for name, one in other.items())
-    if isinstance(other, list):
-        return isinstance(own, list) and len(own) == len(other) and all(map(equal, own, other))
-    if isinstance(other, float) or isinstance(own, float):
-        return isinstance(own, int | float) and isinstance(other, int | float) and _same(own, other)
-    return bool(own == other)
+    return next(changes(own, other), None) is None
 
 
 def changes(own: Any, other: Any, at: str = "") -> Iterator[tuple[str, str, str]]:
     """Yield the differences between two ROS messages: field, own value, other value."""
     if isinstance(other, dict) and isinstance(own, dict) and "b64" not in other:
         for name, one in other.items():
-            yield from changes(own.get(name), one, f"{at}/{name}")
+            yield from changes(own.get(name, _MISSING), one, f"{at}/{name}")
     elif isinstance(other, list) and isinstance(own, list) and len(own) == len(other):
         for number, pair in enumerate(zip(own, other, strict=True)):
             yield from changes(*pair, f"{at}/{number}")
-    elif not equal(own, other):
+    elif not (own == other or (isinstance(own, float) and isinstance(other, float) and _same(own, other))):
         yield at or "/", _value_text(own), _value_text(other)
 
 

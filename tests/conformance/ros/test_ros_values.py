@@ -2,18 +2,22 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import pytest
 import test_msgs.msg
 import toy_messages
 
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.rules.ros_gateway.test_topics import order
 from conformance.scenarios.ros.definition import Definition, put_at, shape_of, value_at
+from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker
 from conformance.scenarios.ros.topics import Burst, Sent
 from conformance.scenarios.ros.web import changes, differences, document_for, document_of, equal
-from conformance.statement.ros_map import Body, Publishes, RosMap
+from conformance.statement.ros_map import Acts, Body, Publishes, RosMap
+from conformance.transport.exchange import Exchange, Request, Response
 from ros_probe.values import described, message_of, plain
 
 TYPES = [f"test_msgs/msg/{name}" for name in dir(test_msgs.msg) if name[0].isupper()]
@@ -156,3 +160,21 @@ def test_order_is_judged_by_messages_that_differ(sent, heard, holds):
     came = tuple(Heard(0.0, "message", json.dumps({"data": ord(one)})) for one in heard)
     trace = (Burst("POST /a", "messages in a row", requests, came),)
     assert [one.holds for one in order.judge(trace, ros)] == holds
+
+
+@pytest.mark.parametrize(("ros", "status", "away"), [("", 503, True), ("play", 503, False), ("play", 502, True)])
+def test_a_topic_without_a_message_is_no_lost_device(ros, status, away):
+    def exchange(status):
+        return Exchange(Request("GET", "http://robot/odom", ()), Response(status, (), b"", 1.0))
+
+    robot = SimpleNamespace(run=SimpleNamespace(ros=ros), rest=SimpleNamespace(looked=[exchange(200)]))
+    assert RobotUnderTest._is_of_gateway(robot, exchange(status)) is away  # noqa: SLF001 - needs no device
+
+
+def test_the_id_of_a_goal_may_have_the_name_that_the_description_gives_it():
+    gateway = SimpleNamespace(binding=SimpleNamespace(make=lambda call, _: call))
+    location = Response(202, (("Location", "/arm/executions/g7"),), b"", 1.0)
+    body = Acts(action="/a", type="test_msgs/action/Fibonacci", values={"app": "arm"})
+    sent = Exchange(Request("POST", "http://robot/arm/executions", ()), location)
+    template = "GET /{app}/executions/{execution}"
+    assert Gateway.following(gateway, sent, body, template, {}) == "GET /arm/executions/g7"

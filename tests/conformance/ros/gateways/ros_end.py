@@ -232,8 +232,11 @@ class RosEnd:
             handle.get_result_async().add_done_callback(lambda done: self._finished(goal, done.result()))
             return True
 
-        sent = client.send_goal_async(request, feedback_callback=lambda came: goal.feedback.append(came.feedback))
-        _passed_on(sent, accepted, responded)
+        self._ask(
+            lambda: client.send_goal_async(request, lambda came: goal.feedback.append(came.feedback)),
+            accepted,
+            responded,
+        )
         return name, goal, accepted
 
     def goal(self, name: str) -> Goal | None:
@@ -246,8 +249,7 @@ class RosEnd:
         if "cancel lost" in self.faults:
             canceled.set_result(result=True)
             return canceled
-        cancelled = goal.handle.cancel_goal_async()
-        _passed_on(cancelled, canceled, lambda response: bool(response.goals_canceling))
+        self._ask(goal.handle.cancel_goal_async, canceled, lambda response: bool(response.goals_canceling))
         return canceled
 
     def topics(self) -> dict[str, str]:
@@ -258,6 +260,10 @@ class RosEnd:
             self._topics |= there
             return self._topics
         return there
+
+    def _ask(self, send: Callable[[], Any], target: Future, converted: Callable[[Any], Any]) -> None:
+        """Send in the executor's thread: rclpy's action client loses a response that comes before it expects one."""
+        self._executor.create_task(lambda: _passed_on(send(), target, converted))
 
     def _late(self, publisher: Any, message: Any) -> None:
         with self._creating:
