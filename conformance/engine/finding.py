@@ -68,6 +68,7 @@ _STATE: Final = re.compile(
 )
 #: Names of members that repeat a command and measure nothing.
 ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
+_LATCHES: Final = re.compile(r"emergency|e-?stop\b|latch|shut|until (?:it is )?reset", re.IGNORECASE)
 _STOPS: Final = re.compile(
     r"(?:stop|halt|cancel|abort)(?:[-_]?(?:slew|goto|go|mov(?:e|es|ing|ement)|motion|all|ax[ie]s|drives?|robot|now))?",
     re.IGNORECASE,
@@ -209,6 +210,7 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
         for operation in operations
         if _STOPS.fullmatch(posixpath.basename(operation.template))
         and operation.method in {"POST", "PUT"}
+        and not _LATCHES.search(operation.text)
         and path.startswith(f"{posixpath.dirname(operation.template).rstrip('/')}/")
     ]
     found = max(stops, key=lambda operation: operation.template.count("/"), default=None)

@@ -354,7 +354,10 @@ class PositionFinder(Finder):
             given |= {"read": own} if own != read else {}
             drift = slope(self._at_rest(own, place)) or 0.0
             given["rest"] = float(f"{max(AT_REST * found.way / found.took_s, 3 * abs(drift)):.3g}")
-            given["tolerance"] = round(max(2 * found.off, 8 * found.sigma, 0.2 * found.way), 5)
+            least, most = limits[name]
+            given["tolerance"] = round(
+                max(2 * found.off, 8 * found.sigma, min(0.2 * found.way, 0.1 * (most - least))), 5
+            )
             declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
             source = "as declared" if declared else "none are declared; so far it was seen to go"
