@@ -14,6 +14,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -43,6 +44,9 @@ ENCODINGS = {
 }
 _SHORT = {"plain", "percent", "base64", "hex"}
 _BASE64 = re.compile(rb"[A-Za-z0-9+/_-]{12,}={0,2}")
+_READABLE = bytes([0, 9, 10, 13, *range(32, 127)])
+#: What `_undone` undoes.
+_ESCAPED = re.compile(r"%[0-9a-fA-F]{2}|&[#a-zA-Z]|\\[ux\"'/\\]")
 
 
 def _sent(request: web.Request, body: bytes) -> str:
@@ -176,6 +180,7 @@ class EchoingService(Device):
 
 def leaks(folder: Path, secrets: Iterable[str], *texts: str) -> list[str]:
     """Return where a secret is in the files of a folder, or in texts, in any form."""
+    secrets = tuple(secrets)
     found = [
         f"{path.relative_to(folder)}: {said}" for path in sorted(folder.rglob("*")) if path.is_file()
         for said in _shown(path.read_bytes(), secrets)
@@ -183,12 +188,13 @@ def leaks(folder: Path, secrets: Iterable[str], *texts: str) -> list[str]:
     return found + [f"terminal: {said}" for text in texts for said in _shown(text.encode("utf-8", "replace"), secrets)]
 
 
+@cache
 def _forms(secret: str) -> set[str]:
     octets = {text.encode() for text in (secret, secret.lower(), secret.upper())}
     return {form.lower() for one in octets for form in (one.decode(), one.decode("latin-1"), one.hex())}
 
 
-def _shown(octets: bytes, secrets: Iterable[str], depth: int = 0) -> Iterator[str]:
+def _shown(octets: bytes, secrets: tuple[str, ...], depth: int = 0) -> Iterator[str]:
     if octets.startswith(b"\x1f\x8b"):
         octets = gzip.decompress(octets)
     readings = [octets.decode("latin-1")]
@@ -197,7 +203,7 @@ def _shown(octets: bytes, secrets: Iterable[str], depth: int = 0) -> Iterator[st
     readings += [re.sub(r"=?(?:\\[rn]|[\r\n])[ \t]*", "", text) for text in readings[:2]]
     readings += [quopri.decodestring(text.encode("latin-1", "replace")).decode("latin-1") for text in readings[-2:]]
     readings.append(_undone(readings[-2]))
-    for text in readings:
+    for text in dict.fromkeys(readings):
         plain = text.replace("\0", "").lower()
         for secret in secrets:
             if at := next((at for form in _forms(secret) if (at := plain.find(form)) >= 0), 0):
@@ -208,25 +214,25 @@ def _shown(octets: bytes, secrets: Iterable[str], depth: int = 0) -> Iterator[st
                 yield from _unpacked(packed.rstrip(b"=")[shift:], secrets, depth)
 
 
-def _unpacked(packed: bytes, secrets: Iterable[str], depth: int) -> Iterator[str]:
-    """Yield what base64 shows, also where it is compressed."""
+@cache  # several files have the same text
+def _unpacked(packed: bytes, secrets: tuple[str, ...], depth: int) -> list[str]:
+    """Return what base64 shows, also where it is compressed."""
     packed = packed[: len(packed) - (len(packed) % 4 == 1)].replace(b"-", b"+").replace(b"_", b"/")
     try:
         octets = base64.b64decode(packed + b"==")
     except binascii.Error:
-        return
+        return []
     for wbits in (15, 31):
         try:
             octets = zlib.decompressobj(wbits).decompress(octets)
         except zlib.error:
             continue
-        yield from _shown(octets, secrets, depth + 1)
-        return
+        return list(_shown(octets, secrets, depth + 1))
     plain = octets.decode("latin-1").replace("\0", "").lower()
-    plain += unquote(plain) + _undone(plain)
-    for secret in secrets:
-        if any(form in plain for form in _forms(secret)):
-            yield f"base64 of {secret!r} in {plain[:200]!r}"
+    if 2 * len(octets.translate(None, _READABLE)) < len(octets) and _ESCAPED.search(plain):
+        plain += unquote(plain) + _undone(plain)
+    found = (secret for secret in secrets if any(form in plain for form in _forms(secret)))
+    return [f"base64 of {secret!r} in {plain[:200]!r}" for secret in found]
 
 
 def _undone(text: str) -> str:

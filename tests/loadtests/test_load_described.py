@@ -5,7 +5,7 @@ import urllib.request
 
 import pytest
 from lxml import etree
-from toy_api import LOGIN, TOKEN
+from toy_api import LOGIN, MAP, TOKEN
 
 from reports.formats.ci_systems import latency_junit
 from reports.latency.noticed import sentences
@@ -152,23 +152,6 @@ def test_https_with_its_own_authority_and_a_login(started, load, certificate, tm
     (tmp_path / "login.json").write_text("{}")
     refused = load(str(statement), SHORT, "--operation 'GET /state'")
     assert (refused.code, "[auth] login = 'POST /login': the device responded 403" in refused.err) == (2, True)
-
-
-MAP = """
-[values]
-speed = [0.5]
-[motion.state]
-read = "GET /where"
-[motion.state.axes]
-x = { at = "/x", limits = [-1000, 1000], tolerance = 0.001 }
-[motion.velocity]
-send = "POST /drive"
-body = { speed = "{speed}" }
-tolerance = 0.1
-axes = { speed = { limits = [-1, 1], at = "/speed" } }
-[motion.stop]
-send = "POST /halt"
-"""
 
 
 @pytest.fixture

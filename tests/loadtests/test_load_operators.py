@@ -1,26 +1,9 @@
 """How late a stop takes effect while several operators read the state of a device that coasts."""
 
 import pytest
+from toy_api import MAP
 
 from reports.latency.page import latency_html
-
-MAP = """
-[values]
-speed = [0.5]
-[motion.state]
-read = "GET /where"
-[motion.state.axes]
-x = { at = "/x", limits = [-1000, 1000], tolerance = 0.001 }
-[motion.velocity]
-send = "POST /drive"
-body = { speed = "{speed}" }
-tolerance = 0.1
-settle_s = 0.2
-axes = { speed = { limits = [-1, 1], at = "/speed" } }
-[motion.stop]
-send = "POST /halt"
-rests_within_s = %s
-"""
 
 
 @pytest.fixture
@@ -29,7 +12,7 @@ def operators(started, load, tmp_path):
 
     def run(coast, promised, *options):
         url, statement = f"http://127.0.0.1:{started('toy_api.py', '--coast', str(coast))[1]}", tmp_path / "robot.toml"
-        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{MAP % promised}')
+        statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n{MAP}rests_within_s = {promised}\n')
         return load(str(statement), "--rate 50 --duration 0.5 --warmup 0.1 --operators 4", *options)
 
     return run

@@ -17,6 +17,23 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import SimpleNamespace
 from typing import ClassVar
 
+#: How it is driven, for a statement.
+MAP = """
+[values]
+speed = [0.5]
+[motion.state]
+read = "GET /where"
+[motion.state.axes]
+x = { at = "/x", limits = [-1000, 1000], tolerance = 0.001 }
+[motion.velocity]
+send = "POST /drive"
+body = { speed = "{speed}" }
+tolerance = 0.1
+settle_s = 0.2
+axes = { speed = { limits = [-1, 1], at = "/speed" } }
+[motion.stop]
+send = "POST /halt"
+"""
 OK = {"description": "good", "content": {"application/json": {"schema": {"type": "object"}}}}
 ITEM = {"name": "item_id", "in": "path", "required": True, "schema": {"type": "string"}}
 SPEED = {"type": "object", "properties": {"speed": {"type": "number"}}, "required": ["speed"]}

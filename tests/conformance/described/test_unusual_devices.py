@@ -59,5 +59,5 @@ def test_faults_are_found(device, arguments, faults, tmp_path):
 
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_a_crash_now_and_then_is_one_finding(seed, tmp_path):
-    done = _certified(devices.unions, (), tmp_path, {"500 now and then"}, seed)
+    done = _certified(devices.unions, ("--class", "robustness"), tmp_path, {"500 now and then"}, seed)
     assert done.blamed == {"robustness/no-server-error": "fail"}, done.text

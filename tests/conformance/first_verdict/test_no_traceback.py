@@ -51,14 +51,11 @@ def test_formats_of_a_device_that_refuses_everything_are_not_seen(tmp_path):
     assert outcome.blamed == {}
 
 
-def _certify(url: str, out: Path, *more: str) -> list[str]:
-    return [sys.executable, "-m", "roaas", "certify", f"{url}/openapi.json", "--effort=quick", f"--out={out}", *more]
-
-
 @pytest.mark.parametrize("streams", ["2>&-", ">&-", ">&- 2>&-", "| head -c 1", "2>&1 | true", ">/dev/full 2>/dev/full"])
 def test_the_exit_code_is_the_verdict_whoever_reads_the_output(tmp_path, streams):
     with small_device(described({"/state": reading(_OBJECT)}), {"/state": constant({})}) as url:
-        command = f"set -o pipefail; {' '.join(_certify(url, tmp_path))} {streams}"
+        words = f"certify {url}/openapi.json --class description --effort quick --out {tmp_path}"
+        command = f"set -o pipefail; {sys.executable} -m roaas {words} {streams}"
         done = subprocess.run(["bash", "-c", command], check=False, capture_output=True, text=True, timeout=100)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
     assert json.loads((tmp_path / "result.json").read_text())["verdict"] == "conformant"

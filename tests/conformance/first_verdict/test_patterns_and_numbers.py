@@ -102,7 +102,7 @@ def test_what_is_right_by_ecma_262_and_json_passes(tmp_path):
 def test_what_is_wrong_by_ecma_262_and_by_its_format_is_told(tmp_path):
     paths, routes = _device(1, 1)
     with small_device(described(paths, "3.1.0"), routes) as url:
-        said = certified(f"{url}/openapi.json", tmp_path / "out")
+        said = certified(f"{url}/openapi.json", tmp_path / "out", "--class", "description")
     assert said.exit_code == 1
     assert said.blamed == {"description/body-schema": "fail", "description/formats": "warn"}, said.text
     told = json.dumps(said.requirement("description/body-schema"))
@@ -129,7 +129,7 @@ def test_a_pattern_that_cannot_be_judged_is_told_and_the_rest_is_judged(tmp_path
         return web.json_response({"v": "a" * 60 + "!"}) if is_right else error(400, "no letters a")
 
     with small_device(described(paths, "3.1.0"), {"/t": {"GET": taking_letters}, "/other": constant(1)}) as url:
-        said = certified(f"{url}/openapi.json", tmp_path / "out")
+        said = certified(f"{url}/openapi.json", tmp_path / "out", "--class", "description")
     assert said.exit_code == exit_code, said.text
     assert text in said.text
     if exit_code == 1:

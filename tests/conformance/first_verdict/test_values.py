@@ -143,7 +143,7 @@ def test_a_status_that_the_application_decides_on_has_to_be_declared(tmp_path):
     ok = {"200": answers({"type": "object"})}
     paths = {path: {"get": {"parameters": [_STATES], "responses": ok | more}} for path, more in declared.items()}
     with small_device(described(paths), {path: {"GET": _locked} for path in paths}) as url:
-        seen = certified(f"{url}/openapi.json", tmp_path / "out")
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--class", "description")
     found = {one["operation"]: len(one["findings"]) for one in seen.result["api"]["operations"]}
     assert found == {"GET /bare": 3, "GET /class": 0, "GET /default": 0, "GET /each": 0}
     assert seen.blamed == {"description/status-declared": "fail"}
