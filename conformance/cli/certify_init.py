@@ -16,7 +16,7 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.ros_map import RosMap
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 from conformance.target.connecting import connection_of
-from conformance.target.describing import fetch_description, is_wsdl
+from conformance.target.describing import fetch_description, is_wsdl, trusting
 from conformance.target.naming import DeviceOptions
 from conformance.transport.client import HttpClient
 from ros_probe.process import ProbeError
@@ -77,7 +77,9 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         base_url = api.base_url or found.base_url
         if options.ros and not base_url:
             raise StatementError(f"{source} does not say where the operations are: give --base-url")
-        client = HttpClient(base_url or "", connection_of(where))
+        connection = connection_of(where)
+        connection.trust = trusting(connection, source, api.base_url)
+        client = HttpClient(base_url or "", connection)
         domain_id = RosMap({}, domain_id=options.ros_domain_id).domain
         ros = partial(ros_proposals, domain_id=domain_id, client=client) if options.ros else None
         write_described_statement(path, found, api, Calls(options.allow, options.never), ros)

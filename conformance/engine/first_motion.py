@@ -104,16 +104,11 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
 
 def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
     """Yield a sentence on each operation that may move the device, where no map is proposed."""
-    for operation in operations:
-        numbers = [] if operation.safe else commanded_by(operation)
-        if operation.safe:
-            continue
-        if operation.never or not numbers:
-            yield f"{operation.label}: {'it must never be called' if operation.never else 'it takes no numbers'}."
-            continue
-        named = ", ".join(number.name for number in numbers)
-        way = f"--drive '{operation.label}' finds what shows them"
-        yield f"{operation.label}: no GET tells numbers called {named}; {way}."
+    for operation in (item for item in operations if not item.safe):
+        named = "" if operation.never else ", ".join(number.name for number in commanded_by(operation))
+        why = f"no GET tells numbers called {named}; --drive '{operation.label}' finds what shows them"
+        none = "it must never be called" if operation.never else "it takes no numbers"
+        yield f"{operation.label}: {why if named else none}."
 
 
 def _sending_lines(pair: _Pair) -> Iterator[str]:

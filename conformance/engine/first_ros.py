@@ -1,7 +1,8 @@
 """``roaas certify --init --ros``: a ROS map as the description and the live graph suggest it, for a person to check.
 
 An operation is taken for the topic, service or action whose fields its schemas have, by name and type, and whose name
-its path or operationId shares. What is left to guess becomes a comment.
+its path or operationId shares; or which a list names beside the value of the path's parameter. What is left to guess
+becomes a comment.
 """
 
 from __future__ import annotations
@@ -9,9 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
+from urllib.parse import quote
 
 from conformance.contract.toml_file import basic_string
 from conformance.documents.json_schema import Schema, kinds_of
@@ -43,6 +45,12 @@ _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_descript
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
+# _KINDS: ends of the graph. _HOLDS: by part of a goal or call, names of an object without declared fields for it.
+_KINDS: Final = ("topics", "services", "actions")
+_HOLDS: Final = {
+    "feedback": re.compile(r"/[^/]*(feedback|progress)$"),
+    "result": re.compile(r"/[^/]*(result|outcome|output|response|parameters)$"),
+}
 #: By state of a goal: beginnings of words for it, and the numbers of action_msgs/msg/GoalStatus.
 _STATES: Final = {
     "running": r"run|exec|activ|accept|pend|work|cancell?ing|[123]$",
@@ -54,19 +62,42 @@ _STATES: Final = {
 
 
 class Graph(NamedTuple):
-    """Contents of the ROS graph: types by name of topic, service and action, and definitions of types."""
+    """Contents of the ROS graph: types by name of topic, service and action, and definitions of types.
+
+    ``read`` has what operations returned, by label: the document, or the status of what was no success; ``named`` those
+    with values of their parameters, and the ROS names that lists give for them. ``is_named``: the graph is one such
+    name, so that a body without declared fields may hold its messages.
+    """
 
     topics: dict[str, str]
     services: dict[str, str]
     actions: dict[str, str]
     definition: Callable[[str], Definition]
+    read: dict[str, Any]
+    named: dict[str, tuple[Operation, str]]
+    is_named: bool = False
 
-    def fitting(self, schema: Schema | None, ends: dict[str, str], part: str = "") -> dict[str, Fit]:
-        """Return by name the ends of the graph whose type, or a part of it, has a schema's fields."""
+    def only(self, name: str) -> Graph:
+        """Return the graph with nothing but one name."""
+        ends: dict[str, Any] = {
+            kind: {key: one for key, one in getattr(self, kind).items() if key == name} for kind in _KINDS
+        }
+        return self._replace(**ends, is_named=True)
+
+    def fitting(
+        self, schema: Schema | None, ends: dict[str, str], part: str = "", holder: re.Pattern[str] | None = None
+    ) -> dict[str, Fit]:
+        """Return by name the ends of the graph whose type, or a part of it, has a schema's fields.
+
+        An object without declared fields has them if its name is that of a ``holder``, or if a list names the end.
+        """
         found, places = {}, _places(schema or {})
+        objects = [at for at, leaf in _leaves(schema or {}) if kinds_of(leaf) == {"object"}]
+        objects = [at for at in objects if (holder.search(at) if holder else self.is_named)]
         for name, type_ in ends.items():
             with suppress(ProbeError):  # the message type is not installed
                 fit = _fit(places, self.definition(type_ + part))
+                fit = Fit(objects[0], {}, _FEW, 0, {}) if objects and not (fit and fit.size) else fit
                 if fit is not None and not (part and fit.lacks):
                     found[name] = fit
         return found
@@ -113,26 +144,56 @@ def ros_proposals(operations: Sequence[Operation], domain_id: int, client: HttpC
     """
     read: dict[str, Any] = {}
     until = WALL_CLOCK.now() + _READS_S
-    for one in operations:
-        if WALL_CLOCK.now() < until and one.method == "GET" and one.shape is not None and "{" not in one.template:
+
+    def get(one: Operation) -> Any:
+        is_new = one.label not in read and one.method == "GET" and one.shape is not None and "{" not in one.template
+        if is_new and WALL_CLOCK.now() < until:
             # A gateway may subscribe only when a client reads.
             with suppress(NoAnswerError):
                 exchange = client.send("GET", one.template, headers=(("Accept", "*/*"),), timeout_s=_READ_S)
                 response = exchange.response
                 read[one.label] = read_json(response.body).value if response.ok else response.status
+        return read.get(one.label)
+
+    for operation in operations:
+        get(operation)
     robot = Robot(domain_id, "roaas_init")
     try:
         robot.await_ready()
         told = _settled_graph(robot)
-        topics = {name: one["types"] for name, one in told["topics"].items()}
+        ends = {name: one for kind in _KINDS for name, one in told[kind].items()}
+        types = {name: one["types"] if isinstance(one, dict) else one for name, one in ends.items()}
         topics, services, actions = (
-            {name: types[0] for name, types in named.items() if types and not _COMMON.search(name)}
-            for named in (topics, told["services"], told["actions"])
+            {name: types[name][0] for name in told[kind] if types[name] and not _COMMON.search(name)} for kind in _KINDS
         )
-        graph = Graph(topics, services, actions, robot.definition)
-        yield from proposed_ros_map(operations, graph, domain_id, read)
+        named = {one.label: (one, name) for one, name in _with_values(operations, ends, get)}
+        graph = Graph(topics, services, actions, robot.definition, read, named)
+        yield from _map_lines([*operations, *(one for one, _ in named.values())], graph, domain_id)
     finally:
         robot.close()
+
+
+def _with_values(
+    operations: Sequence[Operation], ends: dict[str, Any], get: Callable[[Operation], Any]
+) -> Iterator[tuple[Operation, str]]:
+    """Yield operations with the values that lists give to the parameters of their paths, and the ROS name of each."""
+    left = [(one.template, one, "") for one in operations if "{" not in one.template]
+    for template, operation, _ in left:
+        value = get(operation) if len(left) < _LEAVES else None
+        lists = [value, *(value.values() if isinstance(value, dict) else ())]
+        for item in (item for found in lists if isinstance(found, list) for item in found if isinstance(item, dict)):
+            texts = [text for text in item.values() if isinstance(text, str)]
+            name = next((text for text in texts if text in ends), "")
+            for other in operations:
+                parameter, end, rest = other.template.removeprefix(f"{template}/{{").partition("}")
+                id_ = next((item[key] for key in (parameter, "id", "name") if isinstance(item.get(key), str)), "")
+                if end and id_ and other.template.startswith(f"{template}/{{"):
+                    made = replace(other, template=f"{operation.template}/{quote(id_, safe='')}{rest}")
+                    way = {"GET": "subscribers"}.get(made.method, "publishers")
+                    if "{" not in rest:
+                        left.append((other.template, made, name))
+                    if name and (rest or way not in ends[name] or ends[name][way]):
+                        yield made, name
 
 
 def _settled_graph(robot: Robot) -> dict[str, Any]:
@@ -146,17 +207,8 @@ def _settled_graph(robot: Robot) -> dict[str, Any]:
         seen = now
 
 
-def proposed_ros_map(
-    operations: Sequence[Operation], graph: Graph, domain_id: int, read: dict[str, Any]
-) -> Iterator[str]:
-    """Yield the lines of a ROS map; operations that are guesses or do not fit become comments.
-
-    Args:
-        operations: of the description.
-        graph: the ROS graph.
-        domain_id: its domain.
-        read: what operations returned, by label: the document, or the status of what was no success.
-    """
+def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) -> Iterator[str]:
+    """Yield the lines of a ROS map; operations that are guesses or do not fit become comments."""
     found: dict[str, _Proposal] = {}
     followers: set[str] = set()
     written: set[str] = set()
@@ -164,16 +216,12 @@ def proposed_ros_map(
     for operation in sorted(operations, key=lambda item: item.method == "GET"):
         if "{" in operation.template:
             continue
-        if operation.method in _SENDS:
-            proposal = (
-                _goal(operation, operations, graph, followers)
-                or _call(operation, graph)
-                or _topic(operation, graph, written)
-            )
-        else:
-            proposal = _lists(operation, graph, read.get(operation.label)) or _topic(
-                operation, graph, written, read.get(operation.label)
-            )
+        there = graph.only(graph.named[operation.label][1]) if operation.label in graph.named else graph
+        proposal = (
+            _goal(operation, operations, there, followers) or _call(operation, there)
+            if operation.method in _SENDS
+            else _lists(operation, there)
+        ) or _topic(operation, there, written)
         if proposal:
             found[operation.label] = proposal
             written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
@@ -192,7 +240,7 @@ def proposed_ros_map(
             comment = "# " if proposal.guess else ""
             yield from [f"# A guess: {proposal.guess}"] if proposal.guess else []
             yield f"{comment}{basic_string(operation.label)} = {inline(proposal.keys)}"
-        elif operation.label not in followers:
+        elif operation.label not in {*followers, *graph.named}:
             label = "".join(char if char.isprintable() else " " for char in operation.label)
             yield f"# {label}: {_why_not(operation, graph)}"
 
@@ -209,7 +257,7 @@ def _why_not(one: Operation, graph: Graph) -> str:
     return f"nothing on the graph has its fields, of {ends}"
 
 
-def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = None) -> _Proposal | None:
+def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal | None:
     """Return the proposal that an operation reads a topic, or publishes on it.
 
     A declared 404 may be for anything: `absent` is a status that it returned, for want of a message, as it seems.
@@ -221,8 +269,8 @@ def _topic(one: Operation, graph: Graph, written: Collection[str], read: Any = N
     name, guess = _best(one, fits, written if reads else ())
     if not name:
         return None
-    none = isinstance(read, int) and read in {HTTPStatus.NOT_FOUND, HTTPStatus.SERVICE_UNAVAILABLE}
-    absent = [read] if none else []
+    read = graph.read.get(one.label)
+    absent = [read] if read in (HTTPStatus.NOT_FOUND, HTTPStatus.SERVICE_UNAVAILABLE) else []
     keys = {"topic" if reads else "publishes": name, "type": graph.topics[name]} | fits[name].keys
     return _Proposal(keys | ({"absent": absent} if absent else {}), fits[name].forms, guess)
 
@@ -258,32 +306,42 @@ def _call(one: Operation, graph: Graph) -> _Proposal | None:
 
 
 def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followers: set[str]) -> _Proposal | None:
-    """Return the proposal that an operation sends goals to an action; those that follow a goal go to ``followers``."""
-    fits = graph.fitting(body_schema(one), graph.actions, "#Goal")
+    """Return the proposal that an operation sends goals to an action, or begins calls that are followed like goals.
+
+    The operations that follow a goal go to ``followers``.
+    """
+    ends, part = (graph.actions, "Goal") if graph.actions or not graph.is_named else (graph.services, "Request")
+    fits = graph.fitting(body_schema(one), ends, f"#{part}")
     name, guess = _best(one, fits)
     id_ = next((at for at, _ in _leaves(one.shape or {}) if re.search(r"[/_]u?u?id$", at)), None)
     if not name or id_ is None:
         return None
-    keys = {"action": name, "type": graph.actions[name]} | fits[name].keys | {"id": id_}
+    is_goal = part == "Goal"
+    keys = {"action" if is_goal else "service": name, "type": ends[name]} | fits[name].keys | {"id": id_}
     forms = dict(fits[name].forms)
-    goal = re.compile(re.escape(one.template.rstrip("/")) + r"/\{[^{}]+\}(/[^{}]*)?")
-    for other in (other for other in operations if goal.fullmatch(other.template)):
-        call = f"{other.method} {_PARAMETER.sub('{id}', other.template)}"
-        cancels = other.method == "DELETE" if other.template.endswith("}") else _CANCELS.search(other.template)
-        if cancels and other.method != "GET":
-            keys["cancel"] = call
-        elif other.method == "GET" and other.shape is not None and "state" not in keys:
-            states = ((at, leaf) for at, leaf in _leaves(other.shape) if re.search("/(state|status|phase)$", at))
-            at, leaf = next(states, ("", {}))
-            keys |= {"state": {"read": call, "at": at} | _states(leaf)} if at else {}
-            for part in ("Feedback", "Result") if at else ():
-                for fit in graph.fitting(other.shape, {name: graph.actions[name]}, f"#{part}").values():
-                    keys |= {part.lower(): fit.at} if fit.at and not fit.fields else {}
-                    forms |= fit.forms
-        else:
-            continue
-        followers.add(other.label)
-    return _Proposal(keys, forms, guess)
+    # All goals may be in one place, beside the operations that send them.
+    for place in (one.template.rstrip("/"), one.template.rstrip("/").rpartition("/")[0]):
+        goal = re.compile(re.escape(place) + r"/\{[^{}]+\}(/[^{}]*)?")
+        for other in (other for other in operations if goal.fullmatch(other.template)):
+            call = f"{other.method} {_PARAMETER.sub('{id}', other.template)}"
+            cancels = other.method == "DELETE" if other.template.endswith("}") else _CANCELS.search(other.template)
+            if cancels and other.method != "GET":
+                keys |= {"cancel": call} if is_goal else {}
+            elif other.method == "GET" and other.shape is not None and "state" not in keys:
+                states = [(at, leaf) for at, leaf in _leaves(other.shape) if re.search("[/_](state|status|phase)$", at)]
+                at, leaf = max(states, key=lambda pair: len(_states(pair[1])), default=("", {}))
+                keys |= {"state": {"read": call, "at": at} | _states(leaf)} if at else {}
+                for held, names in list(_HOLDS.items())[not is_goal :] if at else ():
+                    part = held.capitalize() if is_goal else "Response"
+                    for fit in graph.fitting(other.shape, {name: ends[name]}, f"#{part}", names).values():
+                        keys |= {held: fit.at} if fit.at and not fit.fields else {}
+                        forms |= fit.forms
+            else:
+                continue
+            followers.add(other.label)
+        if "state" in keys or "cancel" in keys:
+            break
+    return _Proposal(keys, forms, guess) if is_goal or "state" in keys else None
 
 
 def _states(leaf: Schema) -> dict[str, list[str]]:
@@ -296,12 +354,12 @@ def _states(leaf: Schema) -> dict[str, list[str]]:
     return found
 
 
-def _lists(one: Operation, graph: Graph, read: Any) -> _Proposal | None:
+def _lists(one: Operation, graph: Graph) -> _Proposal | None:
     """Return the proposal that an operation lists the graph, if its response contains all names of one kind."""
     for at, leaf in _leaves(one.shape or {}):
         items = _items(leaf)
         members = dict(_leaves(items)) if items else {}
-        listed = value_at(read, at)
+        listed = value_at(graph.read.get(one.label), at)
         for kind, ends in (("topics", graph.topics), ("services", graph.services), ("actions", graph.actions)):
             for name in members if ends and isinstance(listed, list) else ():
                 if {*ends} <= {str(value_at(item, name)) for item in listed}:

@@ -57,8 +57,10 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         failure: how a 2xx response says that its request failed; None: by no value.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
             long it waits for a service that does not respond is not judged.
+        type: of the message, service or action.
     """
 
+    type: str = ""
     at: Pointer = ""
     fields: dict[Pointer, Pointer] = {}
     values: dict[str, Any] = {}

@@ -37,6 +37,8 @@ _DISCOVERY_S: Final = 15.0
 _KEYS: Final[dict[type, str]] = {
     Reads: "topic", Publishes: "publishes", Calls: "service", Acts: "action", Lists: "lists"
 }  # fmt: skip
+#: What of a type an operation is sent.
+_PARTS: Final[dict[type, str]] = {Calls: "#Request", Acts: "#Goal"}
 
 
 @dataclass
@@ -163,7 +165,7 @@ class Gateway:
             # Its id identifies the response to this message.
             body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
-            document = document_for(value, self.definition(_type_of(body)), body, self.ros)
+            document = document_for(value, self.definition(body.type + _PARTS.get(type(body), "")), body, self.ros)
         return self.binding.make(fill(call, body.values), document)
 
     def following(
@@ -225,15 +227,3 @@ def exchange_of(stream: Stream, message: Message | None) -> Exchange:
     if message is None:
         return Silence(stream.request, Response(HTTPStatus.NOT_FOUND, (), b"", 0.0))
     return Exchange(stream.request, Response(HTTPStatus.OK, (), message.octets, 0.0, received_s=message.at))
-
-
-def _type_of(body: Body) -> str:
-    """Return the name of the type that an operation is sent."""
-    match body:
-        case Calls():
-            return f"{body.type}#Request"
-        case Acts():
-            return f"{body.type}#Goal"
-        case Publishes() | Reads():
-            return body.type
-    raise TypeError(type(body).__name__)

@@ -40,9 +40,10 @@ _BESIDE: Final = 4
 _HELD_S, _HELD = 0.8, 5.0
 # A request that a call holds up ends at most this long before the call's response, s.
 _TOGETHER_S: Final = 0.25
-# _OVERTAKEN_S: how much earlier every second of many concurrent calls is answered than the one before, s. _CALLS: their
-# number.
+# _OVERTAKEN_S: how much earlier every second of many concurrent calls is answered than the one before, s. _FEW: so many
+# at quick. _CALLS: calls one by one.
 _OVERTAKEN_S: Final = 0.1
+_FEW: Final = 4
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
 
 
@@ -171,8 +172,7 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
             with gateway.robot.publishing(body.service):
                 caller = _Caller(gateway, call, body, request, responses[call])
                 probes.extend(caller.calls(effort))
-                if effort.name != "quick":
-                    crowds.append(caller.of_many())
+                crowds.append(caller.of_many(_FEW if effort.name == "quick" else CROWD))
     return Services(tuple(probes), responses, tuple(crowds))
 
 
@@ -208,19 +208,19 @@ class _Caller:
         self._serve([{"answer": {}}])
         yield self._reach_server(Server.BACK)
 
-    def of_many(self) -> Crowd:
+    def of_many(self, number: int) -> Crowd:
         """Call from many clients at once. It comes last, as calls that were given up may still reach the server."""
         robot, body = self._gateway.robot, self._body
-        requests = [self._complete("Request", self._requests.usual().value) for _ in range(CROWD)]
+        requests = [self._complete("Request", self._requests.usual().value) for _ in range(number)]
         script = [
             {"answer": self._complete("Response", self._responses.usual().value), "delay_s": _OVERTAKEN_S * (turn % 2)}
-            for turn in range(CROWD)
+            for turn in range(number)
         ]
         robot.tell("script", name=body.service, script=[*script, {}])
         robot.take_heard(body.service)
         made = [[self._gateway.request(self._call, body, request)] for request in requests]
         attempts = [(self._outcome(one),) for (one,) in crowd(self._gateway.api.client, made, body.within_s + _LATE_S)]
-        heard = tuple(robot.take_heard(body.service, 2 * CROWD, _MORE_S))
+        heard = tuple(robot.take_heard(body.service, 2 * number, _MORE_S))
         return Crowd(self._call, body, tuple(map(json.dumps, requests)), tuple(one for (one,) in attempts), heard)
 
     def _serve(self, script: list[dict[str, Any]]) -> None:

@@ -44,6 +44,8 @@ def test_the_map_of_a_right_gateway_is_found(tmp_path, domain_id, style):
 STAMP = {"type": "object", "properties": {"sec": {"type": "integer"}, "nanosec": {"type": "integer"}}}
 HEADER = {"type": "object", "properties": {"stamp": STAMP, "frameId": {"type": "string"}}}
 PLACE = {"header": HEADER} | {name: {"type": "number"} for name in ("pointX", "pointY", "pointZ")}
+OBJECT = {"type": "object"}
+GOAL = {"id": {"type": "string"}, "state": {"enum": ["runs", "done", "failed", "canceled"]}, "output": OBJECT}
 VELOCITY = {f"{part}{axis}": {"type": "number"} for part in ("linear", "angular") for axis in "XYZ"}
 
 
@@ -52,12 +54,21 @@ def _paths():
         return {"content": {"application/json": {"schema": {"type": "object", "properties": members}}}}
 
     done = {"200": {"description": "done"} | content({}), "422": {"description": "refused"} | content({})}
+    goal = {"201": {"description": "a goal"} | content(GOAL)}
     read = {"200": {"description": "a place"} | content(PLACE), "404": {"description": "none"} | content({})}
     return {
         "/place": {"get": {"responses": read}},
         "/cmd/velocity": {"post": {"requestBody": {"required": True} | content(VELOCITY), "responses": done}},
         "/halt": {"post": {"requestBody": content({"hard": {"type": "boolean"}}), "responses": done}},
         "/places/{id}": {"get": {"responses": read}},
+        "/goals/count": {"post": {"requestBody": content({"order": {"type": "integer"}}), "responses": goal}},
+        "/goals/{goal}": {"get": {"responses": goal}, "delete": {"responses": goal}},
+        "/apps": {"get": {"responses": {"200": {"description": "all"} | content({})}}},
+        "/apps/{app}/data": {"get": {"responses": {"200": {"description": "all"} | content({})}}},
+        "/apps/{app}/data/{name}": {
+            "get": {"responses": {"200": {"description": "a message"} | content({"data": OBJECT})}},
+            "put": {"requestBody": content({}), "responses": done},
+        },
     }
 
 
@@ -69,6 +80,9 @@ def _renaming(domain_id):
     ros.tell("listen", topic="/robot1/place", type="geometry_msgs/msg/PointStamped")
     twist = {"topic": "/robot1/cmd_vel", "type": "geometry_msgs/msg/Twist"}
     ros.tell("publish", **twist)
+    ros.tell("act", action="/robot1/count", type="test_msgs/action/Fibonacci", script=[])
+    lists = {"/apps": [{"id": "arm"}], "/apps/arm/data": [{"id": "its/place", "topic": "/robot1/place"}]}
+    raw = {}
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version, disable_nagle_algorithm = "HTTP/1.1", True
@@ -85,12 +99,16 @@ def _renaming(domain_id):
             with lock:
                 for _, _, value in ros.tell("heard", name="/robot1/place")["events"]:
                     header, point = value["header"], value["point"]
+                    raw.update({"data": value})
                     last.update({"header": {"stamp": header["stamp"], "frameId": header["frame_id"]}})
                     last.update({f"point{axis.upper()}": one for axis, one in point.items()})
             if self.path == "/openapi.json":
                 self.answer(200, {"openapi": "3.1.0", "info": {"title": "x", "version": "1"}, "paths": _paths()})
+            elif self.path in lists:
+                self.answer(200, {"items": lists[self.path]})
             else:
-                self.answer(*((200, last) if last and self.path == "/place" else (404, {})))
+                found = {"/place": last, "/apps/arm/data/its%2Fplace": raw}.get(self.path)
+                self.answer(*((200, found) if found else (404, {})))
 
         def do_POST(self):
             try:
@@ -132,8 +150,17 @@ def test_names_that_differ_are_mapped_and_a_run_with_the_map_passes(tmp_path, do
     assert tables["POST /cmd/velocity"]["fields"] == {
         f"/{part}{axis.upper()}": f"/{part}/{axis}" for part in ("linear", "angular") for axis in "xyz"
     }
+    # A list names the topic of a path's value; who publishes on it is not the gateway.
+    listed = {"topic": "/robot1/place", "type": "geometry_msgs/msg/PointStamped", "at": "/data", "absent": [404]}
+    assert tables["GET /apps/arm/data/its%2Fplace"] == listed
+    assert not any(call.startswith("PUT") for call in tables)
+    # Goals may be in one place, beside what sends them.
+    words = {"running": ["runs"], "succeeded": ["done"], "aborted": ["failed"], "canceled": ["canceled"]}
+    goal = {"state": {"read": "GET /goals/{id}", "at": "/state"} | words, "result": "/output", "id": "/id"}
+    goal |= {"action": "/robot1/count", "type": "test_msgs/action/Fibonacci", "cancel": "DELETE /goals/{id}"}
+    assert tables["POST /goals/count"] == goal
     for line in (
-        "# POST /halt: nothing on the graph has its fields, of 2 topics, 0 services and 0 actions",
+        "# POST /halt: nothing on the graph has its fields, of 2 topics, 0 services and 1 actions",
         "# GET /places/{id}: its path has a parameter: write an operation for each value",
     ):
         assert line in path.read_text(encoding="utf-8")
