@@ -14,6 +14,7 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.call_rules import words_of
+from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import collection_of, object_in
 from conformance.checkers.occasion import Occasion
@@ -23,6 +24,7 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
 from conformance.verdict.evidence import Case
 
 _ABSENT: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
@@ -31,10 +33,16 @@ _MOST_THINGS: Final = 1_000
 _KEPT: Final = "description/refused-keeps"
 # A device may carry out an operation this long after its response, s.
 _SETTLES_S: Final = 3.0
-# Phrases in a description for the only states in which an operation is not refused.
-_ONLY_FROM: Final = re.compile(
-    r"\b(?:409|refuse[sd]?|conflict)\b[^.;]*\bunless\b((?:(?!\bnot\b)[^.;])*)", re.IGNORECASE
+# Phrases in a description: for the state to which an operation leads, and for the conditions on which it is refused.
+_LEADS: Final = re.compile(
+    r"\b(?:is|are) (?:then|now|afterwards) `?([\w-]+)|\b(?:becomes?|goes (?:in)?to|turns) `?([\w-]+)", re.IGNORECASE
 )
+_REFUSED: Final = re.compile(
+    r"\b(?:409|refuse[sd]?|conflict)\b([^.;:]*?\b(?:if|when|while|unless)\b[^.;:]*)", re.IGNORECASE
+)
+# The subject of such a condition, and its predicate; words beside a state in that.
+_IS: Final = re.compile(r"\b(unless )?(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
+_BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
 _DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
@@ -105,12 +113,12 @@ class Changes:
             for operation in operations
             if "409" in operation.responses and (found := _alone(operation))
         }
-        # By operation: the states in which alone it is not refused, by the description.
-        self._only = {
-            operation.label: only
+        # By operation: the state to which it leads by its description.
+        self._leads = {
+            operation.label: state
             for operation in operations
             if (template := operation.template.rpartition("/")[0]) in self._states
-            if (only := _only(operation, _states_of(reads[template], self._states[template])))
+            if (state := leads_to(operation, reads[template], self._states[template]))
         }
         self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
         # By path template: members that never decrease. Below, by path: their last values.
@@ -177,10 +185,6 @@ class Changes:
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
-        only = self._only.get(operation.label, frozenset({was}))
-        if now and was in FINAL and was not in only:
-            expected = f"a refusal, as the thing was {was}, and not {' or '.join(sorted(only))}"
-            yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
         for said in self._alone.get(operation.label, ()) if now else ():
             if said == now:
                 near = path.rpartition("/")[0]
@@ -188,6 +192,8 @@ class Changes:
                 for other in (one for one in others if one.rpartition("/")[0] == near):
                     self._claims[other].append((occasion, now))
         if now:
+            # A device may act later than it responds.
+            now = self._leads.get(operation.label, now) if now == was else now
             is_news = now != was
             at_s = occasion.response.received_s
             self._known[path] = _State(now, at_s, was if is_news else "", operation.label if is_news else "")
@@ -233,7 +239,7 @@ class Changes:
             return
         wrong, expected = "", f"{before.value} as {name}, as it was read before"
         if before.told and now != before.value:
-            expected = f"{before.value} as {name}, which the response to {before.told} said"
+            expected = f"{before.value} as {name}, to which {before.told} led by its response or description"
             lost = before.value in FINAL and now not in _AWAY
             wrong = now if lost or (now == before.was and is_late) else ""
         elif before.refused and now in _CANCELLED and before.value not in FINAL:
@@ -291,10 +297,12 @@ def _states_of(read: Operation, name: str) -> tuple[str, ...]:
     return tuple(map(str, flat(flat(read.shape or {}).get("properties", {}).get(name, {})).get("enum", ())))
 
 
-def _only(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
-    """Return the states in a phrase such as "409 unless the job is queued or paused"."""
-    said = [found[1] for found in _ONLY_FROM.finditer(operation.text)]
-    return frozenset(state for state in states for text in said if re.search(rf"\b{re.escape(state)}\b", text))
+def leads_to(operation: Operation, read: Operation, name: str) -> str:
+    """Return the one state to which an operation leads by its description, as in "The job is then paused"."""
+    sentences = [text for text in re.split(r"[.;:]\s", operation.text) if not _UNLESS.search(text)]
+    said = {word for text in sentences for found in _LEADS.finditer(text) for word in found.groups() if word}
+    found = [state for state in _states_of(read, name) if state in said]
+    return found[0] if len(found) == 1 else ""
 
 
 def _growing(read: Operation) -> frozenset[str]:
@@ -340,7 +348,7 @@ _TWICE: Final = 2
 
 
 class Transitions:
-    """Judges operations of things by the read before them.
+    """Judges operations in states in which they are refused by the description, by the read before them.
 
     Args:
         contract: the description's.
@@ -348,67 +356,111 @@ class Transitions:
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
-        reads = _reads(operations)
-        # By template: the member with the thing's state. Below: the states from which each operation starts.
-        self._states = {template: name for template, one in reads.items() if (name := state_member(one))}
-        self._starts = {
-            operation.label: named for operation in operations if (named := self._states_named(reads, operation))
+        self._reads = {path: read for path, read in _reads(operations).items() if collection_of(path)}
+        # By operation: the things on whose state it depends, by path template, and what each forbids.
+        self._barred = {
+            operation.label: found
+            for operation in operations
+            if operation.method not in SAFE and "409" in operation.responses
+            if (
+                found := {
+                    path: barred_by(operation, one) for path, one in self._reads.items() if _is_at(operation, path)
+                }
+            )
         }
         # By path: members of the thing at the last read.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
 
-    def _states_named(self, reads: dict[str, Operation], operation: Operation) -> frozenset[str]:
-        """Return the states that the description of an operation names; none where they may mean something else."""
-        above = operation.template.rstrip("/").rpartition("/")[0]
-        if operation.method != "POST" or "409" not in operation.responses or above not in self._states:
-            return frozenset()
-        given = flat(flat(reads[above].shape or {}).get("properties", {}).get(self._states[above], {}))
-        sentences = re.split(r"(?<=[.;])\s+", operation.text)
-        said = [sentence for sentence in sentences if not _ELSE.search(sentence)]
-        named = {
-            str(state): [item for item in said if _word(str(state)).search(item)] for state in given.get("enum", ())
-        }
-        is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
-        is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)
-        return frozenset(state for state, found in named.items() if found) if is_said and not is_open else frozenset()
-
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
         operation, status = occasion.operation, occasion.response.status
         path = occasion.context.target.partition("?")[0].rstrip("/")
-        above = path.rpartition("/")[0]
         if occasion.request.method in SAFE:
             if occasion.request.method == "GET" and operation is not None:
                 self._read(occasion, operation.template.rstrip("/"), path)
             return
-        before = self._seen.get(above)
-        if operation is not None and before is not None and operation.method == "POST" and occasion.context.usual:
-            yield from self._act(occasion, operation, before)
-            if status == HTTPStatus.CONFLICT:
-                return
-        self._seen.clear()
+        if operation is not None and occasion.context.usual:
+            for template, barred in self._barred.get(operation.label, {}).items():
+                yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
+        if not refuses(status, operation):
+            self._seen.clear()
 
-    def _act(self, occasion: Occasion, operation: Operation, before: dict[str, Any]) -> Iterator[Case]:
-        """Judge an operation by the state that the thing had."""
-        starts = self._starts.get(operation.label, frozenset())
-        state = str(before.get(self._states[operation.template.rstrip("/").rpartition("/")[0]], ""))
-        if starts and state:
-            is_taken = occasion.response.ok and state not in starts
-            self._taken[operation.label, state] += is_taken
-            if not is_taken or self._taken[operation.label, state] >= _TWICE:
-                expected = f"status 409, as the description says of other states than {' and '.join(sorted(starts))}"
-                found, cause = f"status {occasion.response.status}, and {state} before", f"{operation.label} {state}"
-                yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
+    def _act(
+        self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str
+    ) -> Iterator[Case]:
+        """Judge an operation by the state that the thing had; one that changes by itself may have changed meanwhile."""
+        for name, states in barred.items():
+            value = self._seen.get(path, {}).get(name)
+            state = text_of(value) if isinstance(value, str | bool) else ""
+            if state:
+                is_taken = occasion.response.ok and state in states
+                self._taken[operation.label, state] += is_taken
+                is_sure = isinstance(value, bool) or state in FINAL or self._taken[operation.label, state] >= _TWICE
+                if not is_taken or is_sure:
+                    expected = f"a refusal with 409, as the description says where {name} is {state}"
+                    found, cause = f"status {occasion.response.status}", f"{operation.label} {name} {state}"
+                    yield occasion.case("description/states", not is_taken, expected, found, cause=cause)
 
     def _read(self, occasion: Occasion, template: str, path: str) -> None:
         """Record the members of a thing as read."""
-        answer, name = occasion.response, self._states.get(template, "")
-        is_usable = bool(name) and answer.ok and is_json(answer.media_type) and len(answer.body) <= _MOST_OCTETS
-        now = object_in(read_json(answer.body).value, {plain_name(name)}) if is_usable else {}
+        answer, read = occasion.response, self._reads.get(template)
+        is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= _MOST_OCTETS
+        shape = flat(read.shape or {}).get("properties", {}) if read is not None else {}
+        now = object_in(read_json(answer.body).value, {plain_name(name) for name in shape}) if is_usable else {}
         self._seen.pop(path, None)
         if now and len(self._seen) < _MOST_THINGS:
             self._seen[path] = now
+
+
+def _is_at(operation: Operation, path: str) -> bool:
+    """Return whether an operation acts on a thing with this path template, or on something below it."""
+    return f"{operation.template}/".startswith(f"{path}/")
+
+
+def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]]:
+    """Return the values of a thing's members with which an operation is refused by its description, by member.
+
+    That says "409 if the job is running", "409 unless it is queued", or "in another state it is answered 409".
+    """
+    parts, name = flat(read.shape or {}).get("properties", {}), state_member(read)
+    known = {word: {"true", "false"} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
+    known |= {name: set(_states_of(read, name))} if name else {}
+    thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
+    is_own = operation.template.count("{") == read.template.count("{")
+    for said in _REFUSED.finditer(operation.text):
+        for unless, subject, no, rest in _IS.findall(said[1]):
+            for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
+                words = {"true": member} if values == {"true", "false"} else {value: value for value in values}
+                if named := _listed(rest, words):
+                    found[member] |= values - named if bool(unless) != bool(no) else named
+    starts = _states_named(operation, known[name]) if name and operation.method == "POST" and is_own else set()
+    if starts and not found[name]:
+        found[name] = known[name] - starts
+    return {member: frozenset(values) for member, values in found.items() if values}
+
+
+def _listed(predicate: str, words: dict[str, str]) -> set[str]:
+    """Return the values whose words begin a predicate, as in "running or paused, or has items"; none beside "and"."""
+    found = set[str]()
+    for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):
+        value = next(
+            (value for value, word in words.items() if _word(word).fullmatch(_BESIDE.sub("", part).strip())), ""
+        )
+        if not value:
+            return set() if part.startswith("and ") else found
+        found.add(value)
+    return found
+
+
+def _states_named(operation: Operation, states: set[str]) -> set[str]:
+    """Return the states that an operation starts from, by the description; none where they may mean something else."""
+    sentences = re.split(r"(?<=[.;])\s+", operation.text)
+    said = [sentence for sentence in sentences if not _ELSE.search(sentence)]
+    named = {state: [item for item in said if _word(state).search(item)] for state in states}
+    is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
+    is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)
+    return {state for state, found in named.items() if found} if is_said and not is_open else set()
 
 
 def state_member(read: Operation) -> str:

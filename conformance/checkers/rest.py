@@ -18,6 +18,7 @@ from conformance.checkers.memory import Memory
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
+from conformance.checkers.totals import Sublists
 from conformance.checkers.untouched import Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
@@ -55,7 +56,7 @@ class RestCheckers:
         self._over_time = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched,
+            self._untouched, Sublists(contract),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

@@ -1,16 +1,27 @@
-"""Totals of lists: the number of items that a response names agrees with the items that it shows."""
+"""Totals of lists: the number of items that a response names agrees with the items that it shows.
+
+So do numbers of a thing with the items of a list below it.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
-from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, number_of
+from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, listing_of, members_of, number_of, page_of
+from conformance.api.rest.references import singular
+from conformance.api.rest.statuses import refuses
+from conformance.api.rest.things import object_in, parts_of
 from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_schema import is_number, kinds_of
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
 #: SETTLES_S: a total may be stored apart from its list, and be late after a change, s. _OFTEN: reads in which it must
@@ -231,6 +242,128 @@ class Totals:
         )
         longest = self._longest[listing.operation.label]
         return is_round and shown >= max(_FEWEST_CUT[not has_parts], longest)
+
+
+# Phrases in a description of a sum, and of things that a write leaves as they are.
+_SUM: Final = re.compile(r"\b(?:sum|total) of (?:all |the |their )*(\w+)", re.IGNORECASE)
+_STAY: Final = re.compile(
+    r"\b(?:stays?|remains?|(?:is|are) (?:kept|unchanged|untouched|not (?:changed|touched)))\b", re.IGNORECASE
+)
+
+
+def numbers_of(above: Operation, lister: Operation) -> dict[str, str]:
+    """Return the numbers of a thing that a list below it tells too: how many items it has, or the sum of a member.
+
+    By the number's name: the member that is added up; empty for the number of items.
+    """
+    things, listing = lister.template.rstrip("/").rpartition("/")[2].lower(), listing_of(lister)
+    thing, found = singular(things), dict[str, str]()
+    counts = {f"{thing}count", f"{things}count", f"numberof{things}", f"num{things}", f"total{things}"}
+    for name, part in parts_of(above.shape).items() if listing is not None else ():
+        said = str(flat(part).get("description", "")).lower()
+        added = _SUM.search(said) if re.search(rf"\b{things}\b", said) else None
+        if added is not None and kinds_of(part) <= {"integer"} and listing is not None:
+            known = [word for word in (added[1], singular(added[1])) if word in listing.members]
+            found |= {name: word for word in known}
+        elif plain_name(name) in counts or re.search(rf"\b(?:how many|number of)(?: the)? {things}\b", said):
+            found[name] = ""
+    return found
+
+
+def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequence[Any]) -> dict[str, float]:
+    """Return the numbers of a thing as the items of the list below it make them, as far as both are known."""
+    found = dict[str, float]()
+    for name, member in numbers.items():
+        values: list[Any] = [members_of(item).get(member) for item in items] if member else [1] * len(items)
+        found |= {name: sum(values)} if all(map(is_number, values)) and is_number(thing.get(name)) else {}
+    return found
+
+
+class Sublists:
+    """Judges lists below a thing: they have as many items as the thing says, and stay when it is written.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = {(one.method, one.template.rstrip("/")): one for one in operations_of(contract)}
+        reads = {path: one for (method, path), one in operations.items() if method == "GET"}
+        pairs = {path: reads[path.rpartition("/")[0]] for path in reads if path.rpartition("/")[0] in reads}
+        # By path template of the list: the thing that it is below, and the numbers that both tell.
+        self._pairs = {
+            path: (above, found) for path, above in pairs.items() if (found := numbers_of(above, reads[path]))
+        }
+        # By operation: lists below the thing that it writes, which stay by its description.
+        self._stay = {
+            one.label: frozenset(path for path in pairs if path.rpartition("/")[0] == template and is_left(one, path))
+            for (method, template), one in operations.items()
+            if method in {"PUT", "PATCH"}
+        }
+        self._lists: dict[str, tuple[str, tuple[Any, ...], tuple[str, ...]]] = {}
+        self._things: dict[str, dict[str, Any]] = {}
+        self._before: dict[str, tuple[tuple[str, ...], str]] = {}
+        # Numbers that once were right, as others may count something else.
+        self._right: set[tuple[str, str]] = set()
+        self._changed_s = float("-inf")
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, answer = occasion.operation, occasion.response
+        path = occasion.context.target.partition("?")[0].rstrip("/")
+        if occasion.request.method not in SAFE:
+            if not refuses(answer.status, operation):
+                stay, label = (
+                    self._stay.get(operation.label if operation else "", ()),
+                    f"{occasion.request.method} {path}",
+                )
+                below = {key: one for key, one in self._lists.items() if key.rpartition("/")[0] == path}
+                self._before = {key: (ids, label) for key, (template, _, ids) in below.items() if template in stay}
+                self._lists, self._things, self._changed_s = {}, {}, answer.received_s
+            return
+        if operation is None or occasion.request.method != "GET" or not answer.ok or not occasion.context.plain:
+            return
+        page, template = page_of(answer, operation), operation.template.rstrip("/")
+        if page is not None and path.count("/") > 1 and "?" not in occasion.context.target:
+            yield from self._list(occasion, operation, path, page)
+        elif is_json(answer.media_type):
+            self._things[path] = object_in(read_json(answer.body).value, {*map(plain_name, parts_of(operation.shape))})
+        for key in [key for key in self._lists if path in {key, key.rpartition("/")[0]}]:
+            template, items, _ = self._lists[key]
+            thing = self._things.get(key.rpartition("/")[0], {})
+            numbers = self._pairs[template][1] if template in self._pairs else {}
+            for name, number in numbers_by_items(numbers, thing, items).items():
+                yield from self._judge(occasion, (template, name), thing[name], number, is_said=bool(numbers[name]))
+
+    def _list(self, occasion: Occasion, operation: Operation, path: str, page: Page) -> Iterator[Case]:
+        """Take a list, and judge whether it has the items that it had before the thing above it was written."""
+        listing, ids = listing_of(operation), page.identities
+        most = listing.most({}) if listing is not None else 0
+        before, label = self._before.pop(path, ((), ""))
+        lost = [one for one in before if one not in ids]
+        if before:
+            expected = f"the {len(before)} items as before {label}, which leaves them by its description"
+            cause, found = f"{operation.label} stay", f"{len(ids)} items, without {''.join(lost[:1])}"
+            yield occasion.case("description/written-is-read", not lost, expected, found, cause=cause)
+        if not page.goes_on and (not most or len(ids) < most):
+            self._lists[path] = operation.template.rstrip("/"), page.items, ids
+
+    def _judge(
+        self, occasion: Occasion, key: tuple[str, str], told: float, number: float, *, is_said: bool
+    ) -> Iterator[Case]:
+        """Judge a number of a thing by the items of the list below it; it may be late after a change."""
+        holds = told == number
+        self._right |= {key} if holds else set()
+        if holds or ((is_said or key in self._right) and occasion.sent_s - self._changed_s > SETTLES_S):
+            expected = f"{number} as {key[1]}, by the items of the list below it"
+            yield _case(occasion, key[1], f"{told} as {key[1]}", expected, holds=holds)
+
+
+def is_left(write: Operation, path: str) -> bool:
+    """Return whether a list stays as it is when the thing above it is written, by the description."""
+    things = path.rpartition("/")[2].lower()
+    said = [text for text in re.split(r"[.;]\s", write.text.lower()) if _STAY.search(text)]
+    return any(re.search(rf"\b(?:{things}|{singular(things)})\b", text) for text in said)
 
 
 def says_filtered(listing: Listing) -> set[str]:

@@ -94,16 +94,22 @@ def _on_kept_connection(api: RestInterface, values: Values, closed: list[Operati
 def _on_new_thing(
     surveyor: Surveyor, operation: Operation, request: Outgoing, client: HttpClient | Stranger, *, authorized: bool
 ) -> Iterator[Exchange]:
-    """Send a request without valid credentials for a thing that was just created, if one can be; delete the thing."""
+    """Send a request without valid credentials for a thing that was just created, if one can be; delete the thing.
+
+    What a GET reads below the thing is written first.
+    """
     api = surveyor.api
     known = callable_operations(api)
     item = operation.template.rpartition("}")[0] + "}"
     read, create, delete = (known.get((method, path)) for method, path in _life_of(item))
-    if operation.safe or read is None or create is None:
+    put = known.get(("PUT", operation.template)) if operation.template != item else None
+    if read is None or create is None or (operation.safe and put is None):
         return
     path = created_path(surveyor, create, read, _MAY_BE_CREATED)
     if path:
         target = path + operation.template[len(item) :] + "".join(request.target.partition("?")[1:])
+        if operation.safe and put is not None:
+            Writer(api, surveyor.values).send(put, target)
         sent = client.send(
             request.method, target, headers=request.headers, body=request.body, authorized=authorized, fresh=True
         )

@@ -16,15 +16,24 @@ from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.statuses import HELD, held_text
-from conformance.api.rest.things import collection_of, doubt_of_deletion, id_member, identifier_of, path_chosen
+from conformance.api.rest.things import (
+    collection_of,
+    doubt_of_deletion,
+    id_member,
+    identifier_of,
+    parts_of,
+    path_chosen,
+)
 from conformance.api.rest.values import Values
+from conformance.checkers.changes import barred_by
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
+from conformance.documents.writing import text_of
 from conformance.scenarios.chosen import Chosen
 from conformance.scenarios.living import ABSENT, Kind, Life, Living, State, Thing
-from conformance.scenarios.refusing import is_refused, refuse_changes, refuse_creation, refuse_deletion
+from conformance.scenarios.refusing import is_refused, look_refused, refuse_changes, refuse_creation, refuse_deletion
 from conformance.scenarios.scenario import NotPossibleError, NotSeenError, scenario
 from conformance.scenarios.singletons import singletons
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -185,6 +194,7 @@ class _Cycle:
             thing = next(reversed(self.living.of(State.ALIVE)), None)
             if thing is not None and self._is_item(thing.path) and not self.living.is_over:
                 self._act_on(action, thing)
+                self._change_barred(thing)
 
     def _act_on(self, action: Operation, thing: Thing) -> None:
         """Call an operation of a thing, and read the thing until it shows the change in the response."""
@@ -211,6 +221,15 @@ class _Cycle:
             thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN
             thing.kept = {} if wrong else thing.kept
         living.look(sent, action.label, thing, said)
+
+    def _change_barred(self, thing: Thing) -> None:
+        """Send a change that the description forbids in the state to which an operation has led."""
+        now, turn = members(thing.last, parts_of(self.read.shape)), _REFUSED + _FEW * self.round
+        for change in self._changes if thing.state is State.ALIVE else ():
+            barred = barred_by(change, self.read)
+            body = next(iter(self.writer.bodies(change, turn, now)), None)
+            if body is not None and any(text_of(now.get(name)) in states for name, states in barred.items()):
+                look_refused(self.living, thing, change, self.writer.conditional(change, self.read, thing.path, body))
 
     def _delete_all(self, delete: Operation) -> None:
         """Delete each thing; after each, the others and the deleted ones are read."""

@@ -21,6 +21,7 @@ from conformance.api.rest.things import another, collection_of, identifier_of, p
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
+from conformance.checkers.totals import is_left, numbers_by_items, numbers_of
 from conformance.documents.files import file_of, keeps_octets
 from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
@@ -96,7 +97,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 thing.write(changes)
                 thing.upload()
                 thing.beside(create, delete)
-                thing.listed_below(operations)
+                thing.listed_below(operations, changes)
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
                 thing.delete(delete, operations.get(("GET", collection_of(path))))
@@ -336,7 +337,7 @@ class _Thing:
         if delete is not None and other:
             Writer(self.api, self.surveyor.values).conditional(delete, self.read, other)
 
-    def listed_below(self, operations: Mapping[tuple[str, str], Operation]) -> None:
+    def listed_below(self, operations: Mapping[tuple[str, str], Operation], changes: Sequence[Operation]) -> None:
         """Create items in each list below it, and look for them there, in parts, and below another thing."""
         own, values = self.read.template.rstrip("/"), self.surveyor.values
         for (method, template), create in operations.items():
@@ -360,6 +361,11 @@ class _Thing:
             inputs = usual_inputs(read, values)[0]
             outgoing, _ = self._at(read, inputs, below)
             found = self.surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), outgoing).exchange
+            self._count(self.read, read, outgoing)
+            for change in changes:
+                bodies = self._bodies(change, self._members()) if is_left(change, template) and self.get().ok else []
+                if bodies and self.send(change, bodies[-1], *self._current()).ok:
+                    self.api.send(replace(outgoing, target=outgoing.target.partition("?")[0]))
             page = page_of(found.response, read) if found is not None else None
             after = self._items(listing, other) if before is not None and page is not None else None
             if after is not None and before is not None and page is not None:
@@ -368,6 +374,25 @@ class _Thing:
                 self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
                 self._read_elsewhere(operations, template, page.items[-1], other)
             self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
+
+    def _count_above(self, lister: Operation | None) -> None:
+        """Read the list that it is in, and the thing above that, if both can be read."""
+        reads = operations_of(self.api.run.contract) if lister is not None and allows(self.api, lister) else ()
+        for above in (one for one in reads if one.method == "GET"):
+            if lister is not None and above.template == lister.template.rpartition("/")[0]:
+                self._count(above, lister, Outgoing("GET", self.target.rpartition("/")[0]))
+
+    def _count(self, above: Operation, lister: Operation, request: Outgoing) -> None:
+        """Read a list and the thing above it until their numbers agree, or the time for that is over."""
+        numbers, until = numbers_of(above, lister), time.monotonic() + _SETTLES_S
+        path = request.target.partition("?")[0].rstrip("/")
+        while numbers:
+            listed, thing = self.api.send(replace(request, target=path)), Outgoing("GET", path.rpartition("/")[0])
+            page, now = page_of(listed.response, lister), members(self.api.send(thing), numbers)
+            right = numbers_by_items(numbers, now, page.items) if page is not None else {}
+            if time.monotonic() > until or all(now[name] == number for name, number in right.items()):
+                return
+            time.sleep(_PAUSE_S)
 
     def _read_elsewhere(
         self, operations: Mapping[tuple[str, str], Operation], template: str, value: Any, other: str
@@ -404,14 +429,16 @@ class _Thing:
         self, put: Operation, read: Operation, delete: Operation | None, request: Outgoing, whole: Outgoing
     ) -> None:
         """Write to a file that is there as if it were not, delete it, and write it again; read it after each."""
-        steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = []
-        if any(parameter.name.lower() == "if-none-match" for parameter in put.parameter("header")):
-            steps.append((put, request, (("If-None-Match", "*"),)))
+        conditions = {"if-none-match": ("If-None-Match", "*"), "if-match": ("If-Match", NO_TAG)}
+        names = {parameter.name.lower() for parameter in put.parameter("header")}
+        steps: list[tuple[Operation, Outgoing, tuple[tuple[str, str], ...]]] = [
+            (put, request, (field,)) for name, field in conditions.items() if name in names
+        ]
         if delete is not None and allows(self.api, delete):
             own = request_of(delete, usual_inputs(delete, self.surveyor.values)[0])
             steps.append((delete, replace(own, target=whole.target), ()))
         for operation, outgoing, fields in steps:
-            headers = (*(pair for pair in outgoing.headers if pair[0].lower() != "if-none-match"), *fields)
+            headers = (*(pair for pair in outgoing.headers if pair[0].lower() not in conditions), *fields)
             odd = Variation(Kind.ODD, "", "", Inputs())
             done = self.surveyor.send(operation, odd, replace(outgoing, headers=headers))
             if operation is delete and done.ok:
@@ -496,6 +523,7 @@ class _Thing:
         listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
         id_ = identifier_of(was, self.read)
         queries = list(_filters(listing, was)) if listing is not None and id_ else []
+        self._count_above(lister)
         for query in queries:
             # A device may cache the response.
             self._look_in(listing, query, id_, began - _SETTLES_S)
@@ -519,6 +547,7 @@ class _Thing:
         is_gone = self.get(place=_GONE_PLACE).status in ABSENT
         for read, request in self.below if is_gone else ():
             self._look_at_gone(read, request)
+        self._count_above(lister)
         for query in queries if is_gone else ():
             self._look_in(listing, query, id_, began)
 

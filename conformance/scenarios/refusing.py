@@ -45,18 +45,18 @@ def refuse_changes(living: Living, change: Operation, thing: Thing, turn: int) -
     writer = living.writer
     valid = next(iter(writer.bodies(change, turn, members(thing.last, ()))), None)
     if valid is not None:
-        _look(living, thing, change, writer.send(change, thing.path, valid, media_type=_TEXT))
+        look_refused(living, thing, change, writer.send(change, thing.path, valid, media_type=_TEXT))
     for body in _half_valid(living, change, turn + _STEP, members(thing.last, ())):
-        _look(living, thing, change, writer.send(change, thing.path, body))
+        look_refused(living, thing, change, writer.send(change, thing.path, body))
 
 
 def refuse_deletion(living: Living, delete: Operation, thing: Thing, absent: str) -> None:
     """Send a DELETE of a thing that does not exist, and read another thing."""
     if absent and living.writer.send(living.read, absent).response.status in ABSENT:
-        _look(living, thing, delete, living.writer.send(delete, absent))
+        look_refused(living, thing, delete, living.writer.send(delete, absent))
 
 
-def _look(living: Living, thing: Thing, operation: Operation, sent: Exchange) -> None:
+def look_refused(living: Living, thing: Thing, operation: Operation, sent: Exchange) -> None:
     """Read a thing after a request that should be refused; one that was accepted has written it."""
     if thing.state is not State.ALIVE:
         return

@@ -92,7 +92,11 @@ def special_bodies(
     zoned += _in_lines(changed, parts)
     rich = {name: one for name, one in _rich(parts, there, values.collections).items() if may(name)}
     empty: dict[str, Any] = {name: [] for name in rich.keys() | changed.keys() if isinstance(there[name], list)}
-    yield from (item for item in (changed, *zoned, rich, empty) if item and fits(schema, item))
+    # Programs take 0, false and an empty text for nothing: twice, as a device may not take one at the moment.
+    scalars = {name: type(changed[name])() for name in changed if isinstance(changed[name], str | int | float)}
+    zeros = {name: one for name, one in scalars.items() if fits(parts[name], one)}
+    bodies = (changed, *zoned, rich, {**empty, **zeros}, zeros)
+    yield from (item for item in bodies if item and fits(schema, item))
     restored = {name: one for name, one in there.items() if now().get(name) != one}
     if restored and fits(schema, restored):
         yield restored

@@ -1,7 +1,15 @@
 """Totals of lists: one that counts the items as it did is never blamed, and one that does not is."""
 
+import json
+
 import pytest
-from valve_lists import STATES, TOTAL, VALVES, Seen, whole, word
+from small_device import answers, described
+from valve_lists import BASE, STATES, TOTAL, VALVES, Seen, whole, word
+
+from conformance.checkers.rest import RestCheckers
+from conformance.contract.described import write_described_pack
+from conformance.contract.pack import Contract
+from conformance.transport.exchange import Exchange, Request, Response
 
 
 @pytest.mark.parametrize("told", [4, 2])
@@ -175,3 +183,57 @@ def test_a_total_that_means_something_else_is_not_blamed(name, play, tmp_path):
     seen = Seen(tmp_path, parameters, _totalled(name))
     play(seen)
     assert TOTAL not in seen.broken, [one for one in seen.cases if not one.holds]
+
+
+_LITRES = {"id": {"type": "string"}, "litres": {"type": "number"}}
+_CRATE = {
+    "id": {"type": "string"},
+    "bottle_count": {"type": "integer"},
+    "whole_litres": {"type": "integer", "description": "The sum of the litres of the bottles."},
+    "weight": {"type": "integer", "description": "The sum of the weights of all parts."},
+}
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+
+
+def _crate_faults(tmp_path, says, steps):
+    """Return the requirements that a crate breaks.
+
+    Args:
+        tmp_path: for the description.
+        says: summary of the PUT of a crate.
+        steps: seconds before a read of the crate and of its bottles, its numbers, and their litres; or a method.
+    """
+    crate = {"200": answers({"type": "object", "properties": _CRATE})}
+    bottles = {"type": "array", "items": {"type": "object", "properties": _LITRES}}
+    get = {"get": {"responses": {"200": answers(bottles)}}, "parameters": [_ID]}
+    one = {"get": {"responses": crate}, "put": {"summary": says, "responses": crate}, "parameters": [_ID]}
+    document = described({"/crates/{id}": one, "/crates/{id}/bottles": get}, "3.1.0")
+    checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+    now, broken = 0.0, set()
+    for after, *said in steps:
+        read = [("GET", "", dict(zip(_CRATE, ("a", *said[:-1]), strict=False)))] if said else [("PUT", "", {})]
+        read += [("GET", "/bottles", [{"id": str(n), "litres": n} for n in said[-1]])] if said else []
+        for method, below, body in read:
+            now += after
+            request = Request(method, f"{BASE}/crates/a{below}", (("Host", "device:8000"),))
+            kind = (("Content-Type", "application/json"),)
+            exchange = Exchange(request, Response(200, kind, json.dumps(body).encode(), 1.0, received_s=now))
+            broken |= {case.requirement for case in checkers(exchange) if not case.holds}
+    return broken & {TOTAL, "description/written-is-read"}
+
+
+@pytest.mark.parametrize(
+    ("says", "steps", "blamed"),
+    [
+        ("", [(1, 2, 3, [1, 2]), (1,), (4, 2, 3, [3])], {TOTAL}),
+        ("", [(1, 2, 3, [1, 2]), (1,), (0.5, 2, 3, [3])], set()),
+        ("", [(4, 1, 3, [1, 2]), (4, 1, 3, [1, 2])], set()),
+        ("", [(4, 2, 2, [1, 2])], {TOTAL}),
+        ("", [(4, 2, 3, 9, [1, 2])], set()),
+        ("The bottles stay.", [(1, 2, 3, [1, 2]), (1,), (1, 0, 0, [])], {"description/written-is-read"}),
+        ("The bottles stay.", [(1, 2, 3, [1, 2]), (1,), (1, 3, 6, [1, 2, 3])], set()),
+        ("Empties the crate.", [(1, 2, 3, [1, 2]), (1,), (1, 0, 0, [])], set()),
+    ],
+)
+def test_numbers_of_a_thing_agree_with_the_list_below_it(says, steps, blamed, tmp_path):
+    assert _crate_faults(tmp_path, says, steps) == blamed

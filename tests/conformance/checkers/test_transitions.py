@@ -11,7 +11,12 @@ from conformance.transport.exchange import Exchange, Request, Response
 _BASE = "http://device:8000"
 _BELT = {
     "type": "object",
-    "properties": {"id": {"type": "string"}, "state": {"enum": ["stopped", "running", "paused"]}, "runs": {}},
+    "properties": {
+        "id": {"type": "string"},
+        "state": {"enum": ["stopped", "running", "paused", "done"]},
+        "runs": {},
+        "archived": {"type": "boolean"},
+    },
 }
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _STATES, _KEEPS = "description/states", "description/refused-keeps"
@@ -21,6 +26,10 @@ _SAID = {
     "resume": f"Let a paused belt run again. {_ELSE}",
     "pause": "Pause a running belt. 409 if it cannot be done.",
     "halt": f"Not for a stopped belt. {_ELSE}",
+    "stop": "409 unless the belt is running or paused. The belt is then stopped.",
+    "clean": "409 if it is running, paused already, or has goods.",
+    "grease": "409 if the belt is running and nobody watches it. Refused if the motor is stopped.",
+    "restore": "409 if it is not archived. If it was paused, it is then paused.",
 }
 
 
@@ -31,7 +40,9 @@ def _contract(tmp_path_factory):
         f"/belts/{{id}}/{name}": {"parameters": [_ID], "post": {"summary": text, "responses": acted}}
         for name, text in _SAID.items()
     }
-    paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}}
+    put = {"summary": "409 if the belt is archived.", "responses": acted}
+    paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}, "put": put}
+    paths["/belts/{id}/goods"] = {"parameters": [_ID], "post": put}
     document = described(paths, "3.1.0")
     return contract_of(tmp_path_factory.mktemp("pack"), document)
 
@@ -40,7 +51,7 @@ def _broken(contract, steps):
     checkers, broken = RestCheckers(contract, _BASE), set()
     for number, (line, *seen) in enumerate(steps):
         method, path, status = line.split()
-        body = json.dumps(dict(zip(("state", "runs"), seen, strict=False))).encode() if seen else b""
+        body = json.dumps(dict(zip(("state", "runs", "archived"), seen, strict=False))).encode() if seen else b""
         request = Request(method, f"{_BASE}/belts/1{path.removeprefix('.')}", (("Host", "device:8000"),), b"")
         kind = (("Content-Type", "application/json"),) if body else ()
         exchange = Exchange(request, Response(int(status), kind, body, 1.0, received_s=float(number)))
@@ -58,11 +69,29 @@ def _refused(action, *runs, change=1):
 
 
 _RESUMED = [("GET . 200", "stopped"), ("POST /resume 200", "running")]
+_AWAY = ("GET . 200", "stopped", 1, True)
 _BROKEN = {
+    "stopped from stopped": ([("GET . 200", "stopped"), ("POST /stop 200", "stopped")] * 2, _STATES),
+    "stopped from done": ([("GET . 200", "done"), ("POST /stop 200", "stopped")], _STATES),
+    "cleaned while paused": ([("GET . 200", "paused"), ("POST /clean 200", "paused")] * 2, _STATES),
+    "written while archived": ([_AWAY, ("PUT . 200", "stopped")], _STATES),
+    "filled while archived": ([_AWAY, ("POST /goods 200",)], _STATES),
+    "restored while not archived": ([("GET . 200", "stopped", 1, False), ("POST /restore 200",)], _STATES),
+    "not stopped": (
+        [("GET . 200", "running"), ("POST /stop 200", "running"), *[("GET . 200", "running")] * 4],
+        _STATES,
+    ),
     "resumed from stopped": (_RESUMED * 2, _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
 }
 _RIGHT = {
+    "stopped later": [("GET . 200", "running"), ("POST /stop 200", "running"), ("GET . 200", "running"),
+                      *[("GET . 200", "stopped")] * 4],
+    "greased while a part of a condition holds": [("GET . 200", "running"), ("POST /grease 200", "running")] * 2,
+    "greased while another thing would be refused": [("GET . 200", "stopped"), ("POST /grease 200", "stopped")] * 2,
+    "cleaned when stopped": [("GET . 200", "stopped"), ("POST /clean 200", "stopped")] * 2,
+    "restored to what it was": [_AWAY, ("POST /restore 200", "stopped"), *[("GET . 200", "stopped")] * 4],
+    "a refused change of what is archived": [_AWAY, ("PUT . 409",), _AWAY],
     "resumed from stopped once, which may have been paused just then": _RESUMED,
     "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
     "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
