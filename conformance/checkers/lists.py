@@ -35,6 +35,9 @@ LEVELS: Final = frozenset({"level", "severity", "loglevel", "priority", "critica
 _INCLUDING: Final = frozenset({"deleted", "archived", "hidden", "removed", "inactive", "expired", "retired", "draft"})
 _ALL: Final = frozenset({"all", "any", "none", "*", "both", "default", "unknown", "other", ""})
 
+# Texts that only the suite sends as a cursor. Below: phrases in a description for values that are refused.
+_NO_CURSOR: Final = re.compile(r"roaas|\s|[^ -~]")
+_REFUSED: Final = re.compile(r"\b4(?:\d\d|xx)\b|\b(?:refus|reject|invalid)", re.IGNORECASE)
 # A link in the field Link with its relation. Below: relations of pages.
 _LINK: Final = re.compile(r"""<([^>]*)>[^,<]*?;\s*rel\s*=\s*"?([^";,]+)""", re.IGNORECASE)
 _RELATIONS: Final = {"next": "next", "prev": "prev", "previous": "prev", "first": "first", "last": "last"}
@@ -77,6 +80,7 @@ class Lists:
         if page is None or sent is None:
             return
         yield from _said_order(occasion, listing, page, sent)
+        yield from self._cursor(occasion, listing, page, sent)
         if not (listing.operation.parameters or page.totals):
             return
         yield from self._limit(occasion, listing, page, sent)
@@ -88,6 +92,15 @@ class Lists:
         yield from self._search(occasion, listing, page, sent)
         yield from _links(occasion, listing, page, sent)
         self._learn(listing, page)
+
+    def _cursor(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge that a cursor which no page named is refused, if the description of the parameter says so."""
+        cursor = listing.cursor
+        if cursor is not None and _NO_CURSOR.search(sent.get(cursor.name, "")) and _REFUSED.search(cursor.says):
+            expected = f"status 4xx for a {cursor.name} that no page has named, by its description"
+            found, cause = f"a list with {len(page.items)} items", f"{listing.operation.label} {cursor.name} unknown"
+            id_ = "description/invalid-refused"
+            yield occasion.case(id_, False, expected, found, cause=cause, doubt=SENTENCE)  # noqa: FBT003
 
     def _learn(self, listing: Listing, page: Page) -> None:
         names = {*listing.filters, *(sorting.member for sorting in listing.sortings.values())}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final
@@ -64,7 +64,8 @@ _EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|pri
 # Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
 # another.
 _NEVER_AGAIN: Final = re.compile(
-    r"\bnever (?:given|used|assigned|issued)\b[^.]*\b(?:twice|again)\b|\b(?:not|never) (?:re-?used|re-?assigned)"
+    r"\b(?:never (?:given|used|assigned|issued)|ids? are given\b[^.]*\bnever)\b[^.]*\b(?:twice|again)\b"
+    r"|\b(?:not|never) (?:re-?used|re-?assigned)"
     r"|\bid(?:entifier)?\b[^.]*\b(?:higher|greater|larger) than\b[^.]*\b(?:had|ever|deleted)\b",
     re.IGNORECASE,
 )
@@ -148,7 +149,9 @@ class Memory:
         self._single -= {read.template for read in self._items.values()}
         self._collections = collections_of(operations)
         self._things: dict[str, _Thing] = {}
-        self._own = {template: _read_only(one) for template, one in self._items.items()}
+        self._own = {path: _read_only(one) | _unwritten(one, path, operations) for path, one in self._items.items()}
+        head = contract.openapi.get("info", {}).get("description", "") if operations else ""
+        self._is_never = bool(_NEVER_AGAIN.search(str(head)))
         # By path: members of things at the last read, with what clients sent since.
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         # By operation and member: values in responses to creations that differ from the declared default.
@@ -263,11 +266,8 @@ class Memory:
 
     def _ending(self, delete: Operation, path: str) -> list[str]:
         """Return the things that end together with a thing, by the description of its DELETE."""
-        found = [thing.path for thing in self._things.values() if _is_below(thing.path, path) and not thing.gone]
-        said = ending_with(delete)
-        return [
-            text for text in found if text in self._made and said & set(map(singular, text[len(path) :].split("/")))
-        ]
+        found, said = [text for text in self._made if _is_below(text, path)], ending_with(delete)
+        return [text for text in found if said & set(map(singular, text[len(path) :].split("/")))]
 
     def _take_creation(self, occasion: Occasion, operation: Operation, item: Operation, path: str) -> Iterator[Case]:
         """Take a POST to a collection."""
@@ -291,7 +291,7 @@ class Memory:
             yield from self._judge_location(occasion, path, target)
             yield from self._defaults(occasion, operation)
             sent = _sent_of(occasion)
-            if before is not None and before.gone and _is_for_ever(item, operation):
+            if before is not None and before.gone and (self._is_never or _is_for_ever(item, operation)):
                 expected = f"an identifier of its own, not that of the thing that {before.change} has deleted"
                 is_chosen = target.rpartition("/")[2].casefold() in {str(one).casefold() for one in sent.values()}
                 yield occasion.case("description/created-is-there", is_chosen, expected, target, cause=operation.label)
@@ -359,7 +359,7 @@ class Memory:
             is_taken = is_taken and not isinstance(now[name], bool) and len(str(now[name])) >= _TELLING
             is_for_ever = _FOR_EVER.fullmatch(plain_name(name)) is not None
             is_other = is_for_ever and name in before and before[name] != now[name]
-            expected = f"{name}, which is readOnly, as the device gave it"
+            expected = f"{name} as the device gave it"
             found = f"{clip(now[name])} as {name}" + (f", and {clip(before[name])} before" if name in before else "")
             holds, cause = not (is_taken or is_other), f"{item.label} {name}"
             doubt = "" if is_taken else "the member may belong to the content, and not to the thing"
@@ -510,6 +510,13 @@ def _read_only(item: Operation) -> frozenset[str]:
     inner = [flat(one).get("properties", {}) for one in outer.values() if isinstance(one, dict)]
     parts = [(name, one) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict)]
     return frozenset(name for name, one in parts if flat(one).get("readOnly"))
+
+
+def _unwritten(item: Operation, path: str, operations: Iterable[Operation]) -> frozenset[str]:
+    """Return the members of an item that never change by their name, and that no request contains."""
+    writes = [one for one in operations if one.template.rstrip("/") in {path, collection_of(path)}]
+    sent = {name for one in writes for body in one.bodies.values() for name in parts_of(body.schema)}
+    return frozenset(name for name in parts_of(item.shape) if _FOR_EVER.fullmatch(plain_name(name))) - sent
 
 
 def _sent_of(occasion: Occasion) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any, Final
 from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, listing_of, members_of, number_of, page_of
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import object_in, parts_of
+from conformance.api.rest.things import collection_of, object_in, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import is_number, kinds_of
@@ -264,7 +264,7 @@ def numbers_of(above: Operation, lister: Operation) -> dict[str, str]:
         added = _SUM.search(said) if re.search(rf"\b{things}\b", said) else None
         if added is not None and kinds_of(part) <= {"integer"} and listing is not None:
             known = [word for word in (added[1], singular(added[1])) if word in listing.members]
-            found |= {name: word for word in known}
+            found |= dict.fromkeys([name][: len(known)], *known[:1]) if known else {}
         elif plain_name(name) in counts or re.search(rf"\b(?:how many|number of)(?: the)? {things}\b", said):
             found[name] = ""
     return found
@@ -290,6 +290,7 @@ class Sublists:
         operations = {(one.method, one.template.rstrip("/")): one for one in operations_of(contract)}
         reads = {path: one for (method, path), one in operations.items() if method == "GET"}
         pairs = {path: reads[path.rpartition("/")[0]] for path in reads if path.rpartition("/")[0] in reads}
+        self._below = frozenset(path for path, above in pairs.items() if collection_of(above.template))
         # By path template of the list: the thing that it is below, and the numbers that both tell.
         self._pairs = {
             path: (above, found) for path, above in pairs.items() if (found := numbers_of(above, reads[path]))
@@ -324,7 +325,7 @@ class Sublists:
         if operation is None or occasion.request.method != "GET" or not answer.ok or not occasion.context.plain:
             return
         page, template = page_of(answer, operation), operation.template.rstrip("/")
-        if page is not None and path.count("/") > 1 and "?" not in occasion.context.target:
+        if template in self._below and page is not None and "?" not in occasion.context.target:
             yield from self._list(occasion, operation, path, page)
         elif is_json(answer.media_type):
             self._things[path] = object_in(read_json(answer.body).value, {*map(plain_name, parts_of(operation.shape))})

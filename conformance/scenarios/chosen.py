@@ -27,6 +27,7 @@ from conformance.scenarios.living import Kind, Living, State, Thing, is_stored
 from conformance.scenarios.whole_list import WholeList, read_whole
 from conformance.scenarios.writing import members
 from conformance.transport.exchange import Exchange
+from conformance.verdict.evidence import SENTENCE
 
 # _FILTERS: filters that are tried. _MOST_ITEMS: items of a list.
 _FILTERS: Final = 2
@@ -68,6 +69,24 @@ class Chosen:
                 if not self.living.is_over:
                     self._read_filtered(listing, things[-1], change, (name, parameter))
         self._read_sorted(listing, things)
+
+    def look_after(self, thing: Thing, before: dict[str, Any]) -> None:
+        """Read the lists that leave out a thing, or include it, by what an operation has changed."""
+        listing = listing_of(self.living.lister) if self.living.lister is not None and thing.id else None
+        was, now = members_of(before), members_of(members(thing.last, before))
+        for name, parameter in listing.filters.items() if listing is not None else ():
+            if was.get(name) != now.get(name) and fitting(parameter, was.get(name)) and listing is not None:
+                # A checker judges each item of it.
+                self._list(listing, thing, {parameter.name: was[name]})
+        for name, parameter in listing.includes.items() if listing is not None else ():
+            if now.get(name) is True and listing is not None:
+                found = self.living.writer.until(
+                    partial(self._list, listing, thing, {parameter.name: True}), lambda item: thing.id in item.ids
+                )
+                other = "" if thing.id in found.ids or not found.is_whole else "a list without it"
+                expected = f"a list with {thing.id} by {parameter.name}=true, as it is {name}"
+                label = listing.operation.label
+                self.living.note(Kind.CHOSEN, label, found.exchange, expected, other, thing, SENTENCE)
 
     def _read_filtered(self, listing: Listing, thing: Thing, change: Operation, by: tuple[str, Parameter]) -> None:
         """Change the member that a filter is for, and read the lists of both values until they are right."""

@@ -221,6 +221,7 @@ class _Cycle:
             thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN
             thing.kept = {} if wrong else thing.kept
         living.look(sent, action.label, thing, said)
+        Chosen(living, self._changes, self.operations).look_after(thing, members(before, ()))
 
     def _change_barred(self, thing: Thing) -> None:
         """Send a change that the description forbids in the state to which an operation has led."""

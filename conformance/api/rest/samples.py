@@ -138,7 +138,7 @@ def _array(schema: Schema, depth: int, room: tuple[int, int], *, whole: bool) ->
 
 
 def alike_and_apart(schema: Schema) -> tuple[list[Any], list[Any]]:
-    """Return two arrays of two or three items by a schema: of equal items, and of different ones; else empty ones.
+    """Return two arrays of at least two items by a schema: of equal items, and of different ones; else empty ones.
 
     Whether the schema allows them is not looked into.
     """
@@ -147,9 +147,9 @@ def alike_and_apart(schema: Schema) -> tuple[list[Any], list[Any]]:
     if not isinstance(items, dict) or schema.get("prefixItems"):
         return [], []
     apart = [first := sample(items, 1, whole=True)]
-    for _ in range(max(2, min(int(schema.get("minItems", 2)), 64), min(int(schema.get("maxItems", 3)), 3)) - 1):
+    for _ in range(max(2, min(int(schema.get("minItems", 2)), 64)) - 1):
         apart.append(_another(items, first, apart))
-    return [first] * len(apart), apart if apart[0] not in apart[1:] else apart[:2] if apart[0] != apart[1] else []
+    return [first] * len(apart), apart if apart[0] != apart[1] else []
 
 
 def _another(schema: Schema, item: Any, others: list[Any]) -> Any:

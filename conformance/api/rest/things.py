@@ -178,7 +178,8 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
     if isinstance(value, dict):
         found = [another(schema, value, turn, collections)]
     elif isinstance(value, list):
-        found = [one for one in [alike_and_apart(schema)[1]] if one]
+        made = [alike_and_apart({**given, "minItems": count})[1] for count in (3, 2)]
+        found = [one for one in made if one and not any(item in one[:place] for place, item in enumerate(one))]
     elif not found and isinstance(value, bool):
         found = [not value]
     elif not found and is_number(value) and kinds & {"number", "integer"}:
