@@ -11,7 +11,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, is_xml, resource_at
 from conformance.transport.exchange import Response
-from conformance.verdict.evidence import Case
+from conformance.verdict.evidence import SENTENCE, Case
 
 WELL_FRAMED: Final = "well-framed HTTP"
 # Headers that clients act on, and that several values make meaningless (RFC 9110 5.3).
@@ -128,6 +128,26 @@ def allow(occasion: Occasion) -> Iterator[Case]:
         f"Allow: {said}",
         cause="methods left out",
     )
+
+
+# A header field with its value in a sentence of a description on all responses.
+_PROMISED = re.compile(r"\b(?:all|every|each)\b[^`]*`([A-Za-z-]+):\s*([^`]+)`", re.IGNORECASE)
+
+
+@lru_cache(maxsize=16)
+def _promises(text: str) -> tuple[tuple[str, str], ...]:
+    said = [sentence for sentence in re.split(r"\.\s", text) if "response" in sentence.lower()]
+    return tuple((found[1], found[2].strip()) for sentence in said for found in _PROMISED.finditer(sentence))
+
+
+def promised(occasion: Occasion) -> Iterator[Case]:
+    """Judge the header fields that the head of the description promises for all responses."""
+    head = str(occasion.contract.openapi.get("info", {}).get("description", ""))
+    for name, value in _promises(head) if occasion.operation is not None and occasion.context.usual else ():
+        got = occasion.response.header(name)
+        expected = f"{name}: {value}, as the description says of all responses"
+        holds, found = value.lower() in (got or "").lower(), f"no {name}" if got is None else f"{name}: {got}"
+        yield occasion.case("description/headers", holds, expected, found, cause=f"{name} promised", doubt=SENTENCE)
 
 
 def challenge(occasion: Occasion) -> Iterator[Case]:

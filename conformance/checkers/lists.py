@@ -60,8 +60,9 @@ class Lists:
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
         # By operation: limits to which a first page was cut.
         self._kept: dict[str, set[int]] = defaultdict(set)
-        # Lists that had fewer items than the default page size although more exist: number of items, total, case.
-        self._short: dict[object, tuple[int, int, Case]] = {}
+        # Lists that had fewer items than the default page size although more exist: number of items, total, case, and
+        # whether a limit has shown more since then.
+        self._short: dict[object, tuple[int, int, Case, bool]] = {}
         # By operation: the items of the whole list, and cases of searches without one of them, until the list shows it.
         self._whole: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
         self._missed: dict[str, list[tuple[str, str, Case]]] = defaultdict(list)
@@ -148,10 +149,14 @@ class Lists:
         places = [one.name for one in (listing.offset, listing.page, listing.cursor) if one is not None]
         if not is_sent and sent.keys().isdisjoint(places) and count < most and total > count:
             expected = f"{min(most, total)} of {total} items, by the default of {listing.limit.name}"
+            if short is not None and short[:2] == (count, total) and short[3]:
+                # The list is as short as before a longer one: it has not grown by itself.
+                yield self._short.pop(key)[2]
+                return
             case = occasion.case("description/list-limit", False, expected, f"{count} items", cause=cause)  # noqa: FBT003
-            self._short[key] = count, total, case
+            self._short[key] = count, total, case, False
         elif is_sent and short is not None and short[0] < count <= most <= listing.most({}) and total == short[1]:
-            yield self._short.pop(key)[2]
+            self._short[key] = (*short[:3], True)
             return
         # A device that raises a limit does so on the first page too.
         is_first = sent.keys().isdisjoint(places)

@@ -521,7 +521,7 @@ def _entries(occasion: Occasion, change: _Change) -> Iterator[Case]:
 
 def _moment(text: Any) -> datetime | None:
     """Return a time by RFC 3339 or of a Date header; None for anything else."""
-    for read in (datetime.fromisoformat, parsedate_to_datetime):
+    for read in (datetime.fromisoformat, parsedate_to_datetime) if isinstance(text, str) else ():
         with suppress(TypeError, ValueError):
             found = read(text)
             return found if found.tzinfo is not None else None

@@ -320,6 +320,8 @@ class _Thing:
                 earlier = [octets for _, octets in files[:-1]]
                 earlier += [file_of(other, octets) for other in others[:1] for octets in _FILES[:2]]
                 self._look_again(read, whole, earlier)
+                for again in (replace(whole, method="HEAD"), whole):
+                    self.surveyor.send(read, Variation(Kind.ODD, "", "", Inputs()), again, fresh=False)
                 self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), replace(request, body=b""))
                 self._end_file(put, read, operations.get(("DELETE", template)), request, whole)
                 self.uploads.append((read, request, [octets for _, octets in files]))

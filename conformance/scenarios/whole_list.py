@@ -19,6 +19,7 @@ from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
 from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.transport.parallel import send_together
 
 _PAGES: Final = 5
 _LIMITS: Final = frozenset({"limit", "pagesize", "perpage", "size", "maxresults", "pagelimit"})
@@ -120,7 +121,7 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
 
 
 def read_items(writer: Writer) -> None:
-    """Read the first, the middle and the last item of each list, and the first one again."""
+    """Read the first, the middle and the last item of each list, and the first one again; then all of them at once."""
     operations = callable_operations(writer.api)
     for (method, path), item in operations.items():
         lister = operations.get(("GET", collection_of(path)))
@@ -132,6 +133,9 @@ def read_items(writer: Writer) -> None:
             ids = [id_member(one, item)[1] for one in page.items if isinstance(one, dict)] if page is not None else []
             ids = [one for one in ids if one is not None]
             chosen = dict.fromkeys(ids[index] for index in (0, len(ids) // 2, -1)) if ids else {}
-            for id_ in [*chosen, *list(chosen)[: len(chosen) > 1]]:
-                text = quote(str(id_), safe="")
-                writer.send(item, item.template.replace(f"{{{item.parameter('path')[0].name}}}", text))
+            name = item.parameter("path")[0].name
+            paths = [item.template.replace(f"{{{name}}}", quote(str(id_), safe="")) for id_ in chosen]
+            for there in [*paths, *paths[: len(paths) > 1]]:
+                writer.send(item, there)
+            requests = [(writer.api.client, writer.request(item, there)) for there in paths]
+            send_together([requests, requests[::-1]] * (len(paths) > 1))

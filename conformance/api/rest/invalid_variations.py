@@ -24,7 +24,7 @@ from conformance.api.rest.variations import (
     clip,
     place_of,
     with_member,
-)  # fmt: skip
+)
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.openapi import Operation, is_json
 from conformance.documents.representation import flat
@@ -179,7 +179,7 @@ def _invalid_values(schema: Schema) -> Iterator[tuple[Any, str]]:
             yield value, _OTHER_TYPE if "enum" not in merged else "which is none of its values"
             break
     if kinds & {"number", "integer"} and "string" not in kinds and not fits(schema, value=False):
-        yield False, _OTHER_TYPE
+        yield from ((False, _OTHER_TYPE), (str(math.floor(fraction)), _OTHER_TYPE))
 
 
 def _beyond(schema: Schema) -> Iterator[tuple[Any, str]]:

@@ -124,3 +124,41 @@ def test_what_is_unique_stays_unique(name, tmp_path):
             one for one in checkers(Exchange(request, answer)) if not one.holds and "another code" in one.expected
         ]
     assert bool(wrong) == blamed
+
+
+_MADE = ("POST", "/notes", 201, {"id": "1", "made": 1, "created_at": "a"})
+_READ = ("GET", "/notes/1", 200, _MADE[3])
+_PUT = ("PUT", "/notes/1", 200, {"id": "1", "made": 1, "created_at": "b"})
+_FIELD = "Responses are never stored: all have `Cache-Control: no-store`."
+
+
+@pytest.mark.parametrize(
+    ("says", "steps", "blamed"),
+    [
+        (_FIELD, [("GET", "/notes/1", 404, {})], "description/headers"),
+        ("Requests have `Cache-Control: no-store`, all of them.", [("GET", "/notes/1", 404, {})], None),
+        ("Ids are given by the shuttle, and never twice.", [_MADE, ("DELETE", "/notes/1", 204, None), _MADE],
+         "description/created-is-there"),
+        ("Ids are given by the shuttle.", [_MADE, ("DELETE", "/notes/1", 204, None), _MADE], None),
+        ("", [_READ, _PUT, ("GET", "/notes/1", 200, _PUT[3])], "description/read-only"),
+        ("", [_READ, ("PUT", "/notes/1", 200, {}), _READ], None),
+        ("", [_READ, _PUT, ("GET", "/notes/1", 200, {**_READ[3], "made": 2})], None),
+    ],
+)  # fmt: skip
+def test_what_the_head_of_a_description_and_names_of_members_promise(says, steps, blamed, tmp_path):
+    note = {"type": "object", "properties": {name: {} for name in ("id", "made", "created_at")}}
+    own = {"description": "", "content": {"application/json": {"schema": note}}}
+    body = {"content": {"application/json": {"schema": {"type": "object", "properties": {"text": {}}}}}}
+    put = {"requestBody": body, "responses": {"200": own}}
+    item = {"get": {"responses": {"200": own, "404": own}}, "put": put, "delete": {"responses": {"204": own}}}
+    id_ = {"in": "path", "name": "id", "required": True, "schema": {"type": "string"}}
+    paths = {"/notes": {"post": {"responses": {"201": own}}}, "/notes/{id}": {"parameters": [id_], **item}}
+    document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1", "description": says}, "paths": paths}
+    checkers, found = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), _BASE), []
+    for number, (method, path, status, told) in enumerate(steps):
+        request = Request(method, _BASE + path, (("Host", "device"),))
+        octets = b"" if told is None else json.dumps(told).encode()
+        answer = Response(status, (("Content-Type", "application/json"),), octets, 1.0, received_s=9.0 * number)
+        found += [case for case in checkers(Exchange(request, answer)) if not case.holds]
+    judged = {"description/headers", "description/created-is-there", "description/read-only"}
+    assert {case.requirement for case in found} & judged == {*filter(None, [blamed])}

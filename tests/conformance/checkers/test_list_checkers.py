@@ -83,9 +83,9 @@ def test_a_short_list_may_be_shorter_than_the_least_limit(tmp_path):
 
 
 def test_a_default_that_is_not_applied(tmp_path):
-    for default, blamed in ((4, {LIMIT}), (2, set())):
-        seen = Seen(tmp_path / str(default), [whole("limit", default=default)])
-        for count, query in ((2, {}), (3, {"limit": 3}), (4, {"limit": 4})):
+    for default, last, blamed in ((4, 2, {LIMIT}), (4, 3, set()), (2, 2, set())):
+        seen = Seen(tmp_path / f"{default} {last}", [whole("limit", default=default)])
+        for count, query in ((2, {}), (3, {"limit": 3}), (4, {"limit": 4}), (last, {})):
             seen.read(VALVES[:count], (("X-Total-Count", "4"),), **query)
         assert seen.broken == blamed
 
@@ -290,6 +290,20 @@ def test_what_a_list_leaves_out(query, shown, blamed, tmp_path):
     items = [{**VALVES[0], **shown}]
     seen = Seen(tmp_path, parameters).read(items, include_archived="true").read(items, **query)
     assert (FILTER in seen.broken) == blamed
+
+
+@pytest.mark.parametrize(
+    ("says", "text", "blamed"),
+    [
+        ("400 if it is none.", "roaas", True),
+        ("400 if it is none.", "b2", False),
+        ("Of the page before.", "roaas", False),
+    ],
+)
+def test_a_cursor_that_no_page_has_named(says, text, blamed, tmp_path):
+    seen = Seen(tmp_path, [{**word("cursor"), "description": says}]).read(VALVES, cursor=text)
+    assert ("description/invalid-refused" in seen.broken) == blamed
+    assert all(case.doubt for case in seen.cases if not case.holds)
 
 
 @pytest.mark.parametrize(

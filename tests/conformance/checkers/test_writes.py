@@ -295,6 +295,7 @@ RIGHT = {
     "null removes": [_get("/merge"), _patch("/merge", {"note": None}), _get("/merge", note=None)],
     "the time of the last change moves": _two_changes(createdAt=_OLD, updatedAt=_NEW),
     "another time stays": _two_changes(updatedAt=_OLD),
+    "a time in seconds stays": _two_changes(createdAt=[7.5] * 3, updatedAt=[7.5] * 3),
     "it has only just changed": _two_changes(createdAt=_OLD, updatedAt=[_NEW[0]] * 3),
     "null for what is readOnly": [_get("/merge"), _patch("/merge", {"built": None}), _get("/merge")],
     "null sets the default": [_get("/merge"), _patch("/merge", {"mode": None}, mode="on"), _get("/merge", mode="on")],

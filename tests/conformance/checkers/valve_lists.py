@@ -59,6 +59,9 @@ def _of(value):
     return {"type": "object", "properties": inner}
 
 
+_JUDGED = ("description/list-", "description/invalid-")
+
+
 class Seen:
     """The requirements that are not met in a run of exchanges with one list."""
 
@@ -84,7 +87,7 @@ class Seen:
         self.now += after
         request = Request(method, BASE + target, (("Host", "device:8000"),))
         exchange = Exchange(request, Response(status, headers, octets, 1.0, received_s=self.now))
-        self.cases += [one for one in self.checkers(exchange) if one.requirement.startswith("description/list-")]
+        self.cases += [one for one in self.checkers(exchange) if one.requirement.startswith(_JUDGED)]
         return self
 
     @property
