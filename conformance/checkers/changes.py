@@ -424,19 +424,19 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     That says "409 if the job is running", "409 unless it is queued", or "in another state it is answered 409".
     """
     parts, name = flat(read.shape or {}).get("properties", {}), state_member(read)
-    known = {word: {"true", "false"} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
-    known |= {name: set(_states_of(read, name))} if name else {}
+    # By member: its values, with the word for each in a text.
+    known = {word: {"true": word, "false": ""} for word, one in parts.items() if kinds_of(one) == {"boolean"}}
+    known |= {name: {state: state for state in _states_of(read, name)}} if name else {}
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
     is_own = operation.template.count("{") == read.template.count("{")
     for said in _REFUSED.finditer(operation.text):
         for unless, subject, no, rest in _IS.findall(said[1]):
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
-                words = {"true": member} if values == {"true", "false"} else {value: value for value in values}
-                if named := _listed(rest, words):
-                    found[member] |= values - named if bool(unless) != bool(no) else named
-    starts = _states_named(operation, known[name]) if name and operation.method == "POST" and is_own else set()
+                if named := _listed(rest, values):
+                    found[member] |= set(values) - named if bool(unless) != bool(no) else named
+    starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
     if starts and not found[name]:
-        found[name] = known[name] - starts
+        found[name] = set(known[name]) - starts
     return {member: frozenset(values) for member, values in found.items() if values}
 
 
@@ -444,9 +444,8 @@ def _listed(predicate: str, words: dict[str, str]) -> set[str]:
     """Return the values whose words begin a predicate, as in "running or paused, or has items"; none beside "and"."""
     found = set[str]()
     for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):
-        value = next(
-            (value for value, word in words.items() if _word(word).fullmatch(_BESIDE.sub("", part).strip())), ""
-        )
+        text = _BESIDE.sub("", part).strip()
+        value = next((value for value, word in words.items() if word and _word(word).fullmatch(text)), "")
         if not value:
             return set() if part.startswith("and ") else found
         found.add(value)

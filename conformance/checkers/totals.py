@@ -261,12 +261,12 @@ def numbers_of(above: Operation, lister: Operation) -> dict[str, str]:
     counts = {f"{thing}count", f"{things}count", f"numberof{things}", f"num{things}", f"total{things}"}
     for name, part in parts_of(above.shape).items() if listing is not None else ():
         said = str(flat(part).get("description", "")).lower()
-        added = _SUM.search(said) if re.search(rf"\b{things}\b", said) else None
-        if added is not None and kinds_of(part) <= {"integer"} and listing is not None:
-            known = [word for word in (added[1], singular(added[1])) if word in listing.members]
-            found |= dict.fromkeys([name][: len(known)], *known[:1]) if known else {}
-        elif plain_name(name) in counts or re.search(rf"\b(?:how many|number of)(?: the)? {things}\b", said):
-            found[name] = ""
+        added = _SUM.search(said) if re.search(rf"\b{things}\b", said) and kinds_of(part) <= {"integer"} else None
+        words = (
+            [word for word in (added[1], singular(added[1])) if word in listing.members] if added and listing else []
+        )
+        if words or plain_name(name) in counts or re.search(rf"\b(?:how many|number of)(?: the)? {things}\b", said):
+            found[name] = next(iter(words), "")
     return found
 
 
@@ -274,7 +274,7 @@ def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequ
     """Return the numbers of a thing as the items of the list below it make them, as far as both are known."""
     found = dict[str, float]()
     for name, member in numbers.items():
-        values: list[Any] = [members_of(item).get(member) for item in items] if member else [1] * len(items)
+        values: list[Any] = [members_of(item).get(member) if member else 1 for item in items]
         found |= {name: sum(values)} if all(map(is_number, values)) and is_number(thing.get(name)) else {}
     return found
 
@@ -287,22 +287,18 @@ class Sublists:
     """
 
     def __init__(self, contract: Contract) -> None:
-        operations = {(one.method, one.template.rstrip("/")): one for one in operations_of(contract)}
-        reads = {path: one for (method, path), one in operations.items() if method == "GET"}
-        pairs = {path: reads[path.rpartition("/")[0]] for path in reads if path.rpartition("/")[0] in reads}
-        self._below = frozenset(path for path, above in pairs.items() if collection_of(above.template))
-        # By path template of the list: the thing that it is below, and the numbers that both tell.
-        self._pairs = {
-            path: (above, found) for path, above in pairs.items() if (found := numbers_of(above, reads[path]))
+        operations = operations_of(contract) if contract.openapi_path else ()
+        reads = {one.template.rstrip("/"): one for one in operations if one.method == "GET"}
+        below = {path: reads[above] for path in reads if (above := path.rpartition("/")[0]) in reads}
+        # By path template of a list: the numbers that the thing above it tells too.
+        self._numbers = {
+            path: numbers_of(one, reads[path]) for path, one in below.items() if collection_of(one.template)
         }
-        # By operation: lists below the thing that it writes, which stay by its description.
-        self._stay = {
-            one.label: frozenset(path for path in pairs if path.rpartition("/")[0] == template and is_left(one, path))
-            for (method, template), one in operations.items()
-            if method in {"PUT", "PATCH"}
-        }
-        self._lists: dict[str, tuple[str, tuple[Any, ...], tuple[str, ...]]] = {}
+        self._above = {path.rpartition("/")[0] for path, numbers in self._numbers.items() if numbers}
+        # By path: the path template and the page of a list, and what a thing shows, since the last change.
+        self._lists: dict[str, tuple[str, Page]] = {}
         self._things: dict[str, dict[str, Any]] = {}
+        # By path: the items of a list before a request that leaves them, and that.
         self._before: dict[str, tuple[tuple[str, ...], str]] = {}
         # Numbers that once were right, as others may count something else.
         self._right: set[tuple[str, str]] = set()
@@ -310,61 +306,51 @@ class Sublists:
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
-        operation, answer = occasion.operation, occasion.response
-        path = occasion.context.target.partition("?")[0].rstrip("/")
-        if occasion.request.method not in SAFE:
-            if not refuses(answer.status, operation):
-                stay, label = (
-                    self._stay.get(operation.label if operation else "", ()),
-                    f"{occasion.request.method} {path}",
-                )
-                below = {key: one for key, one in self._lists.items() if key.rpartition("/")[0] == path}
-                self._before = {key: (ids, label) for key, (template, _, ids) in below.items() if template in stay}
-                self._lists, self._things, self._changed_s = {}, {}, answer.received_s
+        operation, answer, method = occasion.operation, occasion.response, occasion.request.method
+        path, template = occasion.context.target.rstrip("/"), operation.template.rstrip("/") if operation else ""
+        if method not in SAFE and not refuses(answer.status, operation):
+            label = f"{method} {path}"
+            kept = [key for key, (template, _) in self._lists.items() if operation and is_left(operation, template)]
+            self._before = {
+                key: (self._lists[key][1].identities, label) for key in kept if key.rpartition("/")[0] == path
+            }
+            self._lists, self._things, self._changed_s = {}, {}, answer.received_s
+        if operation is None or method != "GET" or not answer.ok or not occasion.context.plain:
             return
-        if operation is None or occasion.request.method != "GET" or not answer.ok or not occasion.context.plain:
-            return
-        page, template = page_of(answer, operation), operation.template.rstrip("/")
-        if template in self._below and page is not None and "?" not in occasion.context.target:
+        if template in self._numbers and (page := page_of(answer, operation)) is not None:
             yield from self._list(occasion, operation, path, page)
-        elif is_json(answer.media_type):
+        elif template in self._above and is_json(answer.media_type):
             self._things[path] = object_in(read_json(answer.body).value, {*map(plain_name, parts_of(operation.shape))})
         for key in [key for key in self._lists if path in {key, key.rpartition("/")[0]}]:
-            template, items, _ = self._lists[key]
-            thing = self._things.get(key.rpartition("/")[0], {})
-            numbers = self._pairs[template][1] if template in self._pairs else {}
-            for name, number in numbers_by_items(numbers, thing, items).items():
-                yield from self._judge(occasion, (template, name), thing[name], number, is_said=bool(numbers[name]))
+            (template, page), thing = self._lists[key], self._things.get(key.rpartition("/")[0], {})
+            for name, number in numbers_by_items(self._numbers[template], thing, page.items).items():
+                # It may be late after a change.
+                holds, is_late = thing[name] == number, occasion.sent_s - self._changed_s <= SETTLES_S
+                self._right |= {(template, name)} if holds else set()
+                is_known = self._numbers[template][name] or (template, name) in self._right
+                expected = f"{number} as {name}, by the items of the list below it"
+                if holds or (is_known and not is_late):
+                    yield _case(occasion, name, f"{thing[name]} as {name}", expected, holds=holds)
 
     def _list(self, occasion: Occasion, operation: Operation, path: str, page: Page) -> Iterator[Case]:
         """Take a list, and judge whether it has the items that it had before the thing above it was written."""
-        listing, ids = listing_of(operation), page.identities
-        most = listing.most({}) if listing is not None else 0
-        before, label = self._before.pop(path, ((), ""))
-        lost = [one for one in before if one not in ids]
+        listing, (before, label) = listing_of(operation), self._before.pop(path, ((), ""))
+        lost = [one for one in before if one not in page.identities]
         if before:
             expected = f"the {len(before)} items as before {label}, which leaves them by its description"
-            cause, found = f"{operation.label} stay", f"{len(ids)} items, without {''.join(lost[:1])}"
+            cause, found = f"{operation.label} stay", f"{len(page.items)} items, without {''.join(lost[:1])}"
             yield occasion.case("description/written-is-read", not lost, expected, found, cause=cause)
-        if not page.goes_on and (not most or len(ids) < most):
-            self._lists[path] = operation.template.rstrip("/"), page.items, ids
-
-    def _judge(
-        self, occasion: Occasion, key: tuple[str, str], told: float, number: float, *, is_said: bool
-    ) -> Iterator[Case]:
-        """Judge a number of a thing by the items of the list below it; it may be late after a change."""
-        holds = told == number
-        self._right |= {key} if holds else set()
-        if holds or ((is_said or key in self._right) and occasion.sent_s - self._changed_s > SETTLES_S):
-            expected = f"{number} as {key[1]}, by the items of the list below it"
-            yield _case(occasion, key[1], f"{told} as {key[1]}", expected, holds=holds)
+        most = listing.most({}) if listing is not None else 0
+        if not page.goes_on and (not most or len(page.items) < most):
+            self._lists[path] = operation.template.rstrip("/"), page
 
 
 def is_left(write: Operation, path: str) -> bool:
-    """Return whether a list stays as it is when the thing above it is written, by the description."""
+    """Return whether a list stays as it is when the thing above it is written by PUT or PATCH, by the description."""
     things = path.rpartition("/")[2].lower()
     said = [text for text in re.split(r"[.;]\s", write.text.lower()) if _STAY.search(text)]
-    return any(re.search(rf"\b(?:{things}|{singular(things)})\b", text) for text in said)
+    named = any(re.search(rf"\b(?:{things}|{singular(things)})\b", text) for text in said)
+    return named and write.method in {"PUT", "PATCH"}
 
 
 def says_filtered(listing: Listing) -> set[str]:
