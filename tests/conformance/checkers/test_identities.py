@@ -154,7 +154,7 @@ def test_what_the_head_of_a_description_and_names_of_members_promise(says, steps
     id_ = {"in": "path", "name": "id", "required": True, "schema": {"type": "string"}}
     paths = {"/notes": {"post": {"responses": {"201": own}}}, "/notes/{id}": {"parameters": [id_], **item}}
     document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1", "description": says}, "paths": paths}
-    checkers, found = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), _BASE), []
+    checkers, found = RestCheckers(contract_of(tmp_path, document), _BASE), []
     for number, (method, path, status, told) in enumerate(steps):
         request = Request(method, _BASE + path, (("Host", "device"),))
         octets = b"" if told is None else json.dumps(told).encode()

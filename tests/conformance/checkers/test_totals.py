@@ -3,12 +3,10 @@
 import json
 
 import pytest
-from small_device import answers, described
+from small_device import answers, contract_of, described
 from valve_lists import BASE, STATES, TOTAL, VALVES, Seen, whole, word
 
 from conformance.checkers.rest import RestCheckers
-from conformance.contract.described import write_described_pack
-from conformance.contract.pack import Contract
 from conformance.transport.exchange import Exchange, Request, Response
 
 
@@ -208,7 +206,7 @@ def _crate_faults(tmp_path, says, steps):
     get = {"get": {"responses": {"200": answers(bottles)}}, "parameters": [_ID]}
     one = {"get": {"responses": crate}, "put": {"summary": says, "responses": crate}, "parameters": [_ID]}
     document = described({"/crates/{id}": one, "/crates/{id}/bottles": get}, "3.1.0")
-    checkers = RestCheckers(Contract.load(write_described_pack(tmp_path, document, document)), BASE)
+    checkers = RestCheckers(contract_of(tmp_path, document), BASE)
     now, broken = 0.0, set()
     for after, *said in steps:
         read = [("GET", "", dict(zip(_CRATE, ("a", *said[:-1]), strict=False)))] if said else [("PUT", "", {})]
