@@ -21,7 +21,7 @@ from conformance.api.rest.things import another, collection_of, identifier_of, p
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
-from conformance.checkers.totals import is_left, numbers_by_items, numbers_of
+from conformance.checkers.totals import is_left
 from conformance.documents.files import file_of, keeps_octets
 from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
@@ -36,6 +36,7 @@ from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.special_bodies import is_list_of_changes, special_bodies
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
+from conformance.scenarios.whole_list import read_numbers
 from conformance.scenarios.writing import Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 from conformance.transport.parallel import send_together
@@ -363,7 +364,7 @@ class _Thing:
             inputs = usual_inputs(read, values)[0]
             outgoing, _ = self._at(read, inputs, below)
             found = self.surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), outgoing).exchange
-            self._count(self.read, read, outgoing)
+            read_numbers(Writer(self.api, values), read, outgoing.target.partition("?")[0])
             for change in changes:
                 bodies = self._bodies(change, self._members()) if is_left(change, template) and self.get().ok else []
                 if bodies and self.send(change, bodies[-1], *self._current()).ok:
@@ -376,25 +377,6 @@ class _Thing:
                 self.surveyor.paged.append(Paged(read.label, ANOTHER, after[0], expected, fault))
                 self._read_elsewhere(operations, template, page.items[-1], other)
             self.surveyor.paged += pages_below(self.api, values, listing, outgoing.target.partition("?")[0])
-
-    def _count_above(self, lister: Operation | None) -> None:
-        """Read the list that it is in, and the thing above that, if both can be read."""
-        reads = operations_of(self.api.run.contract) if lister is not None and allows(self.api, lister) else ()
-        for above in (one for one in reads if one.method == "GET"):
-            if lister is not None and above.template == lister.template.rpartition("/")[0]:
-                self._count(above, lister, Outgoing("GET", self.target.rpartition("/")[0]))
-
-    def _count(self, above: Operation, lister: Operation, request: Outgoing) -> None:
-        """Read a list and the thing above it until their numbers agree, or the time for that is over."""
-        numbers, until = numbers_of(above, lister), time.monotonic() + _SETTLES_S
-        path = request.target.partition("?")[0].rstrip("/")
-        while numbers:
-            listed, thing = self.api.send(replace(request, target=path)), Outgoing("GET", path.rpartition("/")[0])
-            page, now = page_of(listed.response, lister), members(self.api.send(thing), numbers)
-            right = numbers_by_items(numbers, now, page.items) if page is not None else {}
-            if time.monotonic() > until or all(now[name] == number for name, number in right.items()):
-                return
-            time.sleep(_PAUSE_S)
 
     def _read_elsewhere(
         self, operations: Mapping[tuple[str, str], Operation], template: str, value: Any, other: str
@@ -525,7 +507,7 @@ class _Thing:
         listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
         id_ = identifier_of(was, self.read)
         queries = list(_filters(listing, was)) if listing is not None and id_ else []
-        self._count_above(lister)
+        read_numbers(Writer(self.api, self.surveyor.values), lister, self.target.rpartition("/")[0])
         for query in queries:
             # A device may cache the response.
             self._look_in(listing, query, id_, began - _SETTLES_S)
@@ -549,7 +531,7 @@ class _Thing:
         is_gone = self.get(place=_GONE_PLACE).status in ABSENT
         for read, request in self.below if is_gone else ():
             self._look_at_gone(read, request)
-        self._count_above(lister)
+        read_numbers(Writer(self.api, self.surveyor.values), lister, self.target.rpartition("/")[0])
         for query in queries if is_gone else ():
             self._look_in(listing, query, id_, began)
 

@@ -13,12 +13,13 @@ from urllib.parse import quote
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.listing import Page, cursors, listing_of, page_of
 from conformance.api.rest.things import collection_of, id_member, identifier_of
+from conformance.checkers.totals import numbers_by_items, numbers_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import json_text
-from conformance.scenarios.writing import Writer
-from conformance.transport.exchange import Exchange, NoAnswerError
+from conformance.scenarios.writing import Writer, members
+from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing
 from conformance.transport.parallel import send_together
 
 _PAGES: Final = 5
@@ -118,6 +119,23 @@ def _seems_cut(lister: Operation, page: Page, sent: Mapping[str, Any]) -> bool:
     return bool(count) and (
         count in {most, *(item for item in said if isinstance(item, int))} or (count >= _FEWEST and count % _ROUND == 0)
     )
+
+
+def read_numbers(writer: Writer, lister: Operation | None, path: str) -> None:
+    """Read a list and the thing above it until the numbers that both tell agree, or the time for that is over."""
+    template = lister.template.rstrip("/") if lister is not None else ""
+    known, path = callable_operations(writer.api), path.rstrip("/")
+    above = known.get(("GET", template.rpartition("/")[0]))
+    numbers = numbers_of(above, lister) if above is not None and lister is not None else {}
+
+    def agree(found: list[Exchange]) -> bool:
+        page, now = page_of(found[0].response, lister), members(found[1], numbers)
+        right = numbers_by_items(numbers, now, page.items) if page is not None else {}
+        return all(now[name] == number for name, number in right.items())
+
+    if numbers:
+        requests = [Outgoing("GET", there) for there in (path, path.rpartition("/")[0])]
+        writer.until(lambda: [writer.api.send(request) for request in requests], agree)
 
 
 def read_items(writer: Writer) -> None:
