@@ -432,7 +432,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     for said in _REFUSED.finditer(operation.text):
         for unless, subject, no, rest in _IS.findall(said[1]):
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
-                if named := _listed(rest, values):
+                if named := _values_in(rest, values):
                     found[member] |= set(values) - named if bool(unless) != bool(no) else named
     starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
     if starts and not found[name]:
@@ -440,7 +440,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     return {member: frozenset(values) for member, values in found.items() if values}
 
 
-def _listed(predicate: str, words: dict[str, str]) -> set[str]:
+def _values_in(predicate: str, words: dict[str, str]) -> set[str]:
     """Return the values whose words begin a predicate, as in "running or paused, or has items"; none beside "and"."""
     found = set[str]()
     for part in re.split(r"\s*,\s*(?:or\s+)?|\s+or\s+", predicate.strip()):

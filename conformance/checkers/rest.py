@@ -30,7 +30,7 @@ from conformance.verdict.evidence import Case
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
-    fields.promised, declared.crash, declared.server_error, declared.status, declared.body,
+    fields.promised_fields, declared.crash, declared.server_error, declared.status, declared.body,
 )  # fmt: skip
 
 # What a device may show later, or as what is in effect, if its description says so.
