@@ -203,7 +203,7 @@ def _with_values(operation: Operation, values: Mapping[str, str]) -> Operation:
 
 
 def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
-    """Return the operation in the same folder, or in one around it, that is called stop or the like; the nearest."""
+    """Return the nearest operation in the same folder, or one around it, called stop; else the DELETE of a move."""
     path = drive.template.partition("?")[0]
     stops = [
         operation
@@ -214,7 +214,10 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
         and path.startswith(f"{posixpath.dirname(operation.template).rstrip('/')}/")
     ]
     found = max(stops, key=lambda operation: operation.template.count("/"), default=None)
-    if found is None or found.never:
+    if found is None:
+        own = re.compile(rf"{re.escape(path)}/\{{[^{{}}]+\}}")
+        return next((one for one in operations if one.method == "DELETE" and own.fullmatch(one.template)), None)
+    if found.never:
         return None
     return None if any(one.required and one.name != lease_header(found) for one in found.parameters) else found
 

@@ -27,6 +27,7 @@ from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
+from conformance.statement.motion_calls import NAME
 from conformance.transport.exchange import Exchange
 
 # _BEFORE_S: how long the device is watched before and after a small move. _MOVES_S: time for the move, s.
@@ -45,6 +46,8 @@ _LIMITS: Final = (
     ("limits/lower", "limits/upper"),
     ("min", "max"),
 )
+# Share of the ways on which axes without limits were seen to go that is tried of several.
+_TOGETHER: Final = 0.5
 # How long a way may take by what a small move took, so that the limits are tried, s.
 _FULL_WAY_S: Final = 5.0
 # _LONGEST_S: how long a device that still moves is watched. _PAUSES_S: how long it may stand on its way, s.
@@ -114,10 +117,14 @@ class PositionFinder(Finder):
         self._gone, self._why = dict.fromkeys(start, 0.0), dict[str, str]()
         until = self._clock.now() + _BUDGET_S
         try:
-            moved = self._try_axes(numbers, start)
+            moved, tried = self._try_axes(numbers, start), set(self._numbers)
+            # What followed beside axes that did not is tried again without them: one may keep another from its place.
+            while 1 < len(moved) < len(tried):
+                tried = set(moved)
+                moved = self._try_axes([self._numbers[name] for name in moved], start)
             for number in numbers if len(numbers) > 1 else ():
-                if number.name not in moved and self._clock.now() < until:
-                    moved |= self._try_axes([number], start)
+                if not moved and self._clock.now() < until:
+                    moved = self._try_axes([number], start)
         finally:
             if not self._relative:
                 self._command(start)
@@ -397,7 +404,9 @@ class PositionFinder(Finder):
         declared = self._limits(number)
         if declared and found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way:
             return declared
-        return round(here + min(0.0, *found.ways), 4), round(here + max(0.0, *found.ways), 4)
+        # Together, axes without limits may not go as far as they were seen to go.
+        share = 1.0 if declared or len(self._numbers) == 1 else _TOGETHER
+        return round(here + share * min(0.0, *found.ways), 4), round(here + share * max(0.0, *found.ways), 4)
 
     def _unit(self, number: Commanded) -> str:
         """Return the unit of an axis by its name or description; of what turns, rad, which a turn of 7 is not."""
@@ -413,12 +422,13 @@ class PositionFinder(Finder):
         schema = body_schema(stop)
         wanted = [name for part in parts_of(schema) for name in part.get("required", ())]
         told = self._answer if isinstance(self._answer, dict) else {}
-        if any(name not in told for name in wanted):
+        ids = {name: name if name in told else "id" for name in NAME.findall(stop.template)}
+        if any(name not in told for name in (*wanted, *ids.values())):
             self._found.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
             return
         yield ""
         yield "[motion.stop]"
-        yield f"send = {string(stop.label)}"
+        yield f"send = {string(NAME.sub(lambda name: f'{{goto:/{ids[name[1]]}}}', stop.label))}"
         if wanted:
             yield f"body = {inline({name: f'{{goto:/{name}}}' for name in wanted})}"
         yield "rests_within_s = 1.0  # the suite's"

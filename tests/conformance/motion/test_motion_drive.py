@@ -331,6 +331,18 @@ def test_a_list_is_driven_by_the_names_of_its_items_and_carries_the_lease_in_the
     assert Looks(titles_in(_POSE)).is_heading("/pose/2")
 
 
+def test_the_stop_is_the_nearest_one_and_else_the_end_of_a_move():
+    move = {"requestBody": {"content": {"application/json": {"schema": _BODY}}}, "responses": {}}
+    stop, read = {"post": {"responses": {}}}, {"get": {"responses": {"200": {"content": {"application/json": {}}}}}}
+    paths = {"/arm/moves": {"post": move}, "/arm/moves/{id}": {"delete": {"responses": {}}}, "/state": read}
+    for more, found in ({}, "DELETE /arm/moves/{id}"), ({"/stop": stop, "/app/stop": stop}, "POST /stop"):
+        operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": {**paths, **more}})
+        assert plan_of(operations, "POST /arm/moves", None, CallRules()).stop.label == found
+    stop["post"]["summary"] = "Emergency stop, latched until it is reset"
+    operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": {**paths, "/stop": stop}})
+    assert plan_of(operations, "POST /arm/moves", None, CallRules()).stop.method == "DELETE"
+
+
 def test_what_commands_in_the_query_is_found():
     query = [{"name": name, "in": "query", "schema": _NUMBER} for name in ("x", "timeout_ms")]
     operations = read_operations(
