@@ -118,11 +118,8 @@ def _print_summary(results: list[MemberResult]) -> None:
     click.echo()
     for result in results:
         trusted = ", ".join(result.trusted_classes)
-        told = f"may be trusted with {trusted}" if trusted else f"may be trusted with nothing{_because(result)}"
+        reason = f": {result.reason}" if result.reason and not trusted else ""
+        told = f"may be trusted with {trusted or 'nothing'}{reason}"
         click.echo(f"  {result.member.name:<{width}}  {result.outcome:<14}  {inert(told)}")
     count = sum(result.outcome is Outcome.CONFORMANT for result in results)
     click.echo(f"\n{count} of {count_of(len(results), 'robot')} conformant")
-
-
-def _because(result: MemberResult) -> str:
-    return f": {result.reason}" if result.reason else ""

@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 
 from conformance.cli.contract import contract_option, load_pack
 from conformance.cli.explanation import UnknownRequirementError, find, ledger_of, page_of
-from conformance.contract.classes import QUESTIONS, Topic
+from conformance.contract.classes import QUESTIONS
 from conformance.contract.generic import generic_classes
 from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
@@ -20,7 +20,6 @@ from conformance.explaining.advice import FRAMEWORKS
 
 if TYPE_CHECKING:
     from conformance.cli.explanation import Explanation
-    from conformance.contract.ledger import Requirement
 
 _WIDEST = 100
 _SHOWN_MUTANTS = 8
@@ -68,7 +67,7 @@ def explain(door: Any, /, requirement: str | None, pack: str, frameworks: tuple[
 
 def _list(contract: Contract) -> None:
     ledger = ledger_of(contract)
-    topics = {id_: _topic(item) for id_, item in ledger.items()}
+    topics = {id_: item.topic or generic_classes()[item.class_].topic for id_, item in ledger.items()}
     width = max(map(len, ledger)) + 2
     for topic, question in QUESTIONS.items():
         click.echo(f"{question}")
@@ -76,10 +75,6 @@ def _list(contract: Contract) -> None:
             if topics[id_] is topic:
                 click.echo(f"  {id_:<{width}}{textwrap.shorten(item.text, max(40, _width() - width - 2))}")
     click.echo(f"{len(ledger)} requirements; roaas explain ID explains one", err=True)
-
-
-def _topic(item: Requirement) -> Topic:
-    return item.topic or generic_classes()[item.class_].topic
 
 
 def _lines(explanation: Explanation, contract: Contract, frameworks: Iterable[str]) -> Iterator[str]:

@@ -70,7 +70,8 @@ def apart(one: Placed, other: Placed) -> bool:
     """Return whether two schemas are known to have no value in common."""
     try:
         wholes = [_whole(*one), _whole(*other)]
-        found = {name: part for whole in wholes for name, part in _definitions(whole).items()}
+        objects = (whole for whole in wholes if isinstance(whole, dict))
+        found = {name: part for whole in objects for name, part in whole.get("$defs", {}).items()}
         both = jsonschema_rs.canonicalize({"allOf": wholes, "$defs": found}, **_options())
         return bool(both.satisfiability() == Satisfiability.NO)
     except _UNUSABLE:
@@ -110,10 +111,6 @@ def _whole(schema: Any, side: Side) -> Any:
     found = {name.rpartition("/")[2]: target for name, target in needed.items()}
     whole: Schema = dict(schema)
     return whole | {"$defs": found} if found else whole
-
-
-def _definitions(whole: Any) -> Schema:
-    return whole.get("$defs", {}) if isinstance(whole, dict) else {}
 
 
 def _parts(schema: Schema) -> Iterator[Any]:

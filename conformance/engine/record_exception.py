@@ -87,7 +87,8 @@ def _record_gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswe
             found=f"{error.unanswered.problem}, and no response to any request since",
         )
     risks = {run.contract.ids_by_alias.get(id_, id_) for id_ in risked}
-    ended = [finding for finding in run.judge.met if finding.requirement in risks and _ends_with(finding, error)]
+    met = (finding for finding in run.judge.met if finding.requirement in risks)
+    ended = [finding for finding in met if finding.exchange is error.unanswered]
     for finding in ended:
         finding.alone = True
     run.judge.ended_by = next((finding for finding in ended if _is_claimed(run, finding)), None)
@@ -99,7 +100,3 @@ def _record_gone(run: Run, known: list[str], open_ids: list[str], error: NoAnswe
 
 def _is_claimed(run: Run, finding: Finding) -> bool:
     return finding.requirement in run.contract.ledger and run.contract.ledger[finding.requirement].binds(run.claims)
-
-
-def _ends_with(finding: Finding, error: NoAnswerError) -> bool:
-    return finding.exchange is error.unanswered

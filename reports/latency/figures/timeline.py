@@ -56,7 +56,8 @@ def stalls(result: Mapping[str, Any]) -> list[Stall]:
                 found.pop()
                 longest = max((x for x in (open_stall.longest_ms, longest) if x is not None), default=None)
             start = open_stall.start_s if open_stall is not None else point["t_s"]
-            open_stall = Stall(start, point["t_s"] + width, longest, _key(series))
+            key = series["operation"], series["client"], series["interface"]
+            open_stall = Stall(start, point["t_s"] + width, longest, key)
             found.append(open_stall)
     return found
 
@@ -150,10 +151,6 @@ def _thin_out(points: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 def _nonempty(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     series = result.get("time_series", {}).get("series", [])
     return [item for item in series if any(point["count"] or point["errors"] for point in item["points"])]
-
-
-def _key(series: Mapping[str, Any]) -> tuple[str, str, str]:
-    return series["operation"], series["client"], series["interface"]
 
 
 def leading(series: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

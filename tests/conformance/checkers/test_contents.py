@@ -4,7 +4,7 @@ import hashlib
 from base64 import b64encode
 
 import pytest
-from small_device import contract_of
+from small_device import contract_of, described
 
 from conformance.checkers.rest import RestCheckers
 from conformance.documents.files import file_of
@@ -56,8 +56,7 @@ def _one(line, body=b"", sent=b"", *, kind=_OCTETS, at_s=0.0, **fields):
 
 
 def _broken(tmp_path, exchanges):
-    document = {"openapi": "3.1.0", "info": {"title": "d", "version": "1"}, "paths": _PATHS}
-    judges = RestCheckers(contract_of(tmp_path, document), _BASE)
+    judges = RestCheckers(contract_of(tmp_path, described(_PATHS, "3.1.0")), _BASE)
     ids = ("http/range", "description/digest", "description/written-is-read", "description/entity-tag")
     named = {*ids, "description/problem-status", "description/if-match", "description/required", "rest-formats/vary"}
     return {case.requirement for exchange in exchanges for case in judges(exchange) if not case.holds} & named

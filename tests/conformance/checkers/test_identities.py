@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from small_device import contract_of
+from small_device import contract_of, described
 
 from conformance.checkers.rest import RestCheckers
 from conformance.transport.exchange import Exchange, Request, Response
@@ -20,7 +20,7 @@ def _paths(name, schema):
 
 @pytest.fixture(scope="module", params=[("id", {"type": "integer"}), ("thing_id", {}), ("name", {"type": "string"})])
 def contract(request, tmp_path_factory):
-    document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": _paths(*request.param)}
+    document = described(_paths(*request.param), "3.1.0")
     return contract_of(tmp_path_factory.mktemp("pack"), document), request.param[0]
 
 
@@ -113,8 +113,7 @@ def test_what_is_unique_stays_unique(name, tmp_path):
     paths = _paths("id", {"type": "integer"})
     body = {"content": {"application/json": {"schema": _CODE}}}
     paths["/things"]["post"] = {"requestBody": body, **paths["/things"]["get"]}
-    document = {"openapi": "3.1.0", "info": {"title": "t", "version": "1"}, "paths": paths}
-    checkers, wrong = (RestCheckers(contract_of(tmp_path / "pack", document), _BASE), [])
+    checkers, wrong = RestCheckers(contract_of(tmp_path / "pack", described(paths, "3.1.0")), _BASE), []
     for method, last, value, status in steps:
         sent = json.dumps(value).encode() if method in {"POST", "PUT", "PATCH"} else b""
         fields = (("Host", "device"), ("Content-Type", "application/json")) if sent else (("Host", "device"),)

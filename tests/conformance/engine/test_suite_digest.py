@@ -3,8 +3,8 @@
 import shutil
 
 import pytest
+from small_device import contract_of, described
 
-from conformance.contract.described import write_described_pack
 from conformance.contract.pack import Contract
 from conformance.contract.requirement_sets import judged_by, load_set
 from conformance.engine.suite import JUDGING, contract_digests, suite_digest, suite_facts
@@ -62,9 +62,7 @@ def test_the_contract_is_in_it(package, tmp_path_factory):
 
 
 def test_a_pack_without_frozen_sets_has_the_one_of_its_ledger(tmp_path):
-    description = {"openapi": "3.1.0", "info": {"title": "Lamp", "version": "1"}, "paths": {}}
-    write_described_pack(tmp_path / "pack", description, description)
-    contract = Contract.load(tmp_path / "pack")
+    contract = contract_of(tmp_path / "pack", described({}))
     scored = judged_by(contract, None)
     assert scored is not None
     assert suite_facts(str(contract.directory))["requirement_sets"] == {"unfrozen": scored.digest}

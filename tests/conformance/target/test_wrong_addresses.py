@@ -9,15 +9,12 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from click.testing import CliRunner
+from small_device import described
 from web_certificate import pair
 
 import roaas
 
-DESCRIPTION = {
-    "openapi": "3.0.3",
-    "info": {"title": "device", "version": "1"},
-    "paths": {"/state": {"get": {"responses": {"200": {"description": "ok"}}}}},
-}
+DESCRIPTION = described({"/state": {"get": {"responses": {"200": {"description": "ok"}}}}})
 PAGE = b"<!doctype html><html><head><title>Robot &amp;\n Console</title></head></html>"
 #: For each kind of server what it answers by path: status, media type and content; by default the path "".
 SERVERS = {
