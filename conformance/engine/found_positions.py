@@ -207,7 +207,7 @@ class PositionFinder(Finder):
 
     def _try_axes(self, numbers: Sequence[Commanded], start: Mapping[str, float]) -> dict[str, Moved]:
         """Move axes at once, a little to each side; return how each followed. Without limits, first less far."""
-        found: dict[str, list[Moved]] = {}
+        found, kept = dict[str, list[Moved]](), dict[str, Moved]()
         parts = _PARTS[all(number.bounds for number in numbers) :]
         # An angle that stays where it is may be one in degrees.
         parts += (_DEGREES,) if all(number.turns and not self._limits(number) for number in numbers) else ()
@@ -228,7 +228,8 @@ class PositionFinder(Finder):
             self._send_by(start, {})
             self._watch(max((one.took_s for own in found.values() for one in own), default=_BEFORE_S))
             found = {name: own for name, own in found.items() if name not in lost}
-        return {name: _worst(own) for name, own in found.items()}
+            kept |= {name: _worst(own) for name, own in found.items()}
+        return kept
 
     def _has_room(self, name: str, goal: float) -> bool:
         """Return whether a target is within the declared limits; without any, it is."""
