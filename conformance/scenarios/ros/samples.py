@@ -35,8 +35,8 @@ _ITEMS: Final = (3, 0, 1, 7)
 _INNER: Final = 2
 _SECONDS: Final = 2**31 - 1
 _NANOSECONDS: Final = 999_999_999
-_LARGE_OCTETS: Final = 1024 * 1024
-_LARGE_NUMBERS: Final = 10_000
+# Octets for each number of a large message.
+_OCTETS: Final = 100
 _GENTLE: Final = 0.001
 _GENTLY: Final = 50
 
@@ -84,18 +84,18 @@ class Maker:
         self._random = random.Random(f"{self.seed} {self.definition.root}")  # noqa: S311 - values, no secrets
         self._leaf, self._texts, self._gentle = itertools.count(), itertools.count(), itertools.count()
 
-    def samples(self, most: int, *, large: bool) -> Iterator[Sample]:
+    def samples(self, most: int, *, large: int) -> Iterator[Sample]:
         """Yield messages: usual ones, those that a fault is likely to change, and usual ones again.
 
         Args:
             most: how many, beside large ones and those with NaN or infinities.
-            large: whether large ones are among them.
+            large: how many numbers the large ones have; 0: there are none.
         """
         yield self.usual()
         yield Sample("the message with its defaults", Kind.DEFAULT, {})
         for turn in range(max(0, most - 4)):
             yield Sample(f"message {turn + 1} of extreme values", Kind.EXTREME, self._message(turn))
-        if large and (grown := self._large()) is not None:
+        if large and (grown := self._large(large)) is not None:
             yield grown
         yield self.usual()
         yield from self._non_finite()
@@ -179,16 +179,16 @@ class Maker:
                 text = "plain"
         return text[:longest]
 
-    def _large(self) -> Sample | None:
+    def _large(self, number: int) -> Sample | None:
         for field, shape in self.definition.fields():
             if shape.is_array and shape.most is None and shape.item in {"uint8", "octet", *FLOATS}:
                 value = self._message(None)
                 if shape.is_octets:
-                    octets = self._random.randbytes(_LARGE_OCTETS)
+                    octets = self._random.randbytes(_OCTETS * number)
                     value[field] = {"b64": base64.b64encode(octets).decode()}
-                    return Sample("a message with 1 MB of octets", Kind.LARGE, value)
-                value[field] = [self._any(Shape(shape.item)) for _ in range(_LARGE_NUMBERS)]
-                return Sample(f"a message with {_LARGE_NUMBERS:,} numbers", Kind.LARGE, value)
+                    return Sample(f"a message with {_OCTETS * number:,} octets", Kind.LARGE, value)
+                value[field] = [self._any(Shape(shape.item)) for _ in range(number)]
+                return Sample(f"a message with {number:,} numbers", Kind.LARGE, value)
         return None
 
     def _non_finite(self) -> Iterator[Sample]:

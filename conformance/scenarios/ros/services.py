@@ -40,8 +40,7 @@ _BESIDE: Final = 4
 _HELD_S, _HELD = 0.8, 5.0
 # A request that a call holds up ends at most this long before the call's response, s.
 _TOGETHER_S: Final = 0.25
-# _OVERTAKEN_S: how much earlier every second of many concurrent calls is answered than the one before, s. _FEW: so many
-# at quick. _CALLS: calls one by one.
+# _OVERTAKEN_S: how much earlier every second concurrent call is answered, s. _FEW: of these at quick. _CALLS: in a row.
 _OVERTAKEN_S: Final = 0.1
 _FEW: Final = 4
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
@@ -255,7 +254,7 @@ class _Caller:
     @staticmethod
     def _finite(maker: Maker, most: int) -> Iterator[Sample]:
         """Yield samples without NaN and infinities, which a gateway may refuse."""
-        return (sample for sample in maker.samples(most, large=False) if sample.kind is not Kind.NON_FINITE)
+        return (sample for sample in maker.samples(most, large=0) if sample.kind is not Kind.NON_FINITE)
 
     def _call_server(self, server: Server, request: dict[str, Any], answer: dict[str, Any] | None = None) -> Called:
         robot, body = self._gateway.robot, self._body

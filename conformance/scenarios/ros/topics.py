@@ -45,6 +45,7 @@ _BURST: Final = 8
 _OF_EACH: Final = 3
 _TEXTS: Final = "a message with a text in place of each number"
 _SAMPLES: Final = {"quick": 8, "standard": 16, "deep": 40}
+_LARGE: Final = {"quick": 2_000, "standard": 10_000, "deep": 10_000}
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class _Reader:
     def publish_samples(self, effort: Effort) -> Iterator[Shown]:
         """Publish messages, and yield the gateway's response for each."""
         lost = 0
-        samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=effort.name != "quick")
+        samples = self.gateway.maker(self.definition).samples(_SAMPLES[effort.name], large=_LARGE[effort.name])
         for sample in samples:
             shown = self.of(sample)
             yield shown
@@ -321,7 +322,7 @@ class _Writer:
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
         """Yield each message with its outcome."""
         if self.gateway.plays:
-            samples = list(self.maker.samples(_SAMPLES[effort.name], large=effort.name != "quick"))
+            samples = list(self.maker.samples(_SAMPLES[effort.name], large=_LARGE[effort.name]))
         else:
             samples = [self.maker.gentle() for _ in range(_BURST)]
         for sample in samples:

@@ -32,7 +32,7 @@ MAPS = [
 @pytest.mark.parametrize("name", TYPES)
 def test_each_sample_is_a_message_and_what_is_written_of_it_is_right(name):
     definition, body = Definition(name, described(name)), Body(at="/data")
-    for sample in Maker(definition, 0).samples(12, large=False):
+    for sample in Maker(definition, 0).samples(12, large=0):
         whole = plain(message_of(name, sample.value))
         assert equal(whole, sample.value), list(changes(whole, sample.value))
         for ros in MAPS:
@@ -42,7 +42,7 @@ def test_each_sample_is_a_message_and_what_is_written_of_it_is_right(name):
 
 def test_the_same_seed_makes_the_same_messages_and_usual_ones_differ():
     definition = Definition("geometry_msgs/msg/Twist", described("geometry_msgs/msg/Twist"))
-    one, other = (list(Maker(definition, 7).samples(8, large=True)) for _ in range(2))
+    one, other = (list(Maker(definition, 7).samples(8, large=10_000)) for _ in range(2))
     assert repr(one) == repr(other)
     maker = Maker(definition, 7)
     assert len({repr(maker.gentle().value) for _ in range(20)}) == 20
