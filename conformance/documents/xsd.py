@@ -17,7 +17,7 @@ from typing import Any, Final
 from lxml import etree
 
 from conformance.documents.xml import XSD, XSI, clark
-from conformance.documents.xsd_assembly import Component, SchemaDocument, assemble, kind_of, references
+from conformance.documents.xsd_assembly import LEFT_OUT, Component, SchemaDocument, assemble, kind_of, references
 from conformance.documents.xsd_shapes import Element, shape
 
 _SHOWN: Final = 300
@@ -172,6 +172,7 @@ def _without_slow_patterns(folder: Path) -> bool:
             parent = pattern.getparent()
             if parent is not None:
                 parent.remove(pattern)
+                parent.set(LEFT_OUT, pattern.get("value", ""))
                 found = True
         if found:
             path.write_bytes(etree.tostring(root))

@@ -11,7 +11,7 @@ from math import isclose
 from typing import TYPE_CHECKING, Any, Final
 
 from conformance.documents.xml import XSD, XSI, Node, clark, elements, local, text_of
-from conformance.documents.xsd_assembly import UNKNOWN
+from conformance.documents.xsd_assembly import LEFT_OUT, UNKNOWN
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -236,24 +236,23 @@ def _simple(declared: Any) -> Simple:
     while builtin is not None and not str(builtin.name or "").startswith(clark(XSD, "")):
         builtin = builtin.base_type
     # A built-in type's own pattern adds nothing to its name.
-    patterns = None if builtin is declared else getattr(declared, "patterns", None)
+    patterns = getattr(getattr(declared, "patterns", None) if builtin is not declared else None, "regexps", None)
     return Simple(
         str(builtin.name).rpartition("}")[2] if builtin is not None else "string",
-        tuple(_lexical(value) for value in getattr(declared, "enumeration", None) or ()),
+        tuple(
+            str(value).lower() if isinstance(value, bool) else str(value)
+            for value in getattr(declared, "enumeration", None) or ()
+        ),
         _decimal(getattr(declared, "min_value", None)),
         _decimal(getattr(declared, "max_value", None)),
         getattr(declared, "min_length", None),
         getattr(declared, "max_length", None),
-        tuple(str(pattern) for pattern in getattr(patterns, "regexps", ()) or ()),
+        tuple(patterns or filter(None, (part.get(LEFT_OUT) for part in getattr(declared.elem, "iter", tuple)()))),
         digits=getattr(declared.get_facet(_FRACTION), "value", None),
     )
 
 
 _FRACTION: Final = clark(XSD, "fractionDigits")
-
-
-def _lexical(value: object) -> str:
-    return ("true" if value else "false") if isinstance(value, bool) else str(value)
 
 
 def _decimal(value: object) -> Decimal | None:

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from processes import ended
-from soap_devices import PASSWORD, SOAP_11, USER, camera, scale, serving, table
+from soap_devices import PASSWORD, SOAP_11, TABLE, USER, camera, scale, serving, table
 
 from conformance.api.call_rules import CallRules
 from conformance.contract.pack import Contract
@@ -18,6 +18,7 @@ from conformance.documents.wsdl import WsdlError, read_services
 from conformance.documents.wsdl_pack import write_soap_pack
 from conformance.documents.xsd_shapes import Simple, beyond
 from conformance.rules.soap import test_soap
+from conformance.scenarios.described_messages import DescribedMessages
 from conformance.scenarios.rule import Rule
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.scenarios.soap_changes import soap_changes
@@ -286,3 +287,15 @@ def test_an_address_takes_the_place_of_what_the_wsdl_says(tmp_path):
             more = ["--base-url", f"{url}/services/camera", "--effort", "quick", "--out", str(tmp_path / "out")]
             done = ended(sys.executable, "-m", "roaas", "certify", str(tmp_path / "camera.wsdl"), *more)
         assert (done.returncode, "1 of 2 operations called" in done.stdout) == (0, True), done.stdout + done.stderr
+
+
+def test_a_pattern_that_may_take_python_too_long_still_makes_messages():
+    trim = r'<xs:restriction base="xs:token"><xs:pattern value="[0-9]{1,4}( [0-9]{1,4}){3}"/></xs:restriction>'
+    other = TABLE.replace(
+        "<xs:sequence/>",
+        f'<xs:sequence><xs:element name="Trim"><xs:simpleType>{trim}</xs:simpleType></xs:element></xs:sequence>',
+        1,
+    )
+    found = read_services(other.replace("ADDRESS", "http://device").encode(), _SOURCE, lambda _: b"")
+    _, node = DescribedMessages(found, {}).usual(found.ports[0].operations[0])
+    assert re.fullmatch(r"\d+( \d+){3}", node.children[0].text)
