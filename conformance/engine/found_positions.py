@@ -403,7 +403,9 @@ class PositionFinder(Finder):
     def _tried_limits(self, number: Commanded, here: float, found: Moved) -> tuple[float, float]:
         """Return the limits that are declared, or those so far seen, if there are none or they are far away."""
         declared = self._limits(number)
-        if declared and found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way:
+        # A move with a duration takes as long to any place.
+        lasts = "{seconds}" in inline(self._body or {})
+        if declared and (lasts or found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way):
             return declared
         # Together, axes without limits may not go as far as they were seen to go.
         share = 1.0 if declared or len(self._numbers) == 1 else _TOGETHER
