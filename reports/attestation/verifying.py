@@ -22,12 +22,17 @@ from reports.errors import EnvelopeRefusedError, ResultMissingError
 from reports.given_files import read_octets
 
 PROVED = (
-    "Proved: the holder of this key vouches that this run took place and gave this result, and nothing was changed "
-    "since it was signed."
+    "Proved: the holder of this key vouches that this run took place and gave the result with the digest above, and the "
+    "envelope was not changed since. A file that is REFUSED above is not the one that was signed."
 )
 NOT_PROVED = (
     "Not proved: that the robot is genuine, that the named suite really ran, or that another run would give the same "
     "result. You have to know who holds the key, and decide whether to trust them."
+)
+DESCRIBED = (
+    "This device was judged by its own description, for which the default policy is not made: give a policy for such "
+    "devices and the folder of the description, as in --policy device.toml --contract description "
+    "(docs/certificates.md#a-device-that-was-judged-by-its-own-description)."
 )
 
 

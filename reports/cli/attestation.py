@@ -10,7 +10,7 @@ import msgspec
 from reports.attestation.envelope import read_envelope
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
 from reports.attestation.statement import RESULT_SUBJECT
-from reports.attestation.verifying import NOT_PROVED, PROVED, Verification
+from reports.attestation.verifying import DESCRIBED, NOT_PROVED, PROVED, Verification
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.errors import EnvelopeRefusedError
@@ -64,6 +64,8 @@ def verify(
         click.echo(f"REFUSED: {on_a_line(str(error), 500)}\n\nNothing is proved.")
         raise SystemExit(EXIT_REFUSED) from error
     _print(found, trusted.keyid)
+    if not found.accepted and found.statement.predicate.roaas.described and None in {policy, pack}:
+        click.echo(f"\n{fill(DESCRIBED, 100)}")
     if not found.accepted:
         raise SystemExit(EXIT_REFUSED)
 

@@ -77,6 +77,10 @@ def build(
         click.echo(on_a_line(said, 400), err=True)
     for refusal in refused:
         click.echo(f"refused: {on_a_line(refusal.detail, 400)}", err=True)
+    for history in (one for one in found if not one.current.stands):
+        why = f"{on_a_line(history.name, 100)} does not count: {', '.join(history.current.against)}"
+        is_own = history.current.certificate.run.described and history.name not in own
+        click.echo(why + "; judged by its own description: --device NAME POLICY PACK" * is_own, err=True)
     counting = sum(history.current.stands for history in found)
     have = "robot has" if len(found) == 1 else "robots have"
     click.echo(f"{counting} of {len(found)} {have} a valid certificate; {len(refused)} refused")
