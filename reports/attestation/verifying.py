@@ -22,8 +22,8 @@ from reports.errors import EnvelopeRefusedError, ResultMissingError
 from reports.given_files import read_octets
 
 PROVED = (
-    "Proved: the holder of this key vouches that this run took place and gave the result with the digest above, and the "
-    "envelope was not changed since. A file that is REFUSED above is not the one that was signed."
+    "Proved: the holder of this key vouches that this run took place and gave the result with the digest above, and "
+    "the envelope was not changed since. A file that is REFUSED above is not the one that was signed."
 )
 NOT_PROVED = (
     "Not proved: that the robot is genuine, that the named suite really ran, or that another run would give the same "

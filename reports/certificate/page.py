@@ -255,7 +255,7 @@ class Certificate:
 
     @property
     def first(self) -> list[Finding]:
-        """Return what to do first: a finding each of the requirements to look at first: failures, warnings, then what is accepted."""
+        """Return a finding each of the requirements to look at first: failures, warnings, then what is accepted."""
         found: dict[str, Finding] = {}
         for finding in (*self.findings("fail"), *self.findings("warn")):
             found.setdefault(finding.requirement["id"], finding)
