@@ -82,7 +82,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         client = HttpClient(base_url or "", connection)
         domain_id = RosMap({}, domain_id=options.ros_domain_id).domain
         ros = partial(ros_proposals, domain_id=domain_id, client=client) if options.ros else None
-        write_described_statement(path, found, api, Calls(options.allow, options.never), ros)
+        write_described_statement(path, found, api, Calls(options.allow, options.never), where, ros)
     except (OSError, ProbeError) as error:
         raise StatementError(str(error)) from error
     for remark in (*found.remarks, *found.unread):

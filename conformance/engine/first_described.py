@@ -8,13 +8,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from conformance.api.call_rules import CallRules
 from conformance.commandline.out_folder import write_atomically
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
 from conformance.documents.json_schema import UnresolvedError, kinds_of
 from conformance.documents.openapi import Operation, read_operations
+from conformance.documents.writing import json_text
 from conformance.engine.first_motion import proposed_map, why_no_map
+from conformance.statement.endpoints import Endpoints
 from conformance.statement.statement import Api, Calls
 
 # _MOST_REASONS: operations without a proposed map that a comment names. _TEMPLATE: a first statement.
@@ -56,7 +60,12 @@ _ROS = """
 
 
 def write_described_statement(
-    path: Path, found: Description, api: Api, calls: Calls, ros: Callable[[Sequence[Operation]], Iterator[str]] | None
+    path: Path,
+    found: Description,
+    api: Api,
+    calls: Calls,
+    where: Endpoints,
+    ros: Callable[[Sequence[Operation]], Iterator[str]] | None,
 ) -> None:
     """Write a commented statement for a device with a description.
 
@@ -65,6 +74,7 @@ def write_described_statement(
         found: the description.
         api: overlays and base URL as the options give them.
         calls: what may be called as the options say it.
+        where: credentials and the connection as the options give them.
         ros: makes the lines of a ROS map of the operations; None: there is none.
 
     Raises:
@@ -86,7 +96,7 @@ def write_described_statement(
             name=basic_string(str(info.get("title", ""))[:200]),
             version=basic_string(str(info.get("version", ""))[:200]),
             api="\n".join(_api(path.parent, found, api)),
-            credentials="".join(f"{line}\n" for line in _credentials(found.document)),
+            credentials="".join(f"{line}\n" for line in (*_given(path.parent, where), *_credentials(found.document))),
             count=f"Called are {called} of {len(operations)} operations. Take the # from a line to call it as well.",
             allow="".join(f"  {line}\n" for line in _groups(operations, rules)),
             never=", ".join(map(basic_string, calls.never)),
@@ -135,6 +145,14 @@ def _beside(folder: Path, source: str) -> str:
     return source if is_url(source) else Path(os.path.relpath(source, folder)).as_posix()
 
 
+def _given(folder: Path, where: Endpoints) -> Iterator[str]:
+    """Yield what the options say of the connection."""
+    for name, value in msgspec.structs.asdict(where).items():
+        if name != "rest" and value != getattr(Endpoints(), name):
+            text = _beside(folder, value) if name.endswith("_file") else value
+            yield f"{name} = {json_text(list(text) if isinstance(text, tuple) else text)}"
+
+
 def _credentials(document: dict[str, Any]) -> Iterator[str]:
     """Yield hints on the credentials that the description asks for."""
     components = document.get("components")
@@ -165,8 +183,11 @@ def _groups(operations: Sequence[Operation], rules: CallRules) -> Iterator[str]:
         yield f"# -- {_one_line(name)}"
         for operation in items:
             reason, label = rules.decide(operation), basic_string(operation.label)
-            why, _, _ = str(reason).partition(":")
-            yield f"# called: {_one_line(operation.label)}" if reason.may else f"# {label},  # {why}"
+            why = str(reason).partition(":")[0] + "; it moves the device, so --allow-motion too" * operation.motion
+            if operation.stop:
+                yield f"# sent at the end, to stop the device: {_one_line(operation.label)}"
+            else:
+                yield f"# called: {_one_line(operation.label)}" if reason.may else f"# {label},  # {why}"
 
 
 def _group(operation: Operation, shared: set[tuple[str, ...]]) -> str:

@@ -28,6 +28,8 @@ API = {
             }
         },
         "/health": {"get": {"responses": {}}},
+        "/brake": {"put": {"responses": {}, "x-roaas-stop": True}},
+        "/speed": {"put": {"responses": {}, "x-roaas-motion": True}},
     },
 }
 
@@ -65,11 +67,13 @@ def test_the_statement_is_written_and_can_be_read(folder, arguments):
         "values": {},
     }
     for line in (
-        "# Called are 3 of 5 operations.",
+        "# Called are 3 of 7 operations.",
         "  # -- jobs\n  # called: GET /api/jobs/{job_id}\n",
         '  # "DELETE /api/jobs/{job_id}",  # it may change something\n',
         '  # -- update\n  # "POST /api/firmware",  # its name warns of harm\n',
         "  # -- health\n  # called: GET /health\n",
+        "  # sent at the end, to stop the device: PUT /brake\n",
+        '  # "PUT /speed",  # it may change something; it moves the device, so --allow-motion too\n',
         '# base_url = "http://arm:8000/v1"',
         '# "job_id" = []  # GET /api/jobs/{job_id}\n',
         "security scheme key: apiKey header X-Key.",
@@ -89,11 +93,14 @@ def test_each_comment_can_become_a_line(folder):
 
 
 def test_what_the_options_say_stands_in_it(folder):
+    (folder / "token").write_text("sesame-opens-the-arm")
     options = ["--call", "DELETE /api/jobs/*", "--never", "update", "--base-url", "http://other"]
+    options += ["--token-file", "token", "--timeout", "5"]
     assert run("--init", "arm.toml", "api.json", *options).exit_code == 0
     found = tomllib.loads((folder / "arm.toml").read_text())
     assert found["calls"] == {"allow": ["DELETE /api/jobs/*"], "never": ["update"]}
     assert found["api"]["base_url"] == "http://other"
+    assert found["endpoints"] == {"token_file": "token", "timeout_s": 5.0}
     assert "# called: DELETE /api/jobs/{job_id}" in (folder / "arm.toml").read_text()
 
 
