@@ -98,6 +98,7 @@ class Secrets:
     def forget(self) -> None:
         """Forget all secrets, as the tests of one process do between two runs."""
         self._known: set[str] = set()
+        self._names: set[str] = set()
         # Cache: many texts are written repeatedly.
         self._seen: dict[str, str] = {}
         self._weak: dict[str, str] = {}
@@ -141,6 +142,12 @@ class Secrets:
                     cuts.setdefault(form.whole[length - _SHORTEST_CUT : length].lower(), []).append((form, length))
             self._cuts = cuts
 
+    def spare(self, name: str) -> None:
+        """Show a name that results need, although a secret may begin with it: ``conveyor`` of ``conveyor-token``."""
+        with self._lock:
+            self._names.add(name.lower())
+            self._seen.clear()
+
     def keep_userinfo(self, text: str) -> None:
         """Mask the passwords of all URLs in a text that have one (``http://user:password@robot``)."""
         for found in _USERINFO.finditer(text):
@@ -173,7 +180,10 @@ class Secrets:
             if mark in text:
                 text = place.sub(shown, text)
         parts, end = list[str](), 0
+        spared = self._names - {secret.lower() for secret in self._known}
         for begin, until, variable in sorted(self._spans(text), key=lambda span: (span[0], -span[1])):
+            if text[begin:until].lower() in spared:
+                continue
             if begin >= end:
                 parts += (text[end:begin], variable)
             end = max(end, until)

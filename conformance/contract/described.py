@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from conformance.commandline.given_files import read_json, read_octets
 from conformance.commandline.out_folder import own_folder, write_atomically, write_json
+from conformance.commandline.secrecy import SECRETS
 from conformance.contract.locating import MANIFEST
 from conformance.contract.toml_file import basic_string
 
@@ -62,6 +63,7 @@ def write_described_pack(
     info = document.get("info")
     info = info if isinstance(info, dict) else {}
     name = _NO_NAME.sub("-", str(info.get("title", "api")).lower()).strip("-") or "api"
+    SECRETS.spare(name)
     taken, sent = _formats(document)
     more = {
         **dict.fromkeys(mapped, True),

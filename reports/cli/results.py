@@ -112,7 +112,7 @@ def tell_change(old: Path, new: Path, threshold: float, out: Path | None = None)
     for path in write_pages(out, pages) if out is not None else ():
         click.echo(path, err=True)
     click.echo(table)
-    for remark in found.remarks:
+    for remark in found.remarks if found.valid else ():
         click.echo(f"\n{on_a_line(remark)}", nl=False)
     click.echo(f"\n{verdict.words}. {on_a_line(verdict.sentence)}")
     if not found.valid:

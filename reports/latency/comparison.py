@@ -41,8 +41,7 @@ class Change:
         threshold: the share by which the value must change to count, 0.05 for 5 %.
         lag_ms: the generator's own lag at the quantile, which a response time includes; 0 for a service time.
         verdict: "slower", "faster", "same", "unclear" (the interval is neither beyond `threshold` nor within the
-            threshold
-            that the user gave) or "no figure".
+            threshold that the user gave), "no figure", or "not compared" where a result is not valid.
     """
 
     operation: str
@@ -144,6 +143,8 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
     ]
     together = sum(change.interval is not None for change in drafts)
     changes = tuple(_settle(change, together, threshold) for change in drafts)
+    if not (old["valid"] and new["valid"]):
+        changes = tuple(replace(change, verdict="not compared") for change in changes)
     return Comparison(old, new, old_series, new_series, changes, tuple(_remarks(old, new, old_series, new_series)))
 
 

@@ -8,14 +8,14 @@ from reports.latency.figures.canvas import COLOUR
 from reports.latency.figures.ratios import Ratio, ratios
 from reports.latency.figures.spectrum import change
 from reports.latency.findings import Verdict
-from reports.latency.numbers import NONE, interval, ms, ratio, share
+from reports.latency.numbers import interval, ms, ratio, share
 from reports.pages.page import html_page, markdown_page
 from reports.pages.untrusted import on_a_line
 
 _CELL = 200
 QUANTILE_WORDS = {"p50": "50 %", "p99": "99 %"}
-_TONES = {"slower": "bad", "faster": "good", "same": "quiet", "unclear": "warning", "no figure": "quiet"}
-_SIGNS = {"slower": "✗", "faster": "✓", "same": "=", "unclear": "?", "no figure": NONE}
+_TONES = {"slower": "bad", "faster": "good", "same": "quiet", "unclear": "warning"}
+_SIGNS = {"slower": "✗", "faster": "✓", "same": "=", "unclear": "?"}
 _HEAD = ("series", "time", "at", "old ms", "new ms", "new/old", "95 % interval", "noise", "verdict")
 
 

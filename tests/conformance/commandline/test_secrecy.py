@@ -170,3 +170,20 @@ def test_a_bomb_of_escapes_takes_no_time(text):
     secrets = Secrets()
     secrets.keep("zz-secret-of-mine", "$ROAAS_TOKEN")
     assert secrets.masked(text) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "shown"),
+    [
+        ("conveyor", "conveyor 1.4.0", "conveyor 1.4.0"),
+        ("conveyor", "Bearer conveyor-belt-7 of conveyor", "Bearer $T of conveyor"),
+        ("conveyor", "conveyor-belt", "$T"),
+        ("conveyor-belt-7", "conveyor-belt-7", "$T"),
+        ("belt", "conveyor", "$T"),
+    ],
+)
+def test_a_name_with_which_a_secret_begins_is_shown(name, text, shown):
+    secrets = Secrets()
+    secrets.spare(name)
+    secrets.keep("conveyor-belt-7", "$T")
+    assert secrets.masked(text) == shown

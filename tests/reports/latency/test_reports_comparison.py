@@ -185,6 +185,7 @@ def test_invalid_result_gives_no_answer(latency):
     other.update(valid=False, invalid_because=["generator CPU at 97 %"])
     found = compared(latency, other)
     assert not found.valid
+    assert {change.verdict for change in found.changes} == {"not compared"}
     assert "generator CPU at 97 %" in verdict(found).sentence
 
 
