@@ -163,7 +163,7 @@ def _suite(statement: Statement, policy: Policy, known: Known) -> Iterator[Point
     yield Point(
         "contract",
         not (same and other),
-        text if same else "not known: another suite or contract judged the robot",
+        text if same else "not compared, because another suite or contract judged the robot",
         "the files of the contract that the suite has",
         f"{contract}; if the vendor changed the files, do not rely on the certificate",
     )

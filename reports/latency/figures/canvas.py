@@ -64,7 +64,7 @@ _STYLE: Any = {
     "xtick.major.size": 3,
     "ytick.major.size": 0,
     "legend.frameon": False,
-    "legend.handlelength": 1.8,
+    "legend.handlelength": 3.0,
     "legend.borderaxespad": 0.2,
     "lines.linewidth": 1.9,
     "hatch.linewidth": 0.6,

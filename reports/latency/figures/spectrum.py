@@ -20,7 +20,8 @@ _NINES = (0.0, 0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999, 0.999999)
     "spectrum",
     "Time at each percentile. At 99 %, one request in a hundred took longer than the curve shows. Solid: service "
     "time, counted from when a request was sent. Dashed: response time, counted from when it was due, so that "
-    "waiting for a stalled robot is included. Thin lines: too few requests for a reliable value.",
+    "waiting for a stalled robot is included; where both are equal, one line is seen. Thin lines: too few requests for "
+    "a reliable value.",
 )
 def spectrum(series: AllSeries) -> Iterator[Panel]:
     """Yield a panel for each client and operation: service time as a solid line, response time dashed."""
