@@ -98,7 +98,8 @@ def step_result(plan: Plan, recorder: Recorder, interface: str, operation: str, 
     blocks = list(measured.blocks(name, "step"))
     whole = measured.total(name, "step")
     # Before its first responses, even a robot that keeps up has answered nothing. A median is late if it falls behind.
-    first_s = (blocks[0].cell.response.quantile_ms(0.1) or 0.0) / 1e3 if blocks else 0.0
+    early_s, usual_s = ((blocks[0].cell.response.quantile_ms(at) or 0.0) / 1e3 if blocks else 0.0 for at in (0.1, 0.5))
+    first_s = max(early_s, min(usual_s, plan.length_s / 10))
     seconds, offered = max(plan.length_s - first_s, plan.length_s / 10), asked / plan.length_s
     achieved = min(recorder.in_time[plan.first_segment] / seconds, offered)
     reasons = []
