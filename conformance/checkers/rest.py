@@ -89,6 +89,7 @@ class RestCheckers:
             is_stored = not case.holds and case.requirement in _STORED
             resource = resource_at(self._contract, context.target.partition("?")[0]) if is_stored else None
             late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
-            yield replace(case, doubt=case.doubt or late)
+            # What such a resource shows otherwise is one finding, and not one for each member.
+            yield replace(case, doubt=late, cause=late) if late and not case.doubt else case
         for check in () if context.is_own_of(attempt.response) else self._documents:
             yield from check(occasion)

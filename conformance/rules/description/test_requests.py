@@ -88,7 +88,8 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         elif converted and converted[2] and not probe.says:
             cause = f"{given} {converted[2]}"
         else:
-            cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
+            place = without_numbers(probe.place) if probe.says else _place_in(why)
+            cause = probe.says if probe.says == NOT_UTF8 else f"{probe.operation} {place}"
         doubt = _LENIENT if probe.says == NOT_UTF8 else _doubt_of_content(probe)
         return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""), doubt=doubt)
 
