@@ -36,7 +36,8 @@ def _described(evil: str) -> dict[str, Any]:
         "info": {"title": evil, "version": evil, "description": evil},
         "servers": [{"url": f"/{evil}"}],
         "paths": {
-            "/state": {"get": {"parameters": [asked], "responses": answer, "operationId": f"read{evil}"}},
+            "/state": {"get": {"responses": answer, "operationId": f"read{evil}"}},
+            "/found": {"get": {"parameters": [asked], "responses": answer}},
             "/goto": {"post": {**acts, "responses": {"200": {"description": evil}}}},
             f"/goto/stop{evil}": {"post": {**acts, "operationId": "stop", "responses": {"200": {"description": ""}}}},
             f"/velocity{evil}": {"post": {**acts, "operationId": "v", "responses": {"200": {"description": ""}}}},
