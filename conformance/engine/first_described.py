@@ -122,7 +122,7 @@ def _motion(operations: Sequence[Operation]) -> list[str]:
     if found:
         return [lead, *found]
     reasons = list(why_no_map(operations))
-    more = [f"{len(reasons) - _MOST_REASONS} more operations."] if len(reasons) > _MOST_REASONS else []
+    more = [f"Not shown: {len(reasons) - _MOST_REASONS}."] if len(reasons) > _MOST_REASONS else []
     states = "If operations are allowed in some states alone, a map of states judges them: [states] in docs/motion.md."
     lines = ["No map is proposed.", *map(_one_line, reasons[:_MOST_REASONS]), *more, states]
     return lines if reasons else ["No map is proposed: no operation changes anything."]

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.conversions import is_converted, unkept_members
-from conformance.api.rest.invalid_variations import NO_WHOLE_NUMBER, NOT_UTF8
+from conformance.api.rest.invalid_variations import NO_WHOLE_NUMBER
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.statuses import HELD
 from conformance.api.rest.validity import INVALID, VALID
@@ -30,7 +30,6 @@ _INVALID = frozenset({400, 422})
 _FIT = "the values of a request may have to fit each other, or what the device does at the moment"
 # Methods whose requests' content has no meaning (RFC 9110 9.3.1, 9.3.2, 9.3.5).
 _WITHOUT_CONTENT = frozenset({"GET", "HEAD", "DELETE"})
-_LENIENT = "a JSON parser may accept what is no JSON (RFC 8259 9)"
 _WRONG = frozenset({Kind.INVALID, Kind.MALFORMED})
 # Header fields whose wrong values a server may ignore (RFC 9110 12.5, 13.1, 14.2; RFC 7240 2), whatever is declared.
 _OF_HTTP = frozenset(
@@ -88,10 +87,9 @@ def invalid_refused(trace: Survey, run: Run) -> Iterable[Outcome]:
         elif converted and converted[2] and not probe.says:
             cause = f"{given} {converted[2]}"
         else:
-            place = without_numbers(probe.place) if probe.says else _place_in(why)
-            cause = probe.says if probe.says == NOT_UTF8 else f"{probe.operation} {place}"
-        doubt = _LENIENT if probe.says == NOT_UTF8 else _doubt_of_content(probe)
-        return Fault(cause, f"status {probe.status}" + (f", although {why}" if why else ""), doubt=doubt)
+            cause = f"{probe.operation} {without_numbers(probe.place) if probe.says else _place_in(why)}"
+        saw = f"status {probe.status}" + (f", although {why}" if why else "")
+        return Fault(cause, saw, doubt=_doubt_of_content(probe))
 
     yield from held_back(sure)
     converted = _convertible(trace, sure, run)
