@@ -96,7 +96,9 @@ def write_described_statement(
             name=basic_string(str(info.get("title", ""))[:200]),
             version=basic_string(str(info.get("version", ""))[:200]),
             api="\n".join(_api(path.parent, found, api)),
-            credentials="".join(f"{line}\n" for line in (*_given(path.parent, where), *_credentials(found.document))),
+            credentials="".join(
+                f"{line}\n" for line in (*_connection_lines(path.parent, where), *_credentials(found.document))
+            ),
             count=f"Called are {called} of {len(operations)} operations. Take the # from a line to call it as well.",
             allow="".join(f"  {line}\n" for line in _groups(operations, rules)),
             never=", ".join(map(basic_string, calls.never)),
@@ -145,7 +147,7 @@ def _beside(folder: Path, source: str) -> str:
     return source if is_url(source) else Path(os.path.relpath(source, folder)).as_posix()
 
 
-def _given(folder: Path, where: Endpoints) -> Iterator[str]:
+def _connection_lines(folder: Path, where: Endpoints) -> Iterator[str]:
     """Yield what the options say of the connection."""
     for name, value in msgspec.structs.asdict(where).items():
         if name != "rest" and value != getattr(Endpoints(), name):
