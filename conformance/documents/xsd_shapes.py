@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, time
 from decimal import Decimal, InvalidOperation
 from itertools import zip_longest
 from math import isclose
@@ -237,22 +238,31 @@ def _simple(declared: Any) -> Simple:
         builtin = builtin.base_type
     # A built-in type's own pattern adds nothing to its name.
     patterns = getattr(getattr(declared, "patterns", None) if builtin is not declared else None, "regexps", None)
+    digits = getattr(declared.get_facet(_FRACTION), "value", None)
+    # A value near a bound that is excluded.
+    name = str(builtin.name).rpartition("}")[2] if builtin is not None else "string"
+    step = Decimal(1).scaleb(-(digits or 0) if name in INTEGERS or digits else -3)
+    least, most = _decimal(getattr(declared, "min_value", None)), _decimal(getattr(declared, "max_value", None))
+    if least is not None and most is not None and 2 * step > most - least:
+        step = (most - least) / 4
+    least = least + step if least is not None and declared.get_facet(_LEAST) is not None else least
+    most = most - step if most is not None and declared.get_facet(_GREATEST) is not None else most
     return Simple(
-        str(builtin.name).rpartition("}")[2] if builtin is not None else "string",
+        name,
         tuple(
             str(value).lower() if isinstance(value, bool) else str(value)
             for value in getattr(declared, "enumeration", None) or ()
         ),
-        _decimal(getattr(declared, "min_value", None)),
-        _decimal(getattr(declared, "max_value", None)),
+        least,
+        most,
         getattr(declared, "min_length", None),
         getattr(declared, "max_length", None),
         tuple(patterns or filter(None, (part.get(LEFT_OUT) for part in getattr(declared.elem, "iter", tuple)()))),
-        digits=getattr(declared.get_facet(_FRACTION), "value", None),
+        digits=digits,
     )
 
 
-_FRACTION: Final = clark(XSD, "fractionDigits")
+_FRACTION, _LEAST, _GREATEST = (clark(XSD, name) for name in ("fractionDigits", "minExclusive", "maxExclusive"))
 
 
 def _decimal(value: object) -> Decimal | None:
@@ -325,6 +335,8 @@ def _text_of_value(value: Any, simple: Simple | None) -> str:
         raise NoElementError(f"{value!r} in place of one value")
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, float) and simple is not None and simple.builtin == "decimal":
+        return f"{Decimal(repr(value)):f}"  # it has no exponent
     whole = simple is not None and simple.builtin in INTEGERS
     return str(int(value)) if whole and isinstance(value, float) and value.is_integer() else str(value)
 
@@ -471,17 +483,35 @@ def is_alike(simple: Simple, one: str, two: str) -> bool:
     first, second = (number_in(text) if simple.builtin in NUMBERS else None for text in (one, two))
     if first is not None and second is not None:
         return first == second or (simple.builtin in FLOATS and isclose(first, second, rel_tol=1e-5, abs_tol=1e-9))
-    if simple.builtin == "dateTime":
+    if moment := _MOMENTS.get(simple.builtin):
         try:
-            return datetime.fromisoformat(one) == datetime.fromisoformat(two)
+            return moment(one) == moment(two)
         except (TypeError, ValueError):
             return one == two
     return one == two
 
 
-# What makes two forms of a value equal (3.2.2, 3.2.15, 3.2.16, 3.3.2).
+def _duration(text: str) -> str:
+    """Return months and seconds of a duration, which are the same in PT60S and PT1M."""
+    found = _DURATION.fullmatch(text)
+    if found is None:
+        return text
+    sign, *parts = found.groups()
+    years, months, days, hours, minutes, seconds = (Decimal(part or 0) for part in parts)
+    return f"{sign}{years * 12 + months} {(((days * 24 + hours) * 60 + minutes) * 60 + seconds).normalize():f}"
+
+
+_MOMENTS: Final[Mapping[str, Callable[[str], datetime | time]]] = {
+    "dateTime": datetime.fromisoformat,
+    "time": time.fromisoformat,
+}
+_DURATION: Final = re.compile(
+    r"(-?)P(?:(\d+)Y)?(?:(\d+)M)?(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?", re.ASCII
+)
+# What makes two forms of a value equal (3.2.2, 3.2.6, 3.2.15, 3.2.16, 3.3.2).
 _READ: Final[Mapping[str, Callable[[str], str]]] = {
     "boolean": lambda text: {"1": "true", "0": "false"}.get(text, text),
+    "duration": _duration,
     "hexBinary": str.upper,
     "token": lambda text: " ".join(text.split()),
     "base64Binary": lambda text: "".join(text.split()),

@@ -16,7 +16,7 @@ from conformance.documents.wsdl import read_file
 from conformance.documents.xml import ENVELOPE, Node, clark, parse
 from conformance.documents.xsd import Types
 from conformance.documents.xsd_assembly import SchemaDocument
-from conformance.documents.xsd_shapes import plain, unreadable
+from conformance.documents.xsd_shapes import Simple, is_alike, plain, unreadable
 from conformance.papers_robot.statement import CONTRACT_DIR
 
 XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t" targetNamespace="urn:t"
@@ -26,8 +26,9 @@ XSD = b"""<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:t="urn:t"
       <xs:enumeration value="small"/><xs:enumeration value="large"/></xs:restriction></xs:simpleType></xs:element>
     <xs:element name="hot" type="xs:boolean"/>
     <xs:element name="cups"><xs:simpleType><xs:restriction base="xs:short">
-      <xs:minInclusive value="1"/><xs:maxInclusive value="12"/></xs:restriction></xs:simpleType></xs:element>
-    <xs:element name="price" type="xs:decimal" minOccurs="0"/>
+      <xs:minExclusive value="0"/><xs:maxExclusive value="13"/></xs:restriction></xs:simpleType></xs:element>
+    <xs:element name="price" minOccurs="0"><xs:simpleType><xs:restriction base="xs:decimal">
+      <xs:minExclusive value="0"/><xs:maxExclusive value="9.5"/></xs:restriction></xs:simpleType></xs:element>
     <xs:element name="weight" type="xs:float" nillable="true"/>
     <xs:element name="note" minOccurs="0"><xs:simpleType><xs:restriction base="xs:string">
       <xs:maxLength value="8"/></xs:restriction></xs:simpleType></xs:element>
@@ -97,6 +98,19 @@ def test_every_form_of_a_float_is_exactly_it(value, form):
 @given(st.integers(-(2**31), 2**31), st.integers(0, 7))
 def test_every_form_of_an_integer_is_exactly_it(value, form):
     assert int(written_integer(value, form)) == value
+
+
+@pytest.mark.parametrize(
+    ("builtin", "text", "same", "other"),
+    [
+        ("duration", "PT90S", "PT1M30S", "PT90M"),
+        ("duration", "P1Y", "P12M", "P365D"),
+        ("time", "12:00:00Z", "12:00:00.0+00:00", "12:00:00"),
+    ],
+)
+def test_forms_of_one_value(builtin, text, same, other):
+    assert is_alike(Simple(builtin), text, same)
+    assert not is_alike(Simple(builtin), text, other)
 
 
 def canonical(document: str) -> bytes:
