@@ -181,7 +181,7 @@ def whole(schema: Schema) -> Schema:
 
 
 def modern(schema: Any) -> Any:
-    """Return an OpenAPI 3.0 schema converted to Draft 2020-12; an OpenAPI 3.1 schema stays unchanged."""
+    """Return an OpenAPI 3.0 schema converted to Draft 2020-12, with whole numbers for integers."""
     if isinstance(schema, list):
         return [modern(item) for item in schema]
     if not isinstance(schema, dict):
@@ -203,7 +203,16 @@ def modern(schema: Any) -> Any:
         result["prefixItems"] = result.pop("items")
         if "additionalItems" in result:
             result["items"] = result.pop("additionalItems")
+    if result.get("type") in ("integer", ["integer"], ["integer", "null"]):
+        # Frameworks write an integer's bound 1 as 1.0, a form that some devices refuse in a request.
+        result = {key: _as_integer(item) for key, item in result.items()}
     return changed_alike(result, "modern")
+
+
+def _as_integer(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_as_integer(item) for item in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _with_null(schema: Schema) -> Schema:

@@ -287,7 +287,11 @@ class _Cycle:
                 return False
             self._read_created(created, path, "")
             return True
-        return self._register(created, before)
+        is_new = self._register(created, before)
+        if not is_new:
+            # A POST may have changed what is there, such as a thing with the same key.
+            self.living.read_anew()
+        return is_new
 
     def _create_at_once(self, delete: Operation, count: int) -> None:
         """Create things by two clients at the same moment, of which each gets its own, and delete them."""
@@ -297,9 +301,13 @@ class _Cycle:
         bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
         requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
         if len({request.body for request in requests}) == len(turns):
-            for created in send_together([[(writer.api.client, request) for request in requests]])[0]:
-                if isinstance(created, Exchange) and created.response.status == HTTPStatus.CREATED:
-                    self._register(created, None)
+            sent = send_together([[(writer.api.client, request) for request in requests]])[0]
+            made = [one for one in sent if isinstance(one, Exchange) and one.response.ok]
+            new = [one for one in made if one.response.status == HTTPStatus.CREATED]
+            for created in new:
+                if self._register(created, None) and len(new) < len(made):
+                    # The other one may have changed what this one has created.
+                    self.living.things[-1].life = replace(self.living.things[-1].life, writes=())
             for thing in self.living.of(State.ALIVE):
                 self._delete_and_read(thing, delete)
 

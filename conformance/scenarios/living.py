@@ -201,6 +201,14 @@ class Living:
             usable = {name: one for name, one in body.items() if name in now and not is_shared(name)}
             thing.kept = {name: one for name, one in usable.items() if not self._differ(thing, {name: one}, now)}
 
+    def read_anew(self) -> None:
+        """Read the living things after a request that may have changed any of them."""
+        for thing in self.of(State.ALIVE):
+            found = self._read(thing)
+            now = members(found, thing.kept) if found.response.ok else {}
+            thing.kept = {name: now[name] for name in thing.kept if name in now}
+            thing.last = found if found.response.ok else thing.last
+
     def _differ(self, thing: Thing, kept: dict[str, Any], now: dict[str, Any]) -> list[str]:
         return list(differences(kept, now, thing.schema, self.read.shape, self.writer.values.collections))
 

@@ -6,6 +6,7 @@ import pytest
 
 from conformance.documents.description import read_description
 from conformance.documents.description_faults import invalid
+from conformance.documents.json_schema import modern
 from conformance.documents.json_shape import shape_of
 from conformance.documents.openapi import read_operations
 
@@ -64,3 +65,10 @@ def test_other_faults_are_told_beside_such_words():
     document = _document({"const": 1, "type": "number", "minimum": "low"}, "3.0.3")
     assert [one for one in invalid(document) if "const" in one]
     assert [one for one in invalid(document) if "low" in one]
+
+
+def test_numbers_of_an_integer_are_whole_and_those_of_a_number_stay():
+    given = {"minimum": 1.0, "default": 60.0, "enum": [1.0, 2.5], "multipleOf": 1.0}
+    whole = {"minimum": 1, "default": 60, "enum": [1, 2.5], "multipleOf": 1}
+    assert json.dumps(modern({"type": "integer", **given})) == json.dumps({"type": "integer", **whole})
+    assert json.dumps(modern({"type": "number", **given})) == json.dumps({"type": "number", **given})
