@@ -263,12 +263,17 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
     return CommandResult(outcome.exit_code, outcome.path, notary, tell=not options.as_json)
 
 
+def _operations(told: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the operations of a failure in result.json; none if it is in doubt."""
+    return [] if told.get("doubt") else told.get("operations", [])
+
+
 def _write_baseline(path: Path, outcome: Certification, contract: Contract, old: Path | None) -> None:
     """Write the failures to a baseline file, and print what the user has to add."""
     from conformance.verdict.baseline import baseline_text, load_baseline  # noqa: PLC0415 - only for this option
 
     found = [
-        contract.ledger[item["id"]]
+        (contract.ledger[item["id"]], {one["operation"] for told in item["failures"] for one in _operations(told)})
         for item in outcome.document["requirements"]
         if item["verdict"] == "fail" or "expected_failure" in item
     ]

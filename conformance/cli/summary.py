@@ -13,6 +13,7 @@ import click
 from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.help_pages import columns, inert, wrap
 from conformance.contract.classes import QUESTIONS
+from conformance.verdict.baseline import ENTRY
 from conformance.verdict.finding import count_of, few_of
 
 if TYPE_CHECKING:
@@ -108,7 +109,10 @@ def warning(document: Mapping[str, Any], which: str = "") -> str:
 
 
 def _print_unjudged(document: Mapping[str, Any]) -> None:
-    """Print stale entries of the baseline, and what was not judged because of a suite error or ``--minutes``."""
+    """Print what the baseline does not accept, and what was not judged because of a suite error or ``--minutes``."""
+    for item in document["requirements"]:
+        if item["reason"].startswith(ENTRY):
+            click.echo(f"\n{item['id']}: {inert(item['reason'].partition(': ')[0])}.")
     for id_ in document.get("stale", ()):
         click.echo(f"\nThe baseline expects {id_} to fail, and it passes: delete the entry.")
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())

@@ -2,7 +2,7 @@
 
 import datetime as dt
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -27,12 +27,14 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         reason: why the failure is accepted.
         expires: last day on which it is accepted.
         intermittent: whether the requirement may also pass, because the failure does not occur in every run.
+        operations: the only operations of a description that may fail; empty: all.
     """
 
     requirement: Text
     reason: str
     expires: dt.date
     intermittent: bool = False
+    operations: tuple[Text, ...] = ()
 
 
 class Accepted(NamedTuple):
@@ -47,6 +49,10 @@ class Accepted(NamedTuple):
     stale: tuple[str, ...] = ()
 
 
+#: Begins the reason of a failure that an entry does not accept.
+ENTRY: Final = "its baseline entry"
+# An entry names at most so many operations.
+_NAMED: Final = 5
 #: The baseline that accepts nothing.
 NOTHING: Final = Accepted()
 
@@ -58,7 +64,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_baseline(
     path: Path, known: Iterable[str], renamed: Mapping[str, str] = MappingProxyType({})
 ) -> tuple[Expectation, ...]:
-    """Read a baseline file: ``[[expected]]`` tables with requirement, reason, expires and intermittent.
+    """Read a baseline file: ``[[expected]]`` tables, whose keys are those of Expectation.
 
     Args:
         path: the file.
@@ -91,7 +97,8 @@ def _with_present_id(entry: Expectation, renamed: Mapping[str, str]) -> Expectat
 def apply_baseline(verdicts: Iterable[Verdict], baseline: Iterable[Expectation], today: dt.date) -> list[Verdict]:
     """Turn expected failures into warnings.
 
-    An entry becomes an error when it has expired, or when its requirement passes and it is not intermittent.
+    A failure of an operation that its entry does not name stays one. An entry becomes an error when it has expired, or
+    when its requirement passes and it is not intermittent.
     """
     expected = {entry.requirement: entry for entry in baseline}
     return [
@@ -106,23 +113,28 @@ def stale_entries(verdicts: Iterable[Verdict], baseline: Iterable[Expectation]) 
     return tuple(entry.requirement for entry in baseline if entry.requirement in passed and not entry.intermittent)
 
 
-def baseline_text(failed: Iterable[Requirement], old: Iterable[Expectation], today: dt.date) -> str:
+def baseline_text(
+    failed: Iterable[tuple[Requirement, Collection[str]]], old: Iterable[Expectation], today: dt.date
+) -> str:
     """Return a baseline file of the present failures; an older baseline's reasons and dates are kept.
 
     Args:
-        failed: the requirements that fail.
+        failed: the requirements that fail, each with its operations that do. An entry names few operations: what fails
+            at many is a fault of the whole device, of which no run sees all.
         old: entries of the older baseline.
         today: the last day of new entries, so that somebody has to choose a later one.
     """
     known = {entry.requirement: entry for entry in old}
     tables = ["# Failures that are accepted for a while: write a reason to each, and the last day on which it holds.\n"]
-    for requirement in failed:
+    for requirement, operations in failed:
         entry = known.get(requirement.id)
         reason, expires = (entry.reason, entry.expires) if entry else ("", today)
         often = "intermittent = true\n" if entry and entry.intermittent else ""
+        is_named = len(operations) <= _NAMED and (entry is None or entry.operations)
+        only = f"operations = {json.dumps(sorted(operations))}\n" if operations and is_named else ""
         tables.append(
             f"# {' '.join(requirement.text.split())}\n[[expected]]\nrequirement = {json.dumps(requirement.id)}\n"
-            f"reason = {json.dumps(reason, ensure_ascii=False)}\nexpires = {expires.isoformat()}\n{often}"
+            f"reason = {json.dumps(reason, ensure_ascii=False)}\nexpires = {expires.isoformat()}\n{often}{only}"
         )
     return "\n".join(tables)
 
@@ -132,12 +144,20 @@ def accepted_until(verdicts: Iterable[Verdict]) -> str:
     return min((verdict.expected_failure[1] for verdict in verdicts if verdict.expected_failure), default="")
 
 
+def _failing(verdict: Verdict) -> set[str]:
+    """Return the operations that break a requirement without doubt."""
+    sure = [finding for finding in verdict.evidence.findings.values() if not finding.doubt]
+    return {label for finding in sure for label in finding.operations}
+
+
 def _apply(verdict: Verdict, entry: Expectation, today: dt.date) -> Verdict:
     day = entry.expires.isoformat()
     # A requirement that another finding kept from being tested counts as failed by that finding.
     if verdict.value in {Value.FAIL, Value.WARN} or verdict.because is not None:
         if entry.expires < today:
-            return replace(verdict, reason=f"its baseline entry expired on {day}: {verdict.reason}")
+            return replace(verdict, reason=f"{ENTRY} expired on {day}: {verdict.reason}")
+        if entry.operations and (others := sorted(_failing(verdict) - {*entry.operations})):
+            return replace(verdict, reason=f"{ENTRY} does not name {', '.join(others)}: {verdict.reason}")
         told = f"expected until {day} ({entry.reason}): {verdict.reason}"
         return replace(verdict, value=Value.WARN, reason=told, expected_failure=(entry.reason, day))
     if verdict.value is Value.PASS and entry.intermittent and entry.expires >= today:

@@ -77,6 +77,11 @@ def test_a_baseline_is_written_asked_for_reasons_and_told_when_it_is_stale(devic
     text = re.sub("expires = .*", day, text.replace('reason = ""', 'reason = "ticket 7"'))
     known.write_text(text, encoding="utf-8")
     assert certified(device, tmp_path, "--baseline", known).exit_code == 0
+    known.write_text(re.sub("operations = .*", 'operations = ["GET /other"]', text), encoding="utf-8")
+    elsewhere = certified(device, tmp_path, "--baseline", known)
+    assert (elsewhere.exit_code, "its baseline entry does not name GET /" in elsewhere.text) == (1, True), (
+        elsewhere.text
+    )
     passing = next(id_ for id_, verdict in verdicts(first).items() if verdict == "pass")
     entry = f'[[expected]]\nrequirement = "{passing}"\nreason = "ticket 8"\n{day}\n'
     known.write_text(f"{text}\n{entry}", encoding="utf-8")

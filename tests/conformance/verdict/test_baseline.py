@@ -16,6 +16,7 @@ from conformance.verdict.baseline import (
     stale_entries,
 )
 from conformance.verdict.evidence import Evidence
+from conformance.verdict.finding import Finding, Showing
 from conformance.verdict.verdicts import Value, Verdict
 
 _TODAY = dt.date(2026, 11, 20)
@@ -48,6 +49,23 @@ def test_an_intermittent_failure_may_also_pass(value, expires, expected):
     applied = _applied(value, expires, intermittent=True)
     assert applied.value == expected
     assert "ticket 7" in applied.reason
+
+
+@pytest.mark.parametrize(
+    ("named", "doubt", "expected"),
+    [((), "", "warn"), (("GET /a", "GET /b"), "", "warn"), (("GET /a",), "", "fail"), (("GET /a",), "it may", "warn")],
+)
+def test_a_failure_of_an_operation_that_is_not_named_stays_one(named, doubt, expected):
+    requirement = Requirement("http/date", "http", Level.MUST, "A text.", "RFC", Origin.NORM)
+    evidence = Evidence()
+    for label, unsure in (("GET /a", ""), ("GET /b", doubt)):
+        finding = Finding("http/date", "RFC", label, "this", "that", None, doubt=unsure)
+        evidence.findings[label] = finding
+        finding.operations[label] = Showing(label)
+    entry = Expectation("http/date", "ticket 7", dt.date(2026, 12, 31), operations=named)
+    applied = apply_baseline([Verdict(requirement, Value.FAIL, "why", evidence)], [entry], _TODAY)[0]
+    assert applied.value == expected
+    assert ("does not name GET /b" in applied.reason) == (expected == "fail")
 
 
 def test_accepted_is_what_all_entries_still_accept():
@@ -95,11 +113,15 @@ def test_a_written_baseline_asks_for_reasons_and_keeps_those_that_are_there(tmp_
     path = tmp_path / "baseline.toml"
     failed = [Requirement(f"http/{name}", "http", Level.MUST, "A text.", "RFC", Origin.NORM) for name in ("date", "x")]
     old = [Expectation("http/x", 'ticket "7"', dt.date(2027, 1, 1), intermittent=True)]
-    path.write_text(baseline_text(failed, old, _TODAY), encoding="utf-8")
+    failing = zip(failed, ({"PUT /b", "GET /a"}, {"GET /a"}), strict=True)
+    path.write_text(baseline_text(failing, old, _TODAY), encoding="utf-8")
     with pytest.raises(BaselineError, match="http/date has no reason"):
         load_baseline(path, {"http/date", "http/x"})
     path.write_text(path.read_text().replace('reason = ""', 'reason = "a"'), encoding="utf-8")
-    assert load_baseline(path, {"http/date", "http/x"}) == (Expectation("http/date", "a", _TODAY), *old)
+    assert load_baseline(path, {"http/date", "http/x"}) == (
+        Expectation("http/date", "a", _TODAY, operations=("GET /a", "PUT /b")),
+        *old,
+    )
 
 
 @pytest.mark.parametrize(("intermittent", "stale"), [(False, ("http/date",)), (True, ())])
@@ -108,3 +130,9 @@ def test_an_entry_whose_requirement_passes_is_stale(intermittent, stale):
     entry = Expectation("http/date", "ticket 7", dt.date(2026, 12, 31), intermittent)
     assert stale_entries([Verdict(requirement, Value.PASS, "", Evidence())], [entry]) == stale
     assert stale_entries([Verdict(requirement, Value.SKIP, "", Evidence())], [entry]) == ()
+
+
+def test_a_failure_at_many_operations_is_accepted_at_all():
+    failed = Requirement("http/date", "http", Level.MUST, "A text.", "RFC", Origin.NORM)
+    many = {f"GET /{number}" for number in range(6)}
+    assert "operations" not in baseline_text([(failed, many)], [], _TODAY)
