@@ -179,9 +179,9 @@ class Changes:
         template = operation.template.rstrip("/").rpartition("/")[0]
         if now and before is not None and before.value in self._said_final.get(template, ()):
             expected = f"{before.value} as {name}, which is final by the description, or a refusal"
-            holds = now == before.value or now in _AWAY
+            holds = now == before.value or now.casefold() in _AWAY
             yield self._case(occasion, holds, expected, f"{now} as {name}", operation.label)
-        is_kept = was in FINAL and "409" in operation.responses and words_of(operation.template) & ENDING
+        is_kept = was.casefold() in FINAL and "409" in operation.responses and words_of(operation.template) & ENDING
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
@@ -235,21 +235,21 @@ class Changes:
             return
         is_late = sent_s - before.at_s > _SETTLES_S
         # The state that the response announced has not come yet.
-        if before.told and now != before.value and now not in FINAL and not is_late:
+        if before.told and now != before.value and now.casefold() not in FINAL and not is_late:
             return
         wrong, expected = "", f"{before.value} as {name}, as it was read before"
         if before.told and now != before.value:
             expected = f"{before.value} as {name}, to which {before.told} led by its response or description"
-            lost = before.value in FINAL and now not in _AWAY
+            lost = before.value.casefold() in FINAL and now.casefold() not in _AWAY
             wrong = now if lost or (now == before.was and is_late) else ""
-        elif before.refused and now in _CANCELLED and before.value not in FINAL:
+        elif before.refused and now.casefold() in _CANCELLED and before.value.casefold() not in FINAL:
             expected += f" and as {before.refused} must leave it"
             wrong = now
-        elif before.value in FINAL and now != before.value and now not in _AWAY:
+        elif before.value.casefold() in FINAL and now != before.value and now.casefold() not in _AWAY:
             reason = before.refused or before.by
             expected += f" and as {reason} must leave it" if reason else ""
             # A thing that is done may start again by itself, for example by a timetable.
-            wrong = now if reason or before.value in _CANCELLED or now in FINAL else ""
+            wrong = now if reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
         self._known[path] = _State(now, occasion.response.received_s)
 
@@ -282,7 +282,9 @@ def state_of(read: Operation) -> str:
     inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
     parts = ((name, flat(one)) for part in (outer, *inner) for name, one in part.items() if isinstance(one, dict))
     named = (
-        str(name) for name, one in parts if plain_name(name) in _STATES and FINAL & set(map(str, one.get("enum", ())))
+        str(name)
+        for name, one in parts
+        if plain_name(name) in _STATES and FINAL & {str(item).casefold() for item in one.get("enum", ())}
     )
     return next(named, "")
 
@@ -342,6 +344,8 @@ def _state_in(occasion: Occasion, name: str) -> str:
 _STATE_NAMES: Final = frozenset({"state", "status", "phase", "mode"})
 # Phrases in a description on what an operation does in every other state.
 _ELSE: Final = re.compile(r"\b(?:an)?other state|\botherwise\b", re.IGNORECASE)
+# A phrase for the state to which an operation leads, as in "queued becomes running".
+_BECOMES: Final = re.compile(r"\b(?:becomes?|goes (?:in)?to) `?[\w-]+", re.IGNORECASE)
 _NEGATED: Final = re.compile(r"\b(?:not|never|unless|except|cannot|no)\b", re.IGNORECASE)
 # How often a state change must follow an operation, because once may be by chance.
 _TWICE: Final = 2
@@ -455,7 +459,7 @@ def _values_in(predicate: str, words: dict[str, str]) -> set[str]:
 def _states_named(operation: Operation, states: set[str]) -> set[str]:
     """Return the states that an operation starts from, by the description; none where they may mean something else."""
     sentences = re.split(r"(?<=[.;])\s+", operation.text)
-    said = [sentence for sentence in sentences if not _ELSE.search(sentence)]
+    said = [_BECOMES.sub("", sentence) for sentence in sentences if not _ELSE.search(sentence)]
     named = {state: [item for item in said if _word(state).search(item)] for state in states}
     is_open = any(_NEGATED.search(item) or "409" in item for found in named.values() for item in found)
     is_said = any(_ELSE.search(sentence) and "409" in sentence for sentence in sentences)

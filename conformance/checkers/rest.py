@@ -37,6 +37,41 @@ _DOCUMENTS: Final = (
 _STORED: Final = frozenset(f"description/{name}" for name in ("written-is-read", "patch", "defaults"))
 
 
+class Histories:
+    """Judges exchanges by the earlier ones of a run.
+
+    Args:
+        contract: by which they are judged.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        self._contract = contract
+        self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
+        self._untouched = Untouched(contract)
+        self._checkers = (
+            Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
+            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
+            self._untouched, Sublists(contract),
+        )  # fmt: skip
+
+    def forget(self, *, deletes: bool) -> None:
+        """Forget states that a request of unknown effect may have changed."""
+        self._memory.forget(deletes=deletes)
+        self._writes.forget()
+        self._changes.forget()
+        self._untouched.forget()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        for case in chain.from_iterable(checker(occasion) for checker in self._checkers):
+            is_stored = not case.holds and case.requirement in _STORED
+            path = occasion.context.target.partition("?")[0]
+            resource = resource_at(self._contract, path) if is_stored else None
+            late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
+            # What such a resource shows otherwise is one finding, and not one for each member.
+            yield replace(case, doubt=late, cause=late) if late and not case.doubt else case
+
+
 class RestCheckers:
     """Judges every exchange with a REST interface, whichever check sent it.
 
@@ -49,22 +84,9 @@ class RestCheckers:
     def __init__(self, contract: Contract, base_url: str, elsewhere: Iterable[str] = ()) -> None:
         self._contract, self._base_url = contract, base_url
         self._elsewhere = frozenset(url.split("?", 1)[0] for url in elsewhere)
-        # Checkers that remember earlier exchanges of the run.
-        self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
-        self._untouched, self._codings = Untouched(contract), Codings()
+        self._histories, self._codings = Histories(contract), Codings()
         self._documents = (*_DOCUMENTS, declared.Negotiation())
-        self._over_time = (
-            Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
-            self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract),
-        )  # fmt: skip
-
-    def forget(self, *, deletes: bool) -> None:
-        """Forget states that a request of unknown effect may have changed."""
-        self._memory.forget(deletes=deletes)
-        self._writes.forget()
-        self._changes.forget()
-        self._untouched.forget()
+        self.forget = self._histories.forget
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
         """Yield the cases of one exchange; none if it went to another interface."""
@@ -85,11 +107,6 @@ class RestCheckers:
         yield from self._codings(occasion)
         if not attempt.response.content.is_plain:
             return  # the remaining checkers read the content
-        for case in chain.from_iterable(checker(occasion) for checker in self._over_time):
-            is_stored = not case.holds and case.requirement in _STORED
-            resource = resource_at(self._contract, context.target.partition("?")[0]) if is_stored else None
-            late = doubt_of_write(*resource.operations.values()) if resource is not None else ""
-            # What such a resource shows otherwise is one finding, and not one for each member.
-            yield replace(case, doubt=late, cause=late) if late and not case.doubt else case
+        yield from self._histories(occasion)
         for check in () if context.is_own_of(attempt.response) else self._documents:
             yield from check(occasion)

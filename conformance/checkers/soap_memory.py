@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from math import isclose
 from typing import Final
@@ -17,7 +17,12 @@ from urllib.parse import urlsplit
 
 from lxml import etree
 
+from conformance.api.rest.request_context import RequestContext
+from conformance.api.soap.resources import BASE, Resources, SoapExchange
 from conformance.api.soap.roles import KEEPS, MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
+from conformance.checkers.occasion import Occasion
+from conformance.checkers.rest import Histories
+from conformance.documents.openapi import matching
 from conformance.documents.wsdl import Wsdl
 from conformance.documents.xml import XSI, clark, local
 from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Simple, is_alike, number_in
@@ -32,15 +37,13 @@ _LOST: Final = 6
 # _FEW: a value with fewer prompt reads for each late one changes in steps. Texts up to this length identify nothing.
 _FEW: Final = 3
 _MOST: Final = 1_000
-# Things of a list that are compared one by one, and reads of a list that show whether it changes by itself.
+_FAILED: Final = 500
+# Things of a list that are compared one by one.
 _ITEMS: Final = 50
-_STEADY: Final = 3
 # What programs write in place of a text that is not there.
 _NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
 # Values that are as good as none.
 _NOTHING: Final = frozenset({"", "0", "0.0", "false"})
-# Values that may say that a thing is removed, though it is still told.
-_STATES: Final = re.compile(r"stat(?:e|us)|delet|remov|activ|enabl|valid|archiv|exist")
 _NIL: Final = clark(XSI, "nil")
 # Separator between the values of one name: a character that XML cannot contain.
 _BETWEEN: Final = "\0"
@@ -63,18 +66,6 @@ class _Write:
     shown: set[str] = field(default_factory=set)
     late: set[str] = field(default_factory=set)
     refused: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-
-
-@dataclass
-class _Thing:
-    """A thing that one request created, with the value by which the device identifies it."""
-
-    creator: Act
-    name: str
-    id: str
-    at_s: float
-    values: frozenset[tuple[str, str]] = frozenset()
-    gone: bool = False
 
 
 @dataclass
@@ -139,14 +130,9 @@ class SoapMemory:
             for writer in acts
         }
         self._written: dict[str, list[_Write]] = defaultdict(list)
-        self._things: list[_Thing] = []
         self._past: dict[tuple[str, str, str], _Past] = defaultdict(_Past)
-        # What identified a thing in a response, by name; of each list its ids, how many requests may have changed the
-        # device before it was read, and how often it was the same without any. The last such request: who, values,
-        # and whether it was refused.
+        # What identified a thing in a response, by name.
         self._given: set[tuple[str, str]] = set()
-        self._lists: dict[str, tuple[set[str], int, int]] = {}
-        self._done_last: tuple[Act, set[str], bool] | None = None
         self._changes = 0
 
     def __call__(self, attempt: Attempt) -> Iterator[Case]:
@@ -168,9 +154,7 @@ class SoapMemory:
         if (act.role is not Role.READS or not sent) and len(self._given) < _MOST:
             self._given.update((name, text) for name, texts in told.items() if REFERS.search(name) for text in texts)
         if act.role is Role.READS:
-            yield from self._judge_removed(act, attempt, sent, told)
             if response.ok and answer is not None and not is_fault:
-                yield from self._judge_list(act, attempt, told)
                 yield from self._judge_id(act, attempt, sent, told)
                 yield from self._values(act, attempt, sent, told)
                 # The items of a list tell what was written to each.
@@ -179,27 +163,24 @@ class SoapMemory:
                     yield from self._values(act, attempt, item, item)
             return
         self._changes += 1
-        self._done_last = act, {text for texts in sent.values() for text in texts}, is_fault
         if is_fault:
             self._keep_refused(act, sent)
         elif not response.ok or self._types.invalid(payload):
             self._forget()
         else:
             nil = {local(str(one.tag)).lower() for one in payload.iter(etree.Element) if one.get(_NIL) in {"true", "1"}}
-            yield from self._keep_done(act, attempt, sent, told, nil - act.emptied)
+            self._keep_done(act, attempt, sent, told, nil - act.emptied)
 
     def _forget(self) -> None:
         self._written.clear()
-        self._things.clear()
-        self._done_last = None
 
     def _keep_refused(self, act: Act, sent: _Texts) -> None:
         for write in self._written[act.label]:
             for name, texts in sent.items():
                 write.refused[name].update(texts)
 
-    def _keep_done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts, unsaid: set[str]) -> Iterator[Case]:
-        """Keep what a successful request did; judge whether what it created is a thing of its own.
+    def _keep_done(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts, unsaid: set[str]) -> None:
+        """Keep what a successful request wrote.
 
         A device may leave the values of ``unsaid`` as they were, or not.
         """
@@ -219,32 +200,6 @@ class SoapMemory:
             others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
         self._written.clear()
         self._written[act.label] = others
-        if act.role is Role.WRITES:
-            return
-        if act.role is Role.CREATES:
-            new = [(name, texts[0]) for name, texts in told.items() if len(texts) == 1 and name not in sent]
-            new = [pair for pair in new if REFERS.search(pair[0])] or (new if len(new) == 1 else [])
-            for name, text in new[:1]:
-                yield from self._keep_thing(_Thing(act, name, text, at_s, _texts(sent)), exchange)
-            del self._things[:-_MOST]
-        elif act.role is Role.REMOVES:
-            for thing in self._things:
-                if thing.creator.noun == act.noun and any(thing.id in texts for texts in sent.values()):
-                    thing.gone, thing.at_s = True, at_s
-        else:
-            self._things.clear()
-
-    def _keep_thing(self, thing: _Thing, exchange: Exchange) -> Iterator[Case]:
-        """Keep a thing; judge whether its id is its own."""
-        own = [one for one in self._things if one.creator is thing.creator and not one.gone]
-        self._things.append(thing)
-        # With no value in common, no key by which a device may take them for one thing; with one id for all, it has
-        # one thing at a time.
-        is_other = bool(own) and bool(thing.values) and own[-1].id == thing.id and not own[-1].values & thing.values
-        if is_other and any(one.id != thing.id for one in own):
-            expected, got = f"{thing.name} of a new thing", f"{thing.name} {thing.id!r}, which the thing before has"
-            cause = f"{thing.creator.label} {thing.name}"
-            yield case("soap/created-is-there", False, exchange, expected, got, cause)  # noqa: FBT003 - see Case
 
     def _values(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
         """Judge what was written before by a response, or by one item of a list in place of request and response."""
@@ -353,68 +308,6 @@ class SoapMemory:
                 continue
             yield from past.twice("written-is-read", exchange, expected, got, f"{act.label} {name}")
 
-    def _judge_removed(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
-        """Judge whether a thing that was removed can still be read; a value of its own may say that it is removed."""
-        for thing in self._things:
-            age_s = exchange.response.received_s - thing.at_s
-            is_asked = sent.keys() == act.needs and [thing.id] in sent.values() and act.shows(thing.creator)
-            if not thing.gone or not is_asked or age_s < SETTLES_S or any(map(_STATES.search, told)):
-                continue
-            past, expected = self._past[thing.creator.label, act.label, "gone"], f"a fault for {thing.id!r}"
-            expected += f", which was removed {age_s:.1f} s before"
-            got = "its values" if [thing.id] in told.values() else ""
-            yield from past.twice("deleted-is-gone", exchange, expected, got, f"{thing.creator.label} {act.label}")
-
-    def _judge_steady(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
-        """Judge whether a list is as it was, but for what the one request did that came since."""
-        names = {thing.name for thing in self._things if act.lists(thing.creator)}
-        ids = {text for name in names for text in told.get(name, ())}
-        before, changes, steady = self._lists.get(act.label, (ids, self._changes, 0))
-        since = self._changes - changes
-        steady += (ids == before or -_MOST) if not since else 0
-        self._lists[act.label] = ids, self._changes, steady
-        if since != 1 or self._done_last is None or steady < _STEADY:
-            return
-        doer, values, is_refused = self._done_last
-        if is_refused and doer.role is Role.CREATES and act.lists(doer):
-            name, odd, what = "refused-keeps", ids - before, "a list as before, since the message was refused"
-        elif not is_refused and doer.role is Role.REMOVES and act.lists(doer):
-            # What a list counts is counted anew.
-            odd = {text for text in before - ids - values if not text.isdigit()}
-            name, what = "created-is-there", f"a list without what {doer.operation.name} removed, and with all else"
-        else:
-            return
-        past = self._past[doer.label, act.label, name]
-        got = f"a list with or without {', '.join(sorted(odd))}" if odd else ""
-        yield from past.twice(name, exchange, what, got, f"{doer.label} {act.label}")
-
-    def _judge_list(self, act: Act, exchange: Exchange, told: _Texts) -> Iterator[Case]:
-        """Judge whether a list contains created things, and no removed ones."""
-        yield from self._judge_steady(act, exchange, told)
-        ids = {text for name, texts in told.items() if REFERS.search(name) for text in texts}
-        for thing in self._things:
-            if not act.lists(thing.creator):
-                continue
-            past = self._past[thing.creator.label, act.label, ""]
-            is_there, age_s = thing.id in ids, exchange.response.received_s - thing.at_s
-            name = "deleted-is-gone" if thing.gone else "created-is-there"
-            expected = f"{thing.name} {thing.id!r}, which {thing.creator.operation.name} created"
-            if thing.gone:
-                expected = f"a list without {thing.id!r}, which was removed {age_s:.1f} s before"
-            if is_there is not thing.gone:
-                if is_there:
-                    past.kept[thing.id] = max(past.kept.get(thing.id, 0.0), age_s)
-                if len(past.kept) >= _KEPT:
-                    yield case(f"soap/{name}", True, exchange, expected)  # noqa: FBT003 - see Case
-            elif age_s >= SETTLES_S and len(past.kept) >= _KEPT and (thing.gone or age_s <= past.longest(thing.id)):
-                got = f"a list with {thing.id!r}" if thing.gone else f"a list without {thing.id!r}"
-                yield from past.twice(name, exchange, expected, got, f"{thing.creator.label} {act.label}")
-
-
-def _texts(sent: _Texts) -> frozenset[tuple[str, str]]:
-    """Return the values of a request that may identify a thing, with their names."""
-    return frozenset((name, text) for name, texts in sent.items() for text in texts if len(text) > _FEW)
-
 
 def _join(texts: list[str]) -> str:
     """Return the values of one name as one text, in any order."""
@@ -461,3 +354,55 @@ def _is_usual(simple: Simple, text: str, kept: list[str]) -> bool:
         return False if number is None or not numbers else min(numbers) <= number <= max(numbers)
     longest = max(*map(len, kept), simple.max_length or 0)
     return len(text) <= longest or not _WORDS.fullmatch(text)
+
+
+# Requirements of SOAP by what REST calls them.
+_AS_SOAP: Final = {
+    "created-is-there": "created-is-there", "deleted-is-gone": "deleted-is-gone", "written-is-read": "written-is-read",
+    "refused-keeps": "refused-keeps", "own-identifier": "created-is-there", "states": "states", "list-filter": "lists",
+    "list-order": "lists", "list-pages": "lists", "list-limit": "lists", "list-total": "lists",
+}  # fmt: skip
+# End of what is expected of a state that no operation has changed.
+_BY_ITSELF: Final = "as it was read before"
+
+
+class SoapThings:
+    """Judges SOAP operations as the checkers of REST judge resources.
+
+    Args:
+        resources: the operations as resources.
+    """
+
+    def __init__(self, resources: Resources) -> None:
+        self._resources, self._histories = resources, Histories(resources.contract)
+        # By list: identifiers of the things that it had.
+        self._known: dict[str, set[str]] = defaultdict(set)
+
+    def __call__(self, attempt: Attempt) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        seen = self._resources.as_rest(attempt)
+        context = RequestContext.of(self._resources.contract, BASE, seen.request) if seen is not None else None
+        if seen is None or context is None:
+            return
+        if not isinstance(seen, Exchange) or seen.response.status >= _FAILED:
+            self._histories.forget(deletes=True)
+            return
+        shown = self._resources.items_in(seen, self._known[context.target]) if isinstance(seen, SoapExchange) else ()
+        for one in (seen, *shown):
+            yield from self._cases(one)
+
+    def _cases(self, seen: Exchange) -> Iterator[Case]:
+        context = RequestContext.of(self._resources.contract, BASE, seen.request)
+        for found in self._histories(Occasion(self._resources.contract, seen, context)) if context is not None else ():
+            name = _AS_SOAP.get(found.requirement.partition("/")[2], "")
+            if name:
+                case = self._resources.in_soap(found)
+                # An axis, which always exists, may leave any state by itself.
+                is_alone = name == "states" and found.expected.endswith(_BY_ITSELF) and not self._is_created(seen)
+                doubt = case.doubt or ("it may have left the state by itself" if is_alone else "")
+                yield replace(case, requirement=f"soap/{name}", doubt=doubt)
+
+    def _is_created(self, seen: Exchange) -> bool:
+        """Return whether an operation creates things where one was read."""
+        above = seen.request.url.removeprefix(BASE).rpartition("/")[0]
+        return matching(self._resources.contract, "POST", above) is not None

@@ -32,6 +32,7 @@ _MULTIPART, _PART, _CONTENT = (
     f"{{http://schemas.xmlsoap.org/wsdl/mime/}}{name}" for name in ("multipartRelated", "part", "content")
 )
 _PREFIXES: Final = {"w": WSDL, "s": WSDL_SOAP, "xs": XSD}
+_DOCUMENTATION: Final = clark(WSDL, "documentation")
 _ACTIONS: Final = tuple(clark(space, "Action") for space in (WSAM, WSAW, "http://www.w3.org/2005/08/addressing"))
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
 
@@ -115,6 +116,12 @@ class Wsdl:
     location: str
     address: str = ""
     foreign: bool = False
+
+    @property
+    def documentation(self) -> str:
+        """What the WSDL says of the whole service."""
+        parts = (*self.definitions, *self.all("w:portType"), *self.all("w:service"))
+        return " ".join(" ".join(part.findtext(_DOCUMENTATION, "").split()) for part in parts)
 
     @property
     def definitions(self) -> list[etree._Element]:
@@ -355,7 +362,7 @@ class _Reader:
             tuple(map(name, messages)),
             tuple(tuple(map(name, element.iterfind(clark(WSDL, "part")))) for element in messages),
             frozenset(self._faults(declared)),
-            " ".join((declared.findtext(clark(WSDL, "documentation")) or "").split()),
+            " ".join(declared.findtext(_DOCUMENTATION, "").split()),
         )
 
     def _faults(self, declared: etree._Element) -> Iterator[str]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Elements of one message to read: recursive types could be read without end.
 _MOST: Final = 20_000
+_DOCUMENTATION: Final = f"{clark(XSD, 'annotation')}/{clark(XSD, 'documentation')}"
 # Elements that a request may have.
 _LARGEST: Final = 100_000
 
@@ -103,6 +104,7 @@ class Element:
         type: type of its content.
         minimum: minOccurs; maximum: maxOccurs (None: unbounded).
         nillable: whether xsi:nil is allowed.
+        documentation: what the schema says of it.
     """
 
     tag: str
@@ -110,6 +112,7 @@ class Element:
     minimum: int = 1
     maximum: int | None = 1
     nillable: bool = False
+    documentation: str = ""
 
     @property
     def children(self) -> tuple[Element, ...]:
@@ -145,7 +148,11 @@ class _Reader:
             return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
         own = self._type(declared.type)
         own = _with_fixed(own, declared) if isinstance(own, Simple) else own
-        return Element(tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable)
+        said = declared.elem.findtext(_DOCUMENTATION, "") if declared.elem is not None else ""
+        documentation = " ".join(said.split())
+        return Element(
+            tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable, documentation=documentation
+        )
 
     def _type(self, declared: Any) -> Simple | Complex:
         if declared.is_simple():

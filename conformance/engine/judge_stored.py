@@ -7,10 +7,11 @@ from typing import Any
 
 from conformance.api.device import device_of
 from conformance.api.rest.interface import RestInterface
+from conformance.api.soap.resources import resources_of
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import SoapCheckers, answers_of
-from conformance.checkers.soap_memory import SoapMemory
+from conformance.checkers.soap_memory import SoapMemory, SoapThings
 from conformance.contract.classes import Interface
 from conformance.documents.wsdl_pack import services_of
 from conformance.engine.certification import draw_verdicts
@@ -124,8 +125,8 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Lis
         checkers.append(RestCheckers(run.contract, api.client.base_url, [service.endpoint for service in services]))
     if services:
         checkers.append(SoapCheckers({service.endpoint: answers_of(service.contract) for service in services}))
-    if (found := services_of(run.contract)) is not None:
-        checkers.append(SoapMemory(found))
+    if (found := services_of(run.contract)) is not None and (resources := resources_of(run.contract)) is not None:
+        checkers += [SoapMemory(found), SoapThings(resources)]
     yield CheckerListener(run.judge, checkers)
 
 

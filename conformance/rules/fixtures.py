@@ -14,10 +14,11 @@ from conformance.api.rest.description import KeptExchanges
 from conformance.api.rest.habits import Habits
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
+from conformance.api.soap.resources import resources_of
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import PASSIVE, SoapCheckers, answers_of
-from conformance.checkers.soap_memory import SoapMemory
+from conformance.checkers.soap_memory import SoapMemory, SoapThings
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import Wsdl
 from conformance.documents.wsdl_pack import services_of
@@ -65,8 +66,8 @@ def _attach_checkers(
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}
         checkers.append(SoapCheckers(answers))
-    if (found := services_of(run.contract)) is not None:
-        checkers.append(SoapMemory(found))
+    if (found := services_of(run.contract)) is not None and (resources := resources_of(run.contract)) is not None:
+        checkers += [SoapMemory(found), SoapThings(resources)]
     listeners.append(CheckerListener(run.judge, checkers))
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():

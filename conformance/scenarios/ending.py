@@ -86,7 +86,11 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         pauses = [operation for operation in ends if words_of(operation.template.rpartition("/")[2]) & _PAUSING][:1]
         ends = [operation for operation in ends if operation not in pauses][:1]
         first = [*pauses, *begins[:1], *begins]
-        for steps in ([*first, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)], first):
+        for steps in (
+            [*first, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)],
+            first,
+            *([_again_and_again(actions)] if len(actions) > _BEGINNING and create is not None else ()),
+        ):
             api.run.limit.check()
             with api.run.limit.lift(), suppress(NoAnswerError):  # the survey reports a broken connection
                 if create is None:
@@ -109,7 +113,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
             done = ""
             for path in kind.paths:
                 now = members(writer.send(kind.read, path), (kind.state,)).get(kind.state)
-                done = path if now in FINAL and path != kind.paths[0] else done
+                done = path if str(now).casefold() in FINAL and path != kind.paths[0] else done
             done = done or (_listed_as_done(writer, kind) if ends else "")
             if done:
                 _walk(writer, kind, done, ends)
@@ -126,7 +130,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
 
         def is_so(found: Exchange, told: Any = told) -> bool:
             now = members(found, (kind.state,)).get(kind.state)
-            return told is None or now == told or now in FINAL or not found.response.ok
+            return told is None or now == told or str(now).casefold() in FINAL or not found.response.ok
 
         writer.until(lambda: writer.send(kind.read, path), is_so)
         if KEEPS.search(step.text):
@@ -146,7 +150,7 @@ def _listed_as_done(writer: Writer, kind: Ended) -> str:
     items = items_of(read_json(writer.send(lister).response.body).value) if lister is not None else None
     for item in items or []:
         id_ = id_member(item, kind.read)[1]
-        if isinstance(item, dict) and id_ is not None and item.get(kind.state) in FINAL:
+        if isinstance(item, dict) and id_ is not None and str(item.get(kind.state)).casefold() in FINAL:
             return f"{collection_of(kind.read.template)}/{id_}"
     return ""
 

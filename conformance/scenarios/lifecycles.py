@@ -39,7 +39,6 @@ from conformance.scenarios.singletons import singletons
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Write, Writer, members
 from conformance.transport.exchange import Exchange, NoAnswerError
-from conformance.transport.parallel import send_together
 from conformance.transport.reach import is_same, joined, path_of
 
 # Things to create in a collection: _KEPT if nothing deletes them, _FEW at quick, _MANY otherwise.
@@ -301,7 +300,7 @@ class _Cycle:
         bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
         requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
         if len({request.body for request in requests}) == len(turns):
-            sent = send_together([[(writer.api.client, request) for request in requests]])[0]
+            sent = writer.api.send_together(requests)
             made = [one for one in sent if isinstance(one, Exchange) and one.response.ok]
             new = [one for one in made if one.response.status == HTTPStatus.CREATED]
             for created in new:

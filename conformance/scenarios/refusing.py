@@ -90,5 +90,8 @@ def refuse_creation(living: Living, create: Operation, turn: int) -> None:
             if id_ and id_ not in before and any(one.get(name) == text for name, text in ours.items())
         ]
         found = f"a list with {', '.join(f'{name} {text!r}' for name, text in ours.items())}" if made else ""
+        new = [id_ for id_ in listing.ids if id_ and id_ not in before] if not found else []
+        found = found or (f"a list with {new[0]}, which is new" if new else "")
         expected = f"a list without what {create.label} with status {sent.response.status} asked for"
-        living.looks.append(Look(Kind.REFUSED, create.label, listing.exchange, expected, found))
+        doubt = "another client may have created it" if new else ""
+        living.looks.append(Look(Kind.REFUSED, create.label, listing.exchange, expected, found, doubt=doubt))

@@ -296,46 +296,17 @@ class _Changes:
                     self.caller.ask(act, _as_it_was(thing, free, values), "the values that were there before")
 
     def create(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
-        """Create things, read the lists, send messages to be refused, and remove the created things."""
+        """Create a thing of a derived type, read it, and remove it; `soap_things` creates all others."""
         remove = next((one for one in self.acts if one[0].role is Role.REMOVES and one[0].noun == act.noun), None)
-        lists = [one for one in self.acts if one[0].lists(act)]
-        if remove is None or not lists or remove[2] is None:
+        if remove is None or remove[2] is None:
             return
-        forms = _forms_of(declared, node)[::-1]
-        node, free = forms[0]
-        short = self.caller.messages.usual(act.operation)[1]
-        readers = [one for one in self.acts if one[0].shows(act)]
-        made, asks = list[str](), list[Node]()
-        forms = [*forms[:2], *_forms_of(declared, short or node)[:1]]
-        for turn in range(_THINGS):
-            probe = self.caller.ask(act, _with_others(*forms[turn], turn), "a message that creates")
-            if not probe.is_success:
-                probe = self.caller.ask(act, node, "a message that creates")
-            told = {name: texts[0] for name, texts in _values_in(probe).items() if len(texts) == 1}
-            made += [text for name, text in told.items() if REFERS.search(name)][:1] or list(told.values())[:1]
-            asks = [Node("", "", tuple(Node(*pair) for pair in told.items())), *asks]
-            if not turn:
-                # The first thing shows that things last longer than the others exist before they are removed.
-                time.sleep(_LASTS_S)
-            self._read(lists, node)
-            yield
-        typed = [_values_in(probe) for probe in self._created_as_derived(act, declared, node)]
-        made += [texts[0] for told in typed for name, texts in told.items() if REFERS.search(name)][: len(typed)]
-        asks += [Node("", "", tuple(Node(name, texts[0]) for name, texts in told.items())) for told in typed]
-        time.sleep(SETTLES_S)
-        self._read(lists, node)
-        for asked in asks * 3:
-            self._read(readers, asked)
-        for kind in (0, _REFUSALS - 1):
-            self._refuse(act, declared, _with_others(node, free, _THINGS), kind)
-            self._read(lists, node, times=2)
-        for id_ in made:
-            self.remove(remove[0], remove[2], id_)
-            self._read(lists, node, times=2)
-        time.sleep(SETTLES_S)
-        self._read(lists, node, times=2)
-        for asked in asks:
-            self._read(readers, asked)
+        told = [_values_in(probe) for probe in self._created_as_derived(act, declared, node)]
+        yield
+        for values in told:
+            asked = Node("", "", tuple(Node(name, texts[0]) for name, texts in values.items()))
+            self._read([one for one in self.acts if one[0].shows(act)], asked, times=2)
+            for text in [texts[0] for name, texts in values.items() if REFERS.search(name)][:1]:
+                self.remove(remove[0], remove[2], text)
 
     def _created_as_derived(self, act: Act, declared: Element, node: Node) -> Iterator[SoapProbe]:
         """Create a thing of a derived type, and again if that is refused; yield the success."""

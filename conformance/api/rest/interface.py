@@ -1,7 +1,7 @@
 """The REST interface of a device in one run."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,8 @@ from conformance.api.rest.driven import Driven
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import HttpClient
-from conformance.transport.exchange import Exchange, Outgoing
+from conformance.transport.exchange import Attempt, Exchange, Outgoing
+from conformance.transport.parallel import send_together
 from conformance.verdict.run import Run
 
 
@@ -103,6 +104,10 @@ class RestInterface:
             fresh=fresh or request.method in {"PUT", "DELETE"},
             timeout_s=timeout_s,
         )
+
+    def send_together(self, requests: Sequence[Outgoing]) -> list[Attempt]:
+        """Send requests at the same moment, each from a client of its own; see `transport.parallel`."""
+        return send_together([[(self.client, request) for request in requests]])[0]
 
     @property
     def path(self) -> str:

@@ -75,6 +75,8 @@ def singular(name: str) -> str:
     plain = plain_name(name)
     if plain.endswith("ies"):
         return f"{plain[:-3]}y"
+    if plain.endswith(("ches", "shes", "xes", "sses")):
+        return plain[:-2]
     return plain[:-1] if plain.endswith("s") and not plain.endswith("ss") else plain
 
 

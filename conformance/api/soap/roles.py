@@ -124,11 +124,6 @@ class Act:
             and not self.told.keys().isdisjoint(writer.sent.keys() - self.sent.keys())
         )
 
-    def lists(self, creator: Act) -> bool:
-        """Return whether this operation lists another's things, as GetPresets lists those of AddPreset."""
-        own, made = self.noun.removesuffix("s"), creator.noun.removesuffix("s")
-        return self.role is Role.READS and not self.needs and bool(made) and own.startswith(made)
-
 
 def role_of(name: str) -> Role:
     """Return an operation's role by its name."""

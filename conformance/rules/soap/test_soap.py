@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from functools import wraps
+from typing import Any
 
 from lxml import etree
 
+from conformance.api.soap.resources import resources_of
 from conformance.documents.multipart import parts_of
 from conformance.documents.traceback import inside_shown
 from conformance.documents.wsdl import ENVELOPE_12
 from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import ENVELOPE, clark, elements, local, text_of
+from conformance.rules.description import test_lives, test_resources
 from conformance.rules.soap.own_state import entries, probes_left
-from conformance.scenarios.rule import Note, Outcome, rule
+from conformance.scenarios.living import Life
+from conformance.scenarios.rule import Note, Outcome, Rule, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
+from conformance.scenarios.soap_things import Things, soap_things
 from conformance.transport.exchange import NoAnswer
 from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing
 from conformance.verdict.run import Run
 
-_ON = (soap_survey, soap_changes)
+_ON = (soap_survey, soap_changes, soap_things)
 _OK, _BAD, _FAILED = 200, 400, 500
 # SOAP 1.2 Part 1, 5.4.6.
 _CHILDREN_11 = frozenset({"faultcode", "faultstring", "faultactor", "detail"})
@@ -38,6 +44,19 @@ _OPTIONAL = re.compile(r"not\s?(?:supported|implemented)", re.IGNORECASE)
 _VALID = frozenset({Kind.USUAL, Kind.TRIED})
 _ASKED = frozenset({Kind.USUAL, Kind.VARIED})
 Trace = tuple[SoapProbe, ...]
+
+
+def _rule(requirement: str) -> Callable[[Callable[..., Iterable[Outcome]]], Rule]:
+    """Return a decorator that turns a function into a rule on the messages of all scenarios."""
+
+    def make(judge: Callable[..., Iterable[Outcome]]) -> Rule:
+        @wraps(judge)
+        def judge_probes(trace: Trace | Things, **fixtures: Any) -> Iterable[Outcome]:
+            return judge(trace.probes if isinstance(trace, Things) else trace, **fixtures)
+
+        return rule(requirement, on=_ON)(judge_probes)
+
+    return make
 
 
 def _cases(
@@ -79,7 +98,7 @@ def wsdl(trace: tuple[str, ...]) -> Iterator[Outcome]:
         yield Case(holds=True, exchange=None, expected=expected)
 
 
-@rule("soap/answered", on=_ON)
+@_rule("soap/answered")
 def answered(trace: Trace) -> Iterator[Outcome]:
     """Judge whether each request gets an HTTP response."""
 
@@ -93,7 +112,7 @@ def answered(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "a response", wrong)
 
 
-@rule("soap/message", on=_ON)
+@_rule("soap/message")
 def message(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a success, and XML with status 500, is a well-formed message of the port's SOAP version."""
 
@@ -112,7 +131,7 @@ def message(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "a SOAP message", wrong)
 
 
-@rule("soap/media-type", on=_ON)
+@_rule("soap/media-type")
 def media_type(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a message has the media type of its SOAP version."""
 
@@ -133,7 +152,7 @@ def media_type(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "the media type of the SOAP version", wrong)
 
 
-@rule("soap/response-valid", on=_ON)
+@_rule("soap/response-valid")
 def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether the Body of a success has the element that the WSDL names, valid by its schema."""
     found = services_of(run.contract)
@@ -157,7 +176,7 @@ def response_valid(trace: Trace, run: Run) -> Iterator[Outcome]:
     return _cases(trace, "a response that is valid by the WSDL", wrong)
 
 
-@rule("soap/fault", on=_ON)
+@_rule("soap/fault")
 def fault(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a fault meets its SOAP version, and its detail the WSDL."""
     types = None if (found := services_of(run.contract)) is None else found.types
@@ -243,7 +262,7 @@ def _wrong_code_12(code: etree._Element) -> str:
     return "" if is_right else f"a {local(str(code.tag))} that is not a Value and at most one Subcode"
 
 
-@rule("soap/fault-status", on=_ON)
+@_rule("soap/fault-status")
 def fault_status(trace: Trace) -> Iterator[Outcome]:
     """Judge a fault's status: 500 in SOAP 1.1 (6.2), 400 or 500 in SOAP 1.2."""
 
@@ -257,7 +276,7 @@ def fault_status(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "a fault with its status", wrong)
 
 
-@rule("soap/valid-accepted", on=_ON)
+@_rule("soap/valid-accepted")
 def valid_accepted(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a message that the WSDL allows is accepted; a device need not have all that a standard's has."""
     found = services_of(run.contract)
@@ -302,7 +321,7 @@ def _refusal_judge(expected: str, *kinds: Kind, code: str = "") -> Callable[[Tra
 
 
 malformed_refused, invalid_refused, version_mismatch, must_understand, doctype_refused = (
-    rule(f"soap/{name}", on=_ON)(judge)
+    _rule(f"soap/{name}")(judge)
     for name, judge in (
         ("malformed-refused", _refusal_judge("a fault or a status of 400 and above", Kind.UNREADABLE, Kind.EMPTY)),
         ("invalid-refused", _refusal_judge("a fault", Kind.INVALID)),
@@ -313,7 +332,7 @@ malformed_refused, invalid_refused, version_mismatch, must_understand, doctype_r
 )
 
 
-@rule("soap/no-bare-error", on=_ON)
+@_rule("soap/no-bare-error")
 def no_bare_error(trace: Trace) -> Iterator[Outcome]:
     """Judge whether server errors come as faults: a bare 500 means that the service itself failed."""
 
@@ -326,7 +345,7 @@ def no_bare_error(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "a fault, if it fails", wrong)
 
 
-@rule("soap/recovers", on=_ON)
+@_rule("soap/recovers")
 def recovers(trace: Trace, run: Run) -> Iterator[Outcome]:
     """Judge whether a valid message still gets its usual response after wrong ones."""
     before = {one.operation: one.is_success for one in trace if one.kind is Kind.USUAL}
@@ -340,7 +359,7 @@ def recovers(trace: Trace, run: Run) -> Iterator[Outcome]:
     return _cases(again, "success, as before", wrong)
 
 
-@rule("soap/no-internals", on=_ON)
+@_rule("soap/no-internals")
 def no_internals(trace: Trace) -> Iterator[Outcome]:
     """Judge whether a response shows a traceback."""
 
@@ -353,12 +372,38 @@ def no_internals(trace: Trace) -> Iterator[Outcome]:
     return _cases(trace, "an error that shows nothing of the program", wrong)
 
 
-def _play(_trace: Trace) -> tuple[Outcome, ...]:
-    """Play the changes; `checkers.soap_memory` judges what is read after them."""
+def _play(_trace: Trace | Things) -> tuple[Outcome, ...]:
+    """Play a scenario; `checkers.soap_memory` judges what is read after its changes."""
     return ()
 
 
 written_is_read, refused_keeps, created_is_there, deleted_is_gone = (
     rule(f"soap/{name}", on=(soap_changes,))(_play)
     for name in ("written-is-read", "refused-keeps", "created-is-there", "deleted-is-gone")
+)
+states = rule("soap/states", on=(soap_things,))(_play)
+
+
+def _of_things(name: str, of: Rule, part: str = "lives") -> Rule:
+    """Return a rule that judges what SOAP operations keep as another rule judges resources."""
+
+    def judge_things(trace: Things, run: Run) -> Iterator[Outcome]:
+        resources = resources_of(run.contract)
+        # A device may limit a setting; `checkers.soap_memory` judges those.
+        own = tuple(one for one in getattr(trace, part) if not isinstance(one, Life) or one.create)
+        for outcome in of.judge(own):
+            yield resources.in_soap(outcome) if resources is not None and isinstance(outcome, Case) else outcome
+
+    return rule(f"soap/{name}", on=(soap_things,))(judge_things)
+
+
+things_created, things_written, things_deleted, things_kept, things_listed, things_chosen, things_paged, things_used = (
+    _of_things("created-is-there", test_lives.created_is_there),
+    _of_things("written-is-read", test_lives.written_is_read),
+    _of_things("deleted-is-gone", test_lives.deleted_is_gone),
+    _of_things("refused-keeps", test_lives.refused_keeps),
+    _of_things("written-is-read", test_lives.same_values),
+    _of_things("lists", test_lives.chosen_by_value),
+    _of_things("lists", test_resources.list_pages, "pages"),
+    _of_things("deleted-is-gone", test_lives.nothing_refers_to_what_is_gone, "deletions"),
 )

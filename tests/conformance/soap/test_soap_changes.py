@@ -20,20 +20,20 @@ _FAULTS = (
         "refused label applied": ("refused-keeps", "label '"),
         "nil stays": ("written-is-read", "note '"),
         "bins share": ("written-is-read", "weight '"),
-        "delete takes all": ("created-is-there", "AddRecipe"),
+        "delete takes all": ("created-is-there", "before DeleteRecipe"),
     },
     {
         "label ignored": ("written-is-read", "label '"),
         "NaN is zero": ("written-is-read", "offset 'NaN'"),
         "slots crossed": ("written-is-read", "which was asked for"),
         "burst is slow": ("written-is-read", "mode '"),
-        "delete does nothing": ("deleted-is-gone", "which was removed"),
+        "delete does nothing": ("deleted-is-gone", "after DeleteRecipe"),
     },
     {
         "quiet stays": ("written-is-read", "quiet '"),
         "latin": ("written-is-read", "label '"),
         "rate whole": ("written-is-read", "rate '"),
-        "second delete does nothing": ("deleted-is-gone", "which was removed"),
+        "second delete does nothing": ("deleted-is-gone", "after DeleteRecipe"),
     },
     {
         "escaped twice": ("written-is-read", "label '"),
@@ -41,14 +41,18 @@ _FAULTS = (
         "no maxInclusive": ("invalid-refused", "'10' at Tray"),
     },
     {"lost after refusal": ("written-is-read", "SetSettings"), "no maxLength": ("invalid-refused", "p' at Title")},
-    {"utf-16 lost": ("written-is-read", "label '"), "delete takes another": ("created-is-there", "and with all else")},
+    {
+        "utf-16 lost": ("written-is-read", "label '"),
+        "delete takes another": ("created-is-there", "before DeleteRecipe"),
+    },
     {"mandatory label applied": ("refused-keeps", "label '"), "empty label stays": ("written-is-read", "label ''")},
     {
         "last slot is far": ("response-valid", "'90'"),
         "fails at times": ("valid-accepted", "GetSettings"),
         "mode burst refused": ("valid-accepted", "SetSettings"),
     },
-    {"refused creates": ("refused-keeps", "a list as before"), "id twice": ("created-is-there", "of a new thing")},
+    {"refused creates": ("refused-keeps", "which is new")},
+    {"id twice": ("created-is-there", "where an earlier thing is")},
 )
 
 

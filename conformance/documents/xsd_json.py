@@ -1,0 +1,113 @@
+"""What XML Schema and JSON Schema have in common: an element as a JSON value, and its declaration as a JSON Schema."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final
+
+from conformance.documents.representation import scalar
+from conformance.documents.xml import XSI, clark, elements, local, text_of
+from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Element, Group, Simple
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+_NIL: Final = clark(XSI, "nil")
+# Elements that are nested deeper than this have no schema.
+_DEEPEST: Final = 6
+# Formats of JSON Schema by the built-in type of XML Schema that has them.
+_FORMATS: Final = {
+    "dateTime": "date-time", "date": "date", "time": "time", "duration": "duration", "anyURI": "uri",
+    "base64Binary": "byte",
+}  # fmt: skip
+# Types whose values have no blank, and a regular expression for such values.
+_TOKENS: Final = frozenset({"NMTOKEN", "NCName", "Name", "ID", "IDREF", "language"})
+_NAME_LIKE: Final = r"[A-Za-z][A-Za-z0-9]*"
+
+
+def value_of(element: etree._Element | None, declared: Element | None) -> Any:
+    """Return an element as a JSON value by its declaration; what the schema does not name is left out."""
+    if element is None or declared is None:
+        return {}
+    kind = declared.type
+    if element.get(_NIL) in {"true", "1"}:
+        return None
+    if isinstance(kind, Simple) or (kind.text is not None and not kind.attributes):
+        return _scalar_of(kind if isinstance(kind, Simple) else kind.text or Simple("string"), text_of(element))
+    found: dict[str, Any] = {} if kind.text is None else {"value": _scalar_of(kind.text, text_of(element))}
+    types = {name: simple for name, simple, _ in kind.attributes}
+    found |= {
+        local(str(name)): _scalar_of(types[str(name)], str(text))
+        for name, text in element.attrib.items()
+        if name in types
+    }
+    found |= {local(part.tag): [] for part in declared.children if part.maximum != 1}
+    parts = {part.tag: part for part in declared.children}
+    for child in elements(element):
+        if (part := parts.get(str(child.tag))) is not None:
+            name, value = local(part.tag), value_of(child, part)
+            found[name] = [*found.get(name, []), value] if part.maximum != 1 else value
+    return found
+
+
+def _scalar_of(simple: Simple, text: str) -> Any:
+    kind = _kind(simple)
+    if simple.many:
+        return [scalar(part, kind) for part in text.split()]
+    return scalar(text, kind) if kind != "string" else text if simple.builtin in STRINGS else text.strip()
+
+
+def _kind(simple: Simple) -> str:
+    if simple.builtin == "boolean" or simple.others:
+        return "string" if simple.others else "boolean"
+    return "integer" if simple.builtin in INTEGERS else "number" if simple.builtin in NUMBERS else "string"
+
+
+def schema_of(declared: Element, depth: int = 0) -> dict[str, Any]:
+    """Return the JSON Schema of an element's content."""
+    kind = declared.type
+    own: dict[str, Any] = {"description": declared.documentation} if declared.documentation else {}
+    if isinstance(kind, Simple) or (kind.text is not None and not kind.attributes):
+        own |= _simple_schema(kind if isinstance(kind, Simple) else kind.text or Simple("string"))
+    elif depth < _DEEPEST:
+        parts = {local(name): _simple_schema(simple) for name, simple, _ in kind.attributes}
+        parts |= {"value": _simple_schema(kind.text)} if kind.text is not None else {}
+        children = list(_first_branches(kind.content))
+        for child in children:
+            part = schema_of(child, depth + 1)
+            many = {"type": "array", "items": part, "minItems": child.minimum}
+            many |= {} if child.maximum is None else {"maxItems": child.maximum}
+            parts[local(child.tag)] = part if child.maximum == 1 else many
+        needed = [local(name) for name, _, needs in kind.attributes if needs]
+        needed += [local(child.tag) for child in children if child.minimum]
+        own |= {"type": "object", "properties": parts, "required": needed}
+    if declared.nillable and "type" in own:
+        own["type"] = [own["type"], "null"]
+    return own
+
+
+def _first_branches(group: Group | None) -> Iterator[Element]:
+    """Yield the elements of a group, of a choice those of its first branch."""
+    for item in group.items[: 1 if group.model == "choice" else None] if group is not None else ():
+        yield from [item] if isinstance(item, Element) else _first_branches(item)
+
+
+def _simple_schema(simple: Simple) -> dict[str, Any]:
+    schema: dict[str, Any] = {"type": _kind(simple)}
+    if simple.enumeration:
+        schema["enum"] = [_scalar_of(replace(simple, many=False), text) for text in simple.enumeration]
+    bounds = {"minimum": simple.minimum, "maximum": simple.maximum} if schema["type"] != "string" else {}
+    schema |= {name: number_of(bound) for name, bound in bounds.items() if bound is not None}
+    patterns = simple.patterns or ((_NAME_LIKE,) if simple.builtin in _TOKENS else ())
+    schema |= {"pattern": f"^(?:{patterns[0]})$"} if patterns else {}
+    schema |= {"multipleOf": 10**-simple.digits} if simple.digits and schema["type"] == "number" else {}
+    lengths = {"minLength": simple.min_length, "maxLength": simple.max_length}
+    schema |= {name: length for name, length in lengths.items() if length is not None and not simple.many}
+    schema |= {"format": _FORMATS[simple.builtin]} if simple.builtin in _FORMATS else {}
+    return {"type": "array", "items": schema} if simple.many else schema
+
+
+def number_of(bound: Any) -> int | float:
+    """Return a decimal as a JSON number."""
+    return int(bound) if bound == bound.to_integral_value() else float(bound)
