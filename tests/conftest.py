@@ -28,9 +28,10 @@ if hasattr(signal, "SIGQUIT"):
 # What takes longest begins first; a module that began last would run alone at the end. Load tests are two chains of
 # minutes, the modules named here take one to three, and tests of these folders start whole commands.
 _LONGEST = (
-    "test_ros_gateway.py", "test_wired_device.py", "test_lost_device.py", "test_servers.py",
-    "test_stateful_devices.py", "test_motion_drive.py", "test_wheel.py", "test_web_servers.py", "test_gateway.py",
-    "test_load_secrets.py", "test_certify_command.py", "test_soap.py", "test_lost_robot.py", "test_bombs.py",
+    "test_ros_gateway.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py", "test_lost_device.py",
+    "test_servers.py", "test_things_that_end.py", "test_hanging_operations.py", "test_stateful_devices.py",
+    "test_motion_drive.py", "test_wheel.py", "test_web_servers.py", "test_gateway.py",
+    "test_load_secrets.py", "test_certify_command.py", "test_soap.py", "test_bombs.py",
 )  # fmt: skip
 _OF_COMMANDS = {
     "ci", "cli", "described", "first_verdict", "fleet", "hostile", "loadtests", "motion", "ros", "selftest", "soap",
@@ -43,11 +44,21 @@ _HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in ("comm
 
 
 #: Their tests share nothing, and wait for most of their minutes.
-_APART = ("test_ros_gateway.py", "test_ros_proposals.py")
+_APART = (
+    "test_ros_gateway.py", "test_ros_proposals.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py",
+    "test_lost_device.py", "test_things_that_end.py", "test_hanging_operations.py", "test_bombs.py",
+    "test_certify_command.py", "test_endings.py",
+)  # fmt: skip
 
 
 class _Sharing(LoadFileScheduling):
-    """Give each process whole modules, those of some modules one by one, and all load tests to two processes."""
+    """Give each process whole modules, those of some modules one by one, and all load tests to gw0 and gw1."""
+
+    def schedule(self) -> None:
+        """Have the first units, which are the load tests, go to the first processes, whichever is ready first."""
+        in_order = sorted(self.assigned_work, key=lambda node: (len(node.gateway.id), node.gateway.id))
+        self.assigned_work = {node: self.assigned_work[node] for node in in_order}
+        super().schedule()
 
     def _split_scope(self, nodeid: str) -> str:
         module = super()._split_scope(nodeid)
@@ -78,7 +89,9 @@ class _Failures:
 
 @pytest.hookimpl(trylast=True)  # pytest makes the reporter in this hook
 def pytest_configure(config: pytest.Config) -> None:
-    """Name failing tests where there is a terminal to write to: a process that shares the tests has none."""
+    """Name failing tests on a terminal, which gw0, gw1, ... have not; let load tests, in gw0 and gw1, go first."""
+    if os.environ.get("PYTEST_XDIST_WORKER", "gw0") not in {"gw0", "gw1"}:
+        os.nice(10)  # inherited by what the tests start
     if terminal := config.pluginmanager.get_plugin("terminalreporter"):
         config.pluginmanager.register(_Failures(terminal))
 
