@@ -67,6 +67,24 @@ def ended(
     return subprocess.run([str(word) for word in command], check=check, **given)
 
 
+class Begun(subprocess.Popen[str]):
+    """A command of roaas in a process that imported its modules before: `command_pid`, which gets all signals."""
+
+    def __init__(self, *words: object, **options: Any) -> None:
+        command = [*warm_commands.beginning(), "-m", "roaas", *map(str, words)]
+        reading, writing = os.pipe()
+        is_warm = sys.platform == "linux"
+        environment = os.environ | ({warm_commands.PID: str(writing)} if is_warm else {})
+        super().__init__(command, text=True, env=environment, pass_fds=[writing] if is_warm else [], **options)
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            self.command_pid = int(pipe.readline() or self.pid)
+
+    def send_signal(self, sig: int) -> None:
+        if self.poll() is None:
+            os.kill(self.command_pid, sig)
+
+
 @contextmanager
 def independent_robot(name: str) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
     """Start an independent robot of the pack table1; yield its process, its REST address and its publishers' WSDL."""

@@ -32,6 +32,8 @@ from conformance.commandline.endings import PARENT_VARIABLE
 MEASURING = "ROAAS_TESTS_MEASURING"
 #: The environment variable with the file to which the client writes the command's peak memory, in MB.
 PEAK = "ROAAS_TESTS_PEAK"
+#: The environment variable with the file descriptor to which the client writes the process id of the command.
+PID = "ROAAS_TESTS_PID"
 
 _IMPORTED = (
     "anyio", "click", "cryptography.hazmat.primitives.asymmetric.ed25519", "h11", "h2.connection",
@@ -43,14 +45,18 @@ _IMPORTED = (
 _NOT_IMPORTED = "conformance.api.rest.guard_process"
 _CLIENT = """
 import array, json, os, socket, sys
-peak = os.environ.pop("ROAAS_TESTS_PEAK", None)
+peak, told = (os.environ.pop(f"ROAAS_TESTS_{name}", None) for name in ("PEAK", "PID"))
 words = json.dumps([sys.argv[2:], os.getcwd(), dict(os.environ)]).encode()
 with socket.socket(socket.AF_UNIX) as server:
     server.connect("\\0" + sys.argv[1])
     fds = array.array("i", [0, 1, 2])
     server.sendmsg([b"%20d" % len(words)], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, fds)])
     server.sendall(words)
-    code, peak_kb = map(int, server.makefile().read().split())
+    answer = server.makefile()
+    pid = answer.readline()
+    if told:
+        os.write(int(told), pid.encode())
+    code, peak_kb = map(int, answer.read().split())
 if peak:
     open(peak, "w").write(str(peak_kb >> 10))
 if code < 0:
@@ -135,6 +141,8 @@ def _attend(connection: _socket.socket) -> None:
         _run(*json.loads(text), streams)
     for stream in (0, 1, 2, *streams):
         close(stream)
+    with suppress(OSError):
+        connection.sendall(b"%d\n" % command)
     ended = os.pidfd_open(command)
     if ended not in select([connection, ended], [], [])[0]:
         os.kill(command, signal.SIGKILL)

@@ -16,7 +16,7 @@ import pytest
 from aiohttp import web
 from echoing_device import authenticated
 from moving_device import DESCRIPTION, MAP, Mover
-from processes import ended
+from processes import Begun, ended
 from small_device import REFUSED, answers, described, error, reading, small_device
 
 import conformance.api.rest.guard
@@ -28,7 +28,6 @@ from proof.selftest.variants import certificate
 from reports.reading import read_latency
 
 _GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")
-_CERTIFY = (sys.executable, "-m", "roaas", "certify")
 _OPTIONS = ("--allow-motion", "--effort", "quick", "--class", "motion", "--timeout", "5")
 # A process that starts a command, writes its pid, and waits for its end.
 _PARENT = "import subprocess, sys; p = subprocess.Popen(sys.argv[1:]); print(p.pid, flush=True); p.wait()"
@@ -91,8 +90,8 @@ def _result(out: Path) -> dict[str, object]:
 def test_a_run_that_is_ended_leaves_the_device_at_rest_and_a_result(ending, tmp_path):
     device, out = Mover(), tmp_path / "out"
     with small_device(DESCRIPTION, device.routes) as url:
-        command = (*_CERTIFY, _statement(tmp_path, url), *_OPTIONS, "--out", out)
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        words = ("certify", _statement(tmp_path, url), *_OPTIONS, "--out", out)
+        with Begun(*words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             assert device.await_that(ending.moment, process), process.communicate()
             ending.end(process)
             said, _ = process.communicate(timeout=120)
@@ -107,7 +106,8 @@ def test_a_run_that_is_ended_leaves_the_device_at_rest_and_a_result(ending, tmp_
 def test_a_run_ends_with_the_process_that_started_it(tmp_path):
     device, out = Mover(), tmp_path / "out"
     with small_device(DESCRIPTION, device.routes) as url:
-        command = (sys.executable, "-c", _PARENT, *_CERTIFY, _statement(tmp_path, url), *_OPTIONS, "--out", out)
+        command = (sys.executable, "-c", _PARENT, sys.executable, "-m", "roaas", "certify", _statement(tmp_path, url))
+        command += (*_OPTIONS, "--out", out)
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, stderr=subprocess.DEVNULL) as parent:
             assert device.await_that(_drives(1), parent)
             parent.kill()
@@ -177,8 +177,8 @@ def _guards() -> set[str]:
 def test_a_run_that_is_killed_leaves_the_device_at_rest(tmp_path):
     device, out = Mover(), tmp_path / "out"
     with small_device(DESCRIPTION, device.routes) as url:
-        command = (*_CERTIFY, _statement(tmp_path, url), *_OPTIONS, "--out", out)
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True) as process:
+        words = ("certify", _statement(tmp_path, url), *_OPTIONS, "--out", out)
+        with Begun(*words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             assert device.await_that(_drives(2), process)
             process.kill()
         assert device.await_that(lambda mover: mover.velocity == 0)
@@ -190,9 +190,9 @@ def test_a_killed_run_stops_the_newest_move_and_shows_the_token_to_nobody(tmp_pa
     token.write_text("s3same", encoding="utf-8")
     token.chmod(0o600)
     with small_device(device.description, device.routes) as url:
-        command = (*_CERTIFY, url, "--call", "POST /moves", "--token-file", token, "--out", tmp_path / "out")
+        words = ("certify", url, "--call", "POST /moves", "--token-file", token, "--out", tmp_path / "out")
         before = _guards()
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        with Begun(*words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             assert device.is_known.wait(120)
             shown = _guards() - before
             process.kill()
@@ -384,8 +384,7 @@ def test_a_replay_that_is_killed_leaves_the_robot_at_rest(tmp_path):
             "requirements": [{"id": "http/head", "failures": [found]}],
         }
         (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-        command = (sys.executable, "-m", "roaas", "replay", tmp_path, "--allow-motion")
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        with Begun("replay", tmp_path, "--allow-motion", stdout=subprocess.DEVNULL) as process:
             assert moving.wait(60)
             process.kill()
         assert resting.wait(60)
@@ -399,8 +398,8 @@ def test_the_runs_of_a_fleet_that_is_killed_end_in_order(tmp_path):
         statement = _statement(tmp_path, url)
         fleet = tmp_path / "fleet.toml"
         fleet.write_text(f'[[robot]]\nname = "cart"\nstatement = "{statement.name}"\n', encoding="utf-8")
-        command = (*_CERTIFY, "--fleet", fleet, *_OPTIONS[:-2], "--out", out)
-        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, text=True) as process:
+        words = ("certify", "--fleet", fleet, *_OPTIONS[:-2], "--out", out)
+        with Begun(*words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             assert device.await_that(_drives(1), process)
             process.kill()
         path = out / "robots/cart/result.json"

@@ -15,7 +15,7 @@ import click
 import pytest
 from aiohttp import web
 from click.testing import CliRunner
-from processes import ended
+from processes import Begun, ended
 from small_device import Handle, constant, described, reading, small_device
 
 import roaas
@@ -117,11 +117,11 @@ def test_a_run_keeps_others_out_of_its_folder_until_it_ends_or_is_killed(tmp_pat
 
     with small_device(_DESCRIPTION, {"/state": {"GET": handle}}) as url:
         command = _command(url, tmp_path, "--class", "description")
-        with subprocess.Popen([*command, "--request-rate", "1"], stderr=subprocess.DEVNULL) as first:
+        with Begun(*command[3:], "--request-rate", "1", stderr=subprocess.DEVNULL) as first:
             assert reached.wait(100)
             second = ended(*command)
             assert second.returncode == 2
-            assert f"another run uses this folder: process {first.pid} on" in second.stderr
+            assert f"another run uses this folder: process {first.command_pid} on" in second.stderr
             first.send_signal(signal.SIGKILL)
             first.wait(30)
         assert (tmp_path / LOCK_NAME).exists()
@@ -171,6 +171,9 @@ _RAISED = [
     (BrokenPipeError(errno.EPIPE, "closed"), 4),
     (OSError(errno.ENOSPC, "full"), 4),
     (AssertionError(), 4),
+    (RuntimeError("odd"), 4),
+    (RecursionError("deep"), 4),
+    (EOFError(), 4),
 ]
 
 
@@ -185,11 +188,14 @@ def test_what_a_command_does_not_expect_never_ends_with_1(raised, code, command,
     monkeypatch.setattr(found, "callback", broken)
     monkeypatch.setattr(found, "params", [])
     monkeypatch.setattr(found, "_start", "", raising=False)  # without arguments, certify says what to try
-    assert CliRunner().invoke(roaas.main, [command]).exit_code == code
+    done = CliRunner().invoke(roaas.main, [command])
+    assert done.exit_code == code
+    assert "Traceback" not in done.output
+    assert code != 4 or len(done.output.strip().splitlines()) == 1
 
 
 #: Limits of addresses (ulimit -v), MB: from where `roaas --version` works to where a run does.
-_LIMITS = {"explain": (30, 60, 90), "certify": (30, 60, 110, 390), "load": (60, 110, 600, 1_190), "diff": (30, 60, 90)}
+_LIMITS = {"explain": (30, 90), "certify": (30, 60, 110, 390), "load": (110, 600, 1_190), "diff": (60,)}
 
 
 @pytest.mark.parametrize(("command", "limit"), [(name, limit) for name, each in _LIMITS.items() for limit in each])

@@ -2,12 +2,12 @@
 
 import json
 import subprocess
-import sys
 import threading
 
 import msgspec
 import pytest
 from aiohttp import web
+from processes import Begun
 from small_device import REFUSED, answers, described, error, small_device
 
 from conformance.contract.described import MOTION
@@ -105,8 +105,8 @@ auth = {{ login = "POST /login", token = "/tokens/0", send_as = "bearer" }}
 """,
             encoding="utf-8",
         )
-        command = (sys.executable, "-m", "roaas", "certify", statement, "--effort", "quick", "--out", tmp_path / "out")
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        words = ("certify", statement, "--effort", "quick", "--out", tmp_path / "out")
+        with Begun(*words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
             assert device.both_move.wait(120)
             if is_killed:
                 process.kill()

@@ -11,7 +11,7 @@ import sys
 
 import pytest
 from aiohttp import web
-from processes import ended
+from processes import Begun, ended
 from small_device import certified, described, reading, small_device
 
 from conformance.contract.pack import Contract
@@ -115,8 +115,8 @@ def test_a_run_that_was_killed_is_judged_up_to_then(tmp_path):
         return web.json_response({"on": True}, headers={"Last-Modified": "yesterday"})
 
     with small_device(described({"/state": reading(_STATE)}), {"/state": {"GET": state}}) as url:
-        command = [sys.executable, "-m", "roaas", "certify", f"{url}/openapi.json", "--out", tmp_path / "out"]
-        with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        words = ("certify", f"{url}/openapi.json", "--out", tmp_path / "out")
+        with Begun(*words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
             assert process.wait(120) == -signal.SIGKILL
     code, text = _judged(tmp_path / "out")
     assert (code, "fail: http/date-format" in text, "which was cut short" in text) == (1, True, True), text
