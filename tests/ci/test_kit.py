@@ -224,12 +224,12 @@ def test_what_others_wrote_is_pinned():
         ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", "../.github/workflows/release.yml"],
         ["check-jsonschema", "--builtin-schema", "vendor.github-workflows", "../.github/workflows/tests.yml"],
         ["check-jsonschema", "--builtin-schema", "vendor.citation-file-format", "../CITATION.cff"],
-        ["zizmor", "--offline", "--no-progress", "github/action.yml"],
-        ["zizmor", "--offline", "--no-progress", "../.github/workflows"],
+        ["zizmor", "--offline", "--no-progress", "github/action.yml", "../.github/workflows"],
         ["shellcheck", "certify.sh", "release.sh", "wheel.sh"],
-        ["hadolint", "../deploy/container/Containerfile.suite"],
-        ["hadolint", "../deploy/container/Containerfile.robot"],
-        ["hadolint", "../deploy/kubernetes/Dockerfile"],
+        [
+            "hadolint",
+            *(str(one) for name in ("Containerfile.*", "Dockerfile") for one in CI.parent.glob(f"deploy/*/{name}")),
+        ],
     ],
     ids=lambda command: f"{command[0]} {command[-1]}",
 )

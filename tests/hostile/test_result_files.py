@@ -125,10 +125,10 @@ def test_a_file_that_is_none(well_made, tmp_path, place, what):
     else:
         what(sent / place)
     before = _tree(tmp_path)
-    # Whatever stands there instead of a file meets each command; wrong contents are read by one reader, and meet one.
+    # What may never end meets each command. The rest is read or refused by one reader, and meets one command by turns.
     commands = [*READERS[place].items()]
-    turn = [*CONTENTS].index(what) % len(commands) if isinstance(what, str) else None
-    for command, codes in commands if turn is None else [commands[turn]]:
+    turn = [*CONTENTS, *SPECIAL].index(what) % len(commands)
+    for command, codes in commands if what in {a_pipe, endless} else [commands[turn]]:
         done = run(command, sent)
         check(done, *codes)
         assert SECRET not in done.output

@@ -45,13 +45,13 @@ def test_a_selection_is_judged_and_certifies_nothing(device, tmp_path):
 def test_what_failed_is_judged_again_and_the_run_ends_at_the_first(device, tmp_path):
     missing = certified(device, tmp_path, "--last-failed")
     assert (missing.exit_code, "--last-failed: there is no" in missing.text) == (2, True)
-    whole = certified(device, tmp_path)
+    whole = certified(device, tmp_path, "--class", "description")
     assert whole.exit_code == 1
     failed = {id_ for id_, verdict in verdicts(whole).items() if verdict == "fail"}
     again = certified(device, tmp_path, "--last-failed", "-x")
     assert again.exit_code == 1
     assert set(again.result["selected"]) == failed
-    first = certified(device, tmp_path / "first", "-x")
+    first = certified(device, tmp_path / "first", "-x", "--class", "description")
     assert (first.exit_code, first.result["requests"] < whole.result["requests"]) == (1, True)
     assert re.search(r", \d+ inconclusive[,;]", first.text), first.text
     assert any("the run ended at its first finding (-x)" in one["reason"] for one in first.result["requirements"])
@@ -64,7 +64,7 @@ def test_a_pattern_that_fits_nothing_is_told_with_the_nearest(device, tmp_path):
 
 def test_a_baseline_is_written_asked_for_reasons_and_told_when_it_is_stale(device, tmp_path):
     known = tmp_path / "known.toml"
-    first = certified(device, tmp_path, "--write-baseline", known)
+    first = certified(device, tmp_path, "--class", "description", "--write-baseline", known)
     text = known.read_text(encoding="utf-8")
     assert first.exit_code == 1
     assert f'requirement = "{_BROKEN}"' in text
@@ -76,16 +76,16 @@ def test_a_baseline_is_written_asked_for_reasons_and_told_when_it_is_stale(devic
     day = "expires = 2999-12-31"
     text = re.sub("expires = .*", day, text.replace('reason = ""', 'reason = "ticket 7"'))
     known.write_text(text, encoding="utf-8")
-    assert certified(device, tmp_path, "--baseline", known).exit_code == 0
+    assert certified(device, tmp_path, "--class", "description", "--baseline", known).exit_code == 0
     known.write_text(re.sub("operations = .*", 'operations = ["GET /other"]', text), encoding="utf-8")
-    elsewhere = certified(device, tmp_path, "--baseline", known)
+    elsewhere = certified(device, tmp_path, "--class", "description", "--baseline", known)
     assert (elsewhere.exit_code, "its baseline entry does not name GET /" in elsewhere.text) == (1, True), (
         elsewhere.text
     )
     passing = next(id_ for id_, verdict in verdicts(first).items() if verdict == "pass")
     entry = f'[[expected]]\nrequirement = "{passing}"\nreason = "ticket 8"\n{day}\n'
     known.write_text(f"{text}\n{entry}", encoding="utf-8")
-    stale = certified(device, tmp_path, "--baseline", known)
+    stale = certified(device, tmp_path, "--class", "description", "--baseline", known)
     assert stale.exit_code == 1
     assert stale.result["stale"] == [passing]
     assert f"The baseline expects {passing} to fail, and it passes: delete the entry." in stale.text

@@ -82,5 +82,9 @@ def test_right_codings(kind, tmp_path):
 )
 def test_wrong_codings(kind, blamed, tmp_path):
     with _device(kind, []) as url:
-        done = certified(f"{url}/openapi.json", tmp_path, "--class", "http")
+        done = certified(
+            f"{url}/openapi.json",
+            tmp_path,
+            *(f"--select=http/{name}" for name in ("content-coding", "accept-encoding")),
+        )
     assert list(done.blamed) == [f"http/{blamed}"], done.text

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from aiohttp import web
 from click.testing import CliRunner
-from processes import ended
 from small_device import REFUSED, certified, constant, described, error, reading, small_device
 
 import roaas
@@ -59,30 +58,6 @@ def test_the_exit_code_is_the_verdict_whoever_reads_the_output(tmp_path, streams
         done = subprocess.run(["bash", "-c", command], check=False, capture_output=True, text=True, timeout=100)
     assert (done.returncode, "Traceback" in done.stderr) == (0, False)
     assert json.loads((tmp_path / "result.json").read_text())["verdict"] == "conformant"
-
-
-def test_a_folder_that_takes_no_result_is_named_before_the_run(tmp_path):
-    (tmp_path / "file").touch()
-    done = ended(
-        sys.executable, "-m", "roaas", "certify", "--rest=http://127.0.0.1:9", f"--out={tmp_path / 'file' / 'out'}"
-    )
-    assert done.returncode == 2
-    assert done.stderr.rstrip().endswith("Not a directory")
-
-
-@pytest.mark.parametrize(
-    "raised", [RuntimeError("odd"), RecursionError("deep"), OSError(28, "No space left"), EOFError()]
-)
-def test_no_exception_of_a_command_ends_with_the_code_of_a_verdict(raised, monkeypatch, tmp_path):
-    def broken(**_: object) -> None:
-        raise raised
-
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    monkeypatch.setattr("conformance.cli.explain.explain.callback", broken)
-    result = CliRunner().invoke(roaas.main, ["explain", "http/date"])
-    assert result.exit_code == 4
-    assert "Traceback" not in result.output
-    assert len(result.output.strip().splitlines()) == 1
 
 
 def test_the_details_of_a_failure_are_kept(monkeypatch):

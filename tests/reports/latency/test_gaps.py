@@ -5,6 +5,7 @@ import re
 import pytest
 from lxml import html
 
+from reports.latency.findings import verdict
 from reports.latency.page import latency_html, latency_markdown
 from reports.reading import LATENCY_FORMAT, validator
 
@@ -82,6 +83,18 @@ def test_no_cell_and_no_sentence_says_none(latency, change):
     page = html.document_fromstring(latency_html(latency)).find(".//main").text_content()
     shown = page + latency_markdown(latency)
     assert not [shown[max(0, word.start() - 60) : word.end() + 20] for word in NOTHING.finditer(shown)]
+
+
+def test_run_without_an_answer(latency):
+    """It was interrupted before."""
+    without_an_answer(latency)
+    latency.update(knee_search=[], slo=[], noise_floor=[], errors=[], blocks=[], interrupted=True)
+    latency.update(heat_map={"width_s": 1.0, "edges_ms": [], "series": []}, time_series={"width_s": 1.0, "series": []})
+    document = html.document_fromstring(latency_html(latency))
+    assert not list(document.iter("figure"))
+    assert "The run was interrupted" in document.text_content()
+    assert "0 samples" in document.text_content()
+    assert verdict(latency, {}).tone == "warning"
 
 
 def test_figures_come_before_tables_and_tables_fold(latency):

@@ -34,6 +34,7 @@ def described(latency):
     (one,) = [each for each in result["series"] if (each["operation"], each["interface"]) == ("pose", "rest")][:1]
     one |= {"operation": "GET /a/{b_c}", "client": "wire", "errors": 0, "dropped": 0}
     result |= {"series": [one], "valid": True, "invalid_because": [], "comparisons": [], "slo": []}
+    result |= {"knee_search": [], "time_series": {"width_s": 1.0, "series": []}}  # few figures: drawing takes seconds
     result["plan"] |= {"description": "http://robot/openapi.json", "operations": ["GET /a/{b_c}"], "rate": 200.0}
     kept = LEVEL | {"limit": "error_rate", "most": 0.001, "measured": 0.0, "outcome": "kept", "beyond": 0}
     result["slo"] = [LEVEL, kept, kept | {"limit": "p50_ms", "most": 5.0, "measured": None, "outcome": "not known"}]

@@ -15,6 +15,7 @@ def test_the_headline_leads_with_the_sign_of_its_verdict(latency, verdict, sign)
     shown = CHANGE | FIGURES | {"quantile": "mean", "verdict": None}
     none = CHANGE | dict.fromkeys(FIGURES) | {"quantile": "p99", "verdict": "unclear", "reason": "9 samples"}
     latency |= {"valid": True, "invalid_because": [], "slo": [], "comparisons": []}
+    latency |= {"knee_search": [], "time_series": {"width_s": 1.0, "series": []}}  # few figures: drawing takes seconds
     latency["against"] = {
         "robot": {"rest": "http://old:7003", "publishers": None, "subscribers": None},
         "tolerance": 0.05,
