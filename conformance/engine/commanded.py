@@ -273,16 +273,10 @@ def _least(parts: Sequence[str], length: int) -> int:
     return length
 
 
-def body_type(operation: Operation) -> str:
-    """Return the media type of a map's body: JSON, if declared; empty without a body."""
-    json = next((name for name in operation.bodies if is_json(name)), "")
-    return json or next((name for name in operation.bodies if name in _FORMS), "")
-
-
 def body_schema(operation: Operation) -> Schema | None:
-    """Return the schema of the body that a map fills; None if the operation has no such body."""
-    name = body_type(operation)
-    return operation.bodies[name].schema if name else None
+    """Return the schema of the body that a map fills, JSON if declared, else a form; None if it has no such body."""
+    names = [*filter(is_json, operation.bodies), *(name for name in operation.bodies if name in _FORMS)]
+    return operation.bodies[names[0]].schema if names else None
 
 
 def parts_of(schema: Any) -> Iterator[Schema]:
@@ -378,15 +372,13 @@ def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: i
                 made[name] = names[place]
             elif is_numeric(member) and re.search(r"duration|seconds", name, re.IGNORECASE):
                 made[name] = "{seconds}"
-            elif any(one.startswith(f"{place}/") for one in names) or (is_needed and _has_members(member)):
+            elif any(one.startswith(f"{place}/") for one in names) or (
+                is_needed and any("properties" in one or _length(one) for one in parts_of(member))
+            ):
                 made[name] = template_of(member, names, place, depth - 1)
             elif is_needed:
                 made[name] = usual_value(member)
     return list(made.values()) if is_list else made
-
-
-def _has_members(schema: Schema) -> bool:
-    return any("properties" in part or _length(part) for part in parts_of(schema))
 
 
 def _choose_parts(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:

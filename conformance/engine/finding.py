@@ -10,9 +10,9 @@ import difflib
 import posixpath
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Self
 
 import msgspec
 
@@ -23,6 +23,7 @@ from conformance.engine.commanded import (
     Commanded,
     body_schema,
     commanded_by,
+    direction_line,
     is_velocity,
     numbers_in,
     template_of,
@@ -34,15 +35,15 @@ from conformance.engine.found_preparation import (
     NOTHING,
     Preparing,
     is_excluded,
-    lease_header,
+    lease_parameter,
     lease_place,
-    lease_query,
     members_of,
     named_preparing,
     preparing_of,
     wants_lease,
     wants_more,
 )
+from conformance.engine.map_text import inline, string
 from conformance.measures.samples import SEVERAL, Sample
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding
@@ -53,6 +54,8 @@ from conformance.statement.motion_calls import NAME, named_by, names_operation
 from conformance.transport.exchange import Exchange, Outgoing
 
 _PACE_S: Final = 0.02
+#: How many times a small change of a position is tried at most, where no limits are declared.
+FARTHEST: Final = 10.0
 _MOST_NUMBERS, _MOST_READS = 8, 6
 #: READY_S: how long a device may take to get ready; _AT_ONCE_S: so soon it is ready at once, s. _LONG: no state is a
 # text of so many characters.
@@ -77,8 +80,6 @@ _STOPS: Final = re.compile(
 ROOM_M, ROOM_S = 0.5, 2.5
 #: How fast a device may seem to move at rest, as a share of its fastest. _REST_S: how long it is watched at first, s.
 AT_REST, _REST_S = 0.005, 1.0
-#: Statuses with which an operation declares that it refuses invalid requests.
-REFUSED: Final = frozenset({"400", "422", "4XX", "4xx"})
 
 
 @dataclass(frozen=True)
@@ -109,33 +110,17 @@ class Plan:
         """Yield the planned steps as lines for the user."""
         yield f"{self.drive.label} commands, by its description:"
         for command in self.numbers:
-            declared = (
-                f"{command.bounds[0]:g} to {command.bounds[1]:g}, as declared"
-                if command.bounds
-                else "no limits declared"
-            )
-            yield f"  {command.name:<16} {declared}; tried at {command.little:g}"
+            bounds, tried = command.bounds, f"tried at {command.little:g}"
+            declared = f"{bounds[0]:g} to {bounds[1]:g}, as declared" if bounds else "no limits declared"
+            if not (bounds or self.is_velocity):
+                tried += f", and up to {FARTHEST * command.little:g} where it is there at once"
+            yield f"  {command.name:<16} {declared}; {tried}"
         yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
         yield from self.preparing.announce(at_once=self.is_prepared)
         far = max(abs(end) for command in self.numbers for end in command.limits)
         room = max(ROOM_M, ROOM_S * far)
         driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
         yield f"Then it is judged: {driven if self.is_velocity else 'within the limits of the map that is found'}."
-
-
-@dataclass
-class Found:
-    """A map that was found.
-
-    Attributes:
-        lines: its TOML.
-        notes: what was seen on the way, for a person.
-        drives_on_s: for so long a device was seen to drive on after its last command; None: it stopped by itself.
-    """
-
-    lines: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    drives_on_s: float | None = None
 
 
 def plan_of(
@@ -153,7 +138,7 @@ def plan_of(
     known = [_with_values(operation, values) for operation in operations]
     chosen = known[operations.index(named)]
     preparing = named_preparing(known, before, rules) if before else preparing_of(known, chosen, rules)
-    chosen = with_query(chosen, lease_query(chosen) if preparing.lease else "")
+    chosen = with_query(chosen, lease_parameter(chosen, "query") if preparing.lease else "")
     numbers = commanded_by(chosen)[:_MOST_NUMBERS]
     if not numbers:
         bodies = ", ".join(chosen.bodies) or "none"
@@ -181,7 +166,9 @@ def plan_of(
     reads = reads or list(_reads(known, rules, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    return Plan(chosen, tuple(numbers), tuple(reads), drives, _stop(known, chosen), named, preparing, bool(before))
+    return Plan(
+        chosen, tuple(numbers), tuple(reads), drives, stop_beside(known, chosen), named, preparing, bool(before)
+    )
 
 
 def _values_in(operation: Operation, call: str) -> dict[str, str]:
@@ -202,7 +189,7 @@ def _with_values(operation: Operation, values: Mapping[str, str]) -> Operation:
     return replace(operation, template=path, parameters=left)
 
 
-def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None:
+def stop_beside(operations: Sequence[Operation], drive: Operation) -> Operation | None:
     """Return the nearest operation in the same folder, or one around it, called stop; else the DELETE of a move."""
     path = drive.template.partition("?")[0]
     stops = [
@@ -217,9 +204,8 @@ def _stop(operations: Sequence[Operation], drive: Operation) -> Operation | None
     if found is None:
         own = re.compile(rf"{re.escape(path)}/\{{[^{{}}]+\}}")
         return next((one for one in operations if one.method == "DELETE" and own.fullmatch(one.template)), None)
-    if found.never:
-        return None
-    return None if any(one.required and one.name != lease_header(found) for one in found.parameters) else found
+    known = {lease_parameter(found, "header"), *NAME.findall(path)}
+    return None if found.never or any(one.required and one.name not in known for one in found.parameters) else found
 
 
 def _operation_named(operations: Sequence[Operation], label: str, option: str) -> Operation:
@@ -275,6 +261,8 @@ class Finder(ABC):
 
     Attributes:
         seconds: the duration that is asked for, where the operation takes one.
+        lines: the TOML of the map that was found.
+        notes: what was seen on the way, for a person.
     """
 
     seconds = 1.0
@@ -290,10 +278,11 @@ class Finder(ABC):
 
     def _begin(self) -> None:
         titles = {at: name for one in self._plan.reads for at, name in titles_in(one.shape).items()}
-        self._looks, self._turn, self._reads, self._found = Looks(titles), 0, list(self._plan.reads), Found()
+        self._looks, self._turn, self._reads = Looks(titles), 0, list(self._plan.reads)
+        self.lines, self.notes = list[str](), list[str]()
 
-    def find(self) -> Found:
-        """Return the map of the device, which is made ready first if it wants that, and left as it was.
+    def find(self) -> Self:
+        """Find the map of the device, which is made ready first if it wants that, and left as it was.
 
         Raises:
             NotPossibleError: nothing shows that it moves; the message says what was tried.
@@ -316,9 +305,9 @@ class Finder(ABC):
             try:
                 self._ready.end()
             except NotPossibleError as problem:
-                self._found.notes.append(f"{problem}.")
-        self._found.lines = [*self._used.lines(self._failed), *self._found.lines]
-        return self._found
+                self.notes.append(f"{problem}.")
+        self.lines = [*self._used.lines(self._failed), *self.lines]
+        return self
 
     @abstractmethod
     def _find(self) -> None:
@@ -341,7 +330,7 @@ class Finder(ABC):
                 self._ready.motion = self._used
                 self._ready.hold(self._used.lease or lease, exchange)
                 return True
-            self._found.notes.append(f"{lease.acquire} got {exchange.came}.")
+            self.notes.append(f"{lease.acquire} got {exchange.came}.")
         while self._left.steps:
             (step, ends), *rest = self._left.steps
             self._left = replace(self._left, steps=tuple(rest))
@@ -351,7 +340,7 @@ class Finder(ABC):
                 self._used = replace(self._used, steps=(*self._used.steps, (step, ends)))
                 self._ready.motion, self._asked = self._used, self._clock.now()
                 return True
-            self._found.notes.append(f"{step.send} got {exchange.came}.")
+            self.notes.append(f"{step.send} got {exchange.came}.")
         return False
 
     def _waits(self) -> bool:
@@ -394,6 +383,30 @@ class Finder(ABC):
     @abstractmethod
     def _body(self) -> Any:
         """The body of a command; None: it has none."""
+
+    def _sending_lines(self, names: Collection[str], still: Mapping[str, float], seconds: object) -> Iterator[str]:
+        """Yield how the map sends a command: numbers by name, and what it sends for those that stay ``still``."""
+        template = self._plan.drive.label
+        for name, value in still.items():
+            template = template.replace(f"{{{name}}}", f"{value:g}")
+        yield f"send = {string(template)}"
+        if self._body is not None:
+            named = {name: f"{{{name}}}" for name in names}
+            yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': seconds, 'lease': '{lease}'}))}"
+            yield from (direction_line(one) for one in self._plan.numbers if one.name in names and one.direction)
+
+    def _refusal_lines(self, *, declared: bool) -> Iterator[str]:
+        """Yield that values beyond the limits are refused, if the description declares that and the limits."""
+        if declared and {"400", "422", "4XX", "4xx"} & self._plan.drive.responses.keys():
+            yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+
+    def _turn_words(self, number: Commanded) -> Commanded:
+        """Exchange the words for both directions of a number in the plan, and return it."""
+        at, positive, negative = number.direction or ("", "", "")
+        turned = replace(number, direction=(at, negative, positive))
+        numbers = (turned if one.name == number.name else one for one in self._plan.numbers)
+        self._plan = replace(self._plan, numbers=tuple(numbers))
+        return turned
 
     def _look(self) -> None:
         """Read one operation; an operation without numbers is not read again."""

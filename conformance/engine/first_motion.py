@@ -24,10 +24,10 @@ from conformance.engine.commanded import (
     unit_of,
     with_query,
 )
+from conformance.engine.finding import stop_beside
 from conformance.engine.map_text import inline, key
 
 _GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
-_STOPS: Final = re.compile(r"stop|halt|cancel|abort", re.IGNORECASE)
 _STAMP: Final = re.compile(r"stamp|timestamp", re.IGNORECASE)
 _MEASURED: Final = re.compile(r"twist|velocit|speed", re.IGNORECASE)
 
@@ -121,10 +121,8 @@ def _sending_lines(pair: _Pair) -> Iterator[str]:
 
 
 def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
-    """Propose the stop whose path is nearest to that of the move."""
-    stops = [item for item in operations if _acts(item) and _STOPS.search(item.label)]
-    found = max(stops, key=lambda item: len(posixpath.commonpath([item.template, move.template])), default=None)
-    if found is not None:
+    """Propose the stop beside a move."""
+    if (found := stop_beside(operations, move)) is not None:
         yield ""
         yield "[motion.stop]"
         yield f"send = {basic_string(found.label)}"

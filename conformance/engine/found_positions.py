@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from statistics import median
 from typing import Any, Final
 
@@ -14,7 +14,6 @@ from conformance.engine.commanded import (
     axis_of,
     body_schema,
     bounds_of,
-    direction_line,
     is_axis,
     member_name,
     numbers_in,
@@ -22,10 +21,9 @@ from conformance.engine.commanded import (
     unit_of,
 )
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import AT_REST, ECHO, READY_S, REFUSED, Finder
+from conformance.engine.finding import AT_REST, ECHO, FARTHEST, READY_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
-from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_calls import NAME
 from conformance.transport.exchange import Exchange
@@ -34,11 +32,13 @@ from conformance.transport.exchange import Exchange
 _BEFORE_S, _MOVES_S = 0.25, 3.0
 # After this time no further axis is tried, s.
 _BUDGET_S: Final = 16.0
-# _PARTS: shares of a small move that are tried. _FOLLOWS: share by which an axis may miss its target or move along.
+# _PARTS: shares of a small move that are tried; a device without limits that is there sooner than in about _SEEN_S, s,
+# goes up to FARTHEST of them. _SLOW_S: no farther move is tried of one that needs so long, s.
+# _FOLLOWS: share by which an axis may miss its target or move along.
 _PARTS, _FOLLOWS = (0.2, 1.0), 0.15
-# _SHARES: of axes that move at once, how far each is sent. _DEGREES: share of a small move for an angle in degrees.
+_SEEN_S, _SLOW_S = 1.0, 2.5
+# _SHARES: of axes that move at once, how far each is sent.
 _SHARES: Final = (1.0, -1.0, 0.8, -0.8, 0.6, -0.6, 0.5, -0.5)
-_DEGREES: Final = 10.0
 # What a reading has beside a position for its least and its greatest value.
 _LIMITS: Final = (
     ("limits/0", "limits/1"),
@@ -129,20 +129,17 @@ class PositionFinder(Finder):
             if not self._relative:
                 self._command(start)
         left = [number.name for number in numbers if number.name not in moved]
-        self._found.notes += [f"{name} stays where it is: {self._why.get(name, 'there was no time')}." for name in left]
-        if not moved and self._refused:
-            raise NotPossibleError(self._refused[0])
+        self.notes += [f"{name} stays where it is: {self._why.get(name, 'there was no time')}." for name in left]
         if not moved:
-            said = " ".join(self._found.notes)
-            raise NotPossibleError(f"{self._plan.drive.label} was accepted, and no axis followed a target: {said}")
-        self._found.lines = list(self._goto_lines(start, moved))
+            why = f"was accepted, and no axis followed a target: {' '.join(self.notes)}"
+            raise NotPossibleError(next(iter(self._refused), f"{self._plan.drive.label} {why}"))
+        self.lines = list(self._goto_lines(start, moved))
 
     def _chosen_places(self) -> dict[str, tuple[str, str]]:
         """Return operation and place of each commanded number: of one operation, as far as it tells them."""
         told = {operation.label: self._named_places(operation.label) for operation in self._reads}
-        ranked = sorted(told, key=lambda label: (len(told[label]), self._is_called_alike(label)), reverse=True)
         found: dict[str, tuple[str, str]] = {}
-        for label in ranked:
+        for label in sorted(told, key=lambda label: -len(told[label])):
             found = {name: (label, place) for name, place in told[label].items()} | found
         return found
 
@@ -156,10 +153,10 @@ class PositionFinder(Finder):
         own = (number for number in self._plan.numbers if number.name in self._places)
         return self._template({at: value for number in own for at, value in number.templates.items()})
 
-    def _is_called_alike(self, operation: str) -> bool:
-        """Return whether an operation is called as something that is commanded."""
-        called = operation.rpartition("/")[2].lower()
-        return any(command.place.strip("{}").rpartition("/")[2].lower() == called for command in self._plan.numbers)
+    @property
+    def _lasts(self) -> bool:
+        """Whether a move lasts as long as is asked for: as long to any place."""
+        return "{seconds}" in inline(self._body or {})
 
     def _named_places(self, operation: str) -> dict[str, str]:
         """Return the places of an operation's numbers, by the name of the commanded number they share."""
@@ -208,27 +205,35 @@ class PositionFinder(Finder):
     def _try_axes(self, numbers: Sequence[Commanded], start: Mapping[str, float]) -> dict[str, Moved]:
         """Move axes at once, a little to each side; return how each followed. Without limits, first less far."""
         found, kept = dict[str, list[Moved]](), dict[str, Moved]()
-        parts = _PARTS[all(number.bounds for number in numbers) :]
-        # An angle that stays where it is may be one in degrees.
-        parts += (_DEGREES,) if all(number.turns and not self._limits(number) for number in numbers) else ()
+        is_free = not all(map(self._limits, numbers))
+        parts = list(_PARTS[all(number.bounds for number in numbers) :])
         for part in parts:
-            if part != parts[0] and (part == _DEGREES if found else not self._stood):
+            if part != parts[0] and not (found or self._stood):
                 break
             left, found, lost = [number for number in numbers if number.name in found] or numbers, {}, set[str]()
             # No two axes go as far, so that exchanged ones show.
             ways = {one.name: part * share * one.little for one, share in zip(left, _SHARES, strict=False)}
-            for side in (1, -1) if part >= 1 else (1,):
+            for side in (1, -1, 0) if part >= 1 else (1, 0):
+                if side < 0 and not is_free and len(found) == len(left):
+                    continue  # declared limits are judged later
                 room = {
                     name: side * way for name, way in ways.items() if self._has_room(name, start[name] + side * way)
                 }
-                moved = self._move_axes(start, room) if room else None
+                moved = self._move_axes(start, room, ways) if room else None
                 lost |= room.keys() - moved.keys() if moved is not None else set()
-                for name, one in (moved or {}).items():
+                for name, one in (moved or {}).items() if side or found else ():
                     found.setdefault(name, []).append(one)
-            self._send_by(start, {})
-            self._watch(max((one.took_s for own in found.values() for one in own), default=_BEFORE_S))
             found = {name: own for name, own in found.items() if name not in lost}
             kept |= {name: _worst(own) for name, own in found.items()}
+            took_s = max((one.took_s for one in kept.values()), default=0.0)
+            if part < 1 and took_s > _SLOW_S:
+                break
+            if is_free and part == 1 and found and took_s < _SEEN_S / 2:
+                # It is there too soon to be stopped under way.
+                parts.append(min(FARTHEST, _SEEN_S / took_s))
+            elif is_free and part == 1 and not found and all(number.turns for number in numbers):
+                # An angle that stays where it is may be one in degrees.
+                parts.append(FARTHEST)
         return kept
 
     def _has_room(self, name: str, goal: float) -> bool:
@@ -267,8 +272,15 @@ class PositionFinder(Finder):
         self._gone = goals if self._took(exchange) else self._gone
         return exchange
 
-    def _move_axes(self, start: Mapping[str, float], ways: Mapping[str, float]) -> dict[str, Moved] | None:
+    def _move_axes(
+        self, start: Mapping[str, float], ways: Mapping[str, float], sizes: Mapping[str, float]
+    ) -> dict[str, Moved] | None:
         """Send axes by ways, and watch; return how each followed, and keep why others count as no axes of their own.
+
+        Args:
+            start: where they were at first.
+            ways: how far from there; 0: back.
+            sizes: how far they are sent at most, by which it is judged whether one is there.
 
         Returns:
             None: it was refused.
@@ -287,9 +299,11 @@ class PositionFinder(Finder):
             self._stood = False
             return None
         self._answer = self._binding.content(exchange.response.body)
-        near = {name: max(_FOLLOWS * abs(way), 6 * sigmas[name]) for name, way in ways.items()}
+        near = {name: max(_FOLLOWS * abs(sizes[name]), 6 * sigmas[name]) for name in ways}
         took_s: dict[str, float] = {}
-        while (now := self._clock.now()) < sent + _MOVES_S or (now < sent + _LONGEST_S and self._moves()):
+        # A device may show where it is at the end of a move only.
+        least_s = _MOVES_S if len(ways) > 1 else 2 * _MOVES_S
+        while (now := self._clock.now()) < sent + least_s or (now < sent + _LONGEST_S and self._moves()):
             self._look()
             for name in ways:
                 last = [value for _, value in self._samples(name, sent)[-SEVERAL:]]
@@ -300,14 +314,15 @@ class PositionFinder(Finder):
         self._watch(_BEFORE_S)
         ends = self._ends()
         self._gone = {name: ends[name] - start[name] for name in ends} if self._relative and not took_s else self._gone
-        self._stood = all(abs(ends[name] - before[name]) < near[name] / 2 for name in ways)
+        if any(ways.values()):
+            self._stood = all(abs(ends[name] - before[name]) < near[name] / 2 for name in ways)
         beside = {
             one.name: f"with it {one.name} went from {start[one.name]:.4g} to {ends[one.name]:.4g}"
             for one in self._numbers.values()
             if one.name not in ways
-            and abs(ends[one.name] - start[one.name]) > _FOLLOWS * max(one.little, *map(abs, ways.values()))
+            and abs(ends[one.name] - start[one.name]) > _FOLLOWS * max(one.little, *map(abs, sizes.values()))
         }
-        if self._turn_words({name: (ends[name] - before[name], way) for name, way in ways.items()}):
+        if self._goes_the_other_way({name: (ends[name] - before[name], way) for name, way in ways.items()}):
             ways = {name: -way for name, way in ways.items()}
             goals = {name: start[name] + way for name, way in ways.items()}
         found: dict[str, Moved] = {}
@@ -320,15 +335,13 @@ class PositionFinder(Finder):
                 found[name] = Moved(took_s.get(name, self._clock.now() - sent), off, sigmas[name], abs(way), (way,))
         return found
 
-    def _turn_words(self, ways: Mapping[str, tuple[float, float]]) -> bool:
-        """Exchange the words for both directions of a number that went the other way by as much; return whether."""
+    def _goes_the_other_way(self, ways: Mapping[str, tuple[float, float]]) -> bool:
+        """Return whether a number went the other way by as much, and exchange the words for its directions."""
         (gone, way), (name, *more) = next(iter(ways.values())), ways
         number = self._numbers[name]
-        if more or self._turned or number.direction is None or abs(gone + way) > _FOLLOWS * abs(way):
+        if more or self._turned or not way or number.direction is None or abs(gone + way) > _FOLLOWS * abs(way):
             return False
-        at, positive, negative = number.direction
-        self._turned, self._numbers[name] = True, replace(number, direction=(at, negative, positive))
-        self._plan = replace(self._plan, numbers=tuple(self._numbers.get(one.name, one) for one in self._plan.numbers))
+        self._turned, self._numbers[name] = True, self._turn_words(number)
         self._gone = {name: gone}
         return True
 
@@ -375,20 +388,13 @@ class PositionFinder(Finder):
         widest = max((limits[name][1] - limits[name][0]) / found.way for name, found in moved.items())
         yield ""
         yield "[motion.goto]"
-        template, lasts = self._plan.drive.label, "{seconds}" in inline(self._body or {})
-        for name, value in still.items():
-            template = template.replace(f"{{{name}}}", f"{value:g}")
-        yield f"send = {string(template)}"
-        if self._body is not None:
-            named = {name: f"{{{name}}}" for name in moved}
-            yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': '{seconds}', 'lease': '{lease}'}))}"
-            yield from (direction_line(number) for number in numbers.values() if number.direction)
+        yield from self._sending_lines(moved, still, "{seconds}")
         if self._relative:
             yield "relative = true"
         if self._relative or self._refuses:
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'
         slowest = max(move.took_s for move in moved.values())
-        if lasts:
+        if self._lasts:
             settle_s = max(0.5, slowest - self.seconds + 0.3)
             yield f"seconds = {self.seconds}  # the suite's: the duration that it asks for"
             yield f"settle_s = {settle_s:.2f}  # seen: a move of {self.seconds} s took {slowest:.2f} s"
@@ -396,26 +402,26 @@ class PositionFinder(Finder):
             yield f"within_s = {2.0 + slowest * widest:.1f}  # seen: a part of the way took {slowest:.2f} s"
         off = max(max(2 * move.off, 8 * move.sigma) for move in moved.values())
         yield f"tolerance = {off + 0.01:.3g}  # twice what was seen, and room"
-        if REFUSED & self._plan.drive.responses.keys() and all(map(self._limits, numbers.values())):
-            yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+        yield from self._refusal_lines(declared=all(map(self._limits, numbers.values())))
         yield from self._stop_lines()
 
     def _tried_limits(self, number: Commanded, here: float, found: Moved) -> tuple[float, float]:
         """Return the limits that are declared, or those so far seen, if there are none or they are far away."""
         declared = self._limits(number)
         # A move with a duration takes as long to any place.
-        lasts = "{seconds}" in inline(self._body or {})
-        if declared and (lasts or found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way):
+        if declared and (self._lasts or found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way):
             return declared
+        if declared:
+            return max(declared[0], round(here - found.way, 4)), min(declared[1], round(here + found.way, 4))
         # Together, axes without limits may not go as far as they were seen to go.
-        share = 1.0 if declared or len(self._numbers) == 1 else _TOGETHER
+        share = 1.0 if len(self._numbers) == 1 else _TOGETHER
         return round(here + share * min(0.0, *found.ways), 4), round(here + share * max(0.0, *found.ways), 4)
 
     def _unit(self, number: Commanded) -> str:
         """Return the unit of an axis by its name or description; of what turns, rad, which a turn of 7 is not."""
-        declared = self._limits(number) or (0.0, 0.0)
+        near = self._limits(number) or tuple(value for _, value in self._samples(number.name, 0.0))
         said = unit_of(self._places[number.name][1], self._schemas[number.name]) or unit_of(number.place, number.schema)
-        return said or ("rad" if number.turns and max(map(abs, declared)) < _RAD else "")
+        return said or ("rad" if number.turns and max(map(abs, near)) < _RAD else "")
 
     def _stop_lines(self) -> Iterator[str]:
         """Yield the stop beside the operation that moves the device, if its parameters are known."""
@@ -427,7 +433,7 @@ class PositionFinder(Finder):
         told = self._answer if isinstance(self._answer, dict) else {}
         ids = {name: name if name in told else "id" for name in NAME.findall(stop.template)}
         if any(name not in told for name in (*wanted, *ids.values())):
-            self._found.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
+            self.notes.append(f"{stop.label} is not used: what it takes ({', '.join(wanted)}) is not known.")
             return
         yield ""
         yield "[motion.stop]"

@@ -120,14 +120,19 @@ class Preparing:
         members = dict(members_of(content))
         token = min(
             (at for at, said in members.items() if _TOKEN.search(at) and not isinstance(said, bool)),
-            key=_rank,
+            # A token rather than an id, outside rather than within.
+            key=lambda at: ("token" not in at.lower(), at.count("/")),
             default="",
         )
-        lasts_s = [_seconds(at, value) for at, value in members.items() if _LASTS.search(at) and _is_positive(value)]
+        lasts_s = [
+            value / (1000 if re.search(r"_ms$|milli", at, re.IGNORECASE) else 1)
+            for at, value in members.items()
+            if _LASTS.search(at) and type(value) in {int, float} and value > 0
+        ]
         lease = msgspec.structs.replace(
             self.lease,
             token=token,
-            header=lease_header(drive) if token else "",
+            header=lease_parameter(drive, "header") if token else "",
             every_s=round(min(lasts_s, default=_USUAL_S), 3),
             # The last part of a path that names a lease is its token.
             release=self.lease.release if token or "{" not in self.lease.release else "",
@@ -186,17 +191,13 @@ def is_excluded(operation: Operation, rules: CallRules) -> bool:
 
 def wants_lease(operation: Operation) -> bool:
     """Return whether a description says that an operation wants a lease: by a status, or a header that carries one."""
-    return bool(_LOCKED & operation.responses.keys() or lease_header(operation) or lease_query(operation))
+    return bool(_LOCKED & operation.responses.keys() or lease_parameter(operation))
 
 
-def lease_header(operation: Operation) -> str:
-    """Return the name of the header in which an operation takes a lease; empty: in none."""
-    return next((one.name for one in operation.parameter("header") if _carries_lease(one.name)), "")
-
-
-def lease_query(operation: Operation) -> str:
-    """Return the name of the query parameter in which an operation takes a lease; empty: in none."""
-    return next((one.name for one in operation.parameter("query") if _carries_lease(one.name)), "")
+def lease_parameter(operation: Operation, *places: str) -> str:
+    """Return the name of the header or query parameter in which an operation takes a lease; empty: in none."""
+    found = (one.name for place in places or ("header", "query") for one in operation.parameter(place))
+    return next(filter(_carries_lease, found), "")
 
 
 def lease_place(operation: Operation) -> str:
@@ -232,7 +233,7 @@ def _words(operation: Operation) -> set[str]:
 
 def _is_lease(operation: Operation) -> bool:
     is_acquired = bool(_words(operation) & _LEASES) and not _words(operation) & (_RELEASES | _KEEPS)
-    return is_acquired and not (lease_header(operation) or lease_query(operation))
+    return is_acquired and not (lease_parameter(operation))
 
 
 def _lease_of(acquire: Operation, operations: Sequence[Operation]) -> Lease:
@@ -261,7 +262,7 @@ def _names_lease(operation: Operation, path: str) -> bool:
 
 
 def _with_token(operation: Operation) -> str:
-    named = with_query(operation, lease_query(operation)).template
+    named = with_query(operation, lease_parameter(operation, "query")).template
     return f"{operation.method} {NAME.sub('{lease}', named)}"
 
 
@@ -328,19 +329,6 @@ def members_of(value: Any, at: str = "", depth: int = 2) -> Iterator[tuple[str, 
             yield f"{at}/{name}", item
 
 
-def _rank(at: str) -> tuple[bool, int]:
-    """Return how likely a member is not the token of a lease: a token rather than an id, outside rather than within."""
-    return "token" not in at.lower(), at.count("/")
-
-
 def _carries_lease(name: str) -> bool:
     """Return whether a header or member of this name carries a lease."""
     return bool(_TOKEN.search(name.replace("-", "_"))) and not _NO_LEASE.search(name)
-
-
-def _is_positive(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and value > 0
-
-
-def _seconds(at: str, value: float) -> float:
-    return value / 1000 if re.search(r"_ms$|milli", at, re.IGNORECASE) else float(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from statistics import median
 from typing import Any, Final
 
@@ -14,7 +13,6 @@ from conformance.engine.commanded import (
     axis_of,
     body_schema,
     bounds_of,
-    direction_line,
     is_axis,
     lasting,
     member_name,
@@ -23,11 +21,10 @@ from conformance.engine.commanded import (
     unit_of,
 )
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import AT_REST, ECHO, REFUSED, ROOM_M, ROOM_S, Finder
+from conformance.engine.finding import AT_REST, ECHO, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.responses import Response, agreement, response_to, rests_from
 from conformance.measures.samples import SEVERAL, Sample, slope
-from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError
 
 # _DRIVEN_S: duration of a drive. _KEPT_S: interval of commands. _BEFORE_S, _AFTER_S: how long the device is watched, s.
@@ -66,7 +63,7 @@ class VelocityFinder(Finder):
             settle_s = max(settle_s, *(self._rises_s(numbers[name], *seen) for name, seen in shown.items()))
         finally:
             self._command({})
-        self._found.lines = list(self._lines(responses, shown, settle_s, hold_s))
+        self.lines = list(self._lines(responses, shown, settle_s, hold_s))
 
     def _drive(self, number: Commanded, speed: float, *, end: bool = True) -> tuple[float, float]:
         """Drive at a velocity and end it; return when it had begun, and when the last command was answered.
@@ -117,6 +114,7 @@ class VelocityFinder(Finder):
             if number.direction and positions and all(one.ratio < 0 for one in positions):
                 # Which of two words is the positive one, only the position says.
                 self._turn_words(number)
+                self._other_way.clear()
                 drives = [(-speed, *moments) for speed, *moments in drives]
                 found[number.name] = {at: one._replace(ratio=-one.ratio) for at, one in found[number.name].items()}
             late_s = max(
@@ -131,8 +129,8 @@ class VelocityFinder(Finder):
                 self._settle_s = max(self._settle_s, 1.0 if took_s is None else 1.5 * took_s + 0.15)
         if len(refused) == len(self._plan.numbers):
             raise next(iter(refused.values()))
-        self._found.notes += [f"{name} stays 0: {problem}" for name, problem in refused.items()]
-        self._found.notes += self._late.values()
+        self.notes += [f"{name} stays 0: {problem}" for name, problem in refused.items()]
+        self.notes += self._late.values()
         self._refused = frozenset(refused)
         return found
 
@@ -172,14 +170,6 @@ class VelocityFinder(Finder):
         """The body of a command, which says for how long it holds, if it can."""
         numbers = {at: value for number in self._plan.numbers for at, value in number.templates.items()}
         return self._template({**lasting(body_schema(self._plan.drive)), **numbers})
-
-    def _turn_words(self, number: Commanded) -> None:
-        """Exchange the words for both directions of a number."""
-        at, positive, negative = number.direction or ("", "", "")
-        turned = replace(number, direction=(at, negative, positive))
-        numbers = tuple(turned if one is number else one for one in self._plan.numbers)
-        self._plan = replace(self._plan, numbers=numbers)
-        self._other_way.clear()
 
     def _forth_and_back(self, number: Commanded) -> list[tuple[float, ...]]:
         """Drive to each side; return the velocities, each with when it rested, began, ended and was looked at last.
@@ -271,13 +261,11 @@ class VelocityFinder(Finder):
             ahead = {name: self._shown_as_position(own[name]) for name in shown.keys() - turns}
             if any(ahead.values()):
                 shown = {name: ahead.get(name) for name in shown}
-                self._found.notes.append(
-                    f"{', '.join(turns)} stays 0: nothing shows how fast it drives once it has turned."
-                )
+                self.notes.append(f"{', '.join(turns)} stays 0: nothing shows how fast it drives once it has turned.")
         for one in self._plan.numbers:
             if shown[one.name] is None and one.name not in self._refused:
                 why = "nothing changed with it" if not own[one.name] else "no single number shows it"
-                self._found.notes.append(f"{one.name} stays 0: {why}.")
+                self.notes.append(f"{one.name} stays 0: {why}.")
         found = {name: one for name, one in shown.items() if one}
         if not found:
             raise NotPossibleError(
@@ -319,7 +307,12 @@ class VelocityFinder(Finder):
             (abs(one.ratio) for at, one in positions.items() if at not in turning), default=0.0
         ):
             positions = {at: one for at, one in positions.items() if at in turning}
-        best = min(positions.items(), key=lambda item: _off(item[1].ratio), default=None)
+        # The one whose unit is likeliest.
+        best = min(
+            positions.items(),
+            key=lambda item: min(abs(math.log(item[1].ratio / unit)) for unit in _UNITS),
+            default=None,
+        )
         alone = best and not any(
             1 / _OTHER < abs(one.ratio / best[1].ratio) < _OTHER
             for place, one in own.items()
@@ -347,12 +340,9 @@ class VelocityFinder(Finder):
                 if response.is_position:
                     # Computed from the distance covered, because noise hides when the robot came to rest.
                     held_s = (samples[-1][1] - samples[0][1]) / moving
-                self._found.notes.append(f"Let go, it came to rest {held_s:.2f} s after the last command.")
+                self.notes.append(f"Let go, it came to rest {held_s:.2f} s after the last command.")
                 return max(0.1, math.ceil(held_s * 20) / 20)
-        self._found.drives_on_s = self._clock.now() - last
-        self._found.notes.append(
-            f"Let go, it drove on for all of the {self._found.drives_on_s:.1f} s that it was watched."
-        )
+        self.notes.append(f"Let go, it drove on for all of the {self._clock.now() - last:.1f} s of the watch.")
         return None
 
     def _rises_s(self, number: Commanded, place: str, response: Response) -> float:
@@ -436,12 +426,8 @@ class VelocityFinder(Finder):
             yield f"{key(names[place])} = {self._axis(place, response, number, fastest[place])}"
         yield ""
         yield "[motion.velocity]"
-        yield f"send = {string(self._plan.drive.label)}"
         still = {command.name: 0 for command in self._plan.numbers if command.name not in shown}
-        if self._body is not None:
-            named = {name: f"{{{name}}}" for name in shown}
-            yield f"body = {inline(fill(self._body, {**named, **still, 'seconds': 1, 'lease': '{lease}'}))}"
-            yield from (direction_line(numbers[name]) for name in shown if numbers[name].direction)
+        yield from self._sending_lines(shown, still, 1)
         widest = {name: max(map(abs, numbers[name].limits)) for name in shown}
         off = {name: _OFF if numbers[name].has_unit else _OFF_WITHOUT_UNIT for name in shown}
         least = max(off[name] * widest[name] for name in shown)
@@ -450,20 +436,16 @@ class VelocityFinder(Finder):
         if hold_s is not None:
             yield f"hold_s = {hold_s:.2f}  # seen: let go, it stopped by itself"
         else:
-            yield f"hold_s = {_DEMANDED_S:g}  # the suite's: none was seen in {self._found.drives_on_s:.1f} s"
+            yield f"hold_s = {_DEMANDED_S:g}  # the suite's: let go, it drove on"
             yield "# If the robot by design holds a velocity until it is told otherwise, take out the line above."
-        refuses = bool(REFUSED & self._plan.drive.responses.keys()) and all(numbers[name].bounds for name in shown)
-        if refuses:
-            yield 'beyond_limits = "refused"  # the description declares limits, and a response for invalid requests'
+        yield from self._refusal_lines(declared=all(numbers[name].bounds for name in shown))
         yield ""
         yield "[motion.velocity.axes]"
         for name, (place, response) in shown.items():
             number = numbers[name]
             given: dict[str, Any] = {"limits": list(number.limits)}
             given |= {"of": names[place]} if response.is_position else {"at": place}
-            # Without a unit nobody says how fast it must be, but as fast as it was seen.
-            scale = _unit(response.ratio)[0] if number.has_unit else float(f"{response.ratio:.3g}")
-            if response.is_position and scale != 1:
+            if response.is_position and (scale := _scale(number, place, response.ratio)) != 1:
                 given["scale"] = scale
             if not response.is_position:
                 given |= {"noise": float(f"{response.sigma:.2g}"), "rest": self._rest(place, response, widest[name])}
@@ -500,7 +482,7 @@ class VelocityFinder(Finder):
         turns = is_heading or (number is not None and number.turns)
         pointer, _, angle = place.partition(ANGLE)
         schema = self._schema_at(place)
-        unit = unit_of(pointer, schema) or (turn if turns else way)
+        unit = "rad" if angle else unit_of(pointer, schema) or (turn if turns else way)
         if is_heading and not angle:
             unit = "deg" if self._looks.is_in_degrees(self._reads[0].label, place) else unit or "rad"
         # One that was seen to turn in degrees is known by the same factor of a radian.
@@ -519,9 +501,11 @@ class VelocityFinder(Finder):
         return f"{inline(given)}  # limits: {'all around' if angle else f'{room:.3g} {unit} around where it was'}"
 
 
-def _off(ratio: float) -> float:
-    """Return how far a ratio is from that of a unit, as a logarithm."""
-    return min(abs(math.log(ratio / unit)) for unit in _UNITS)
+def _scale(number: Commanded, place: str, ratio: float) -> float:
+    """Return how fast a position must change at velocity 1: without a unit nobody says more than what was seen."""
+    if ANGLE in place and unit_of(number.place, number.schema) == "deg":
+        return round(math.radians(1), 6)
+    return _unit(ratio)[0] if number.has_unit else float(f"{ratio:.3g}")
 
 
 def _unit(ratio: float) -> tuple[float, tuple[str, str]]:

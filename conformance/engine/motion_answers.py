@@ -11,7 +11,7 @@ from conformance.scenarios.motion.attempts import attempts_at_rest
 from conformance.scenarios.motion.measuring import end_of_travel, speed_in
 from conformance.scenarios.motion.moves import clamped_targets, stops, targets
 from conformance.scenarios.motion.trace import Drive, Leg, Quiet, Reading
-from conformance.scenarios.motion.velocities import WAYS, clamped_velocities, let_go, vanishing, velocities
+from conformance.scenarios.motion.velocities import WAYS, clamped_velocities, let_go, velocities
 from conformance.scenarios.scenario import Recordings, Scenario
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.finding import count_of
@@ -52,8 +52,6 @@ def answers(motion: MotionMap | None, verdicts: Iterable[Verdict], recordings: R
         said, picture = figure(motion, recordings)
         if value == "yes" and said == _NO_LIMITS:
             value = "not seen"
-        if value == "not seen" and ids == ("watchdog",) and motion.velocity is None:
-            said = _ENDS
         if value == "no":
             said, picture = _fault(own, picture)
         elif value == "not seen" and said.startswith("no: "):
@@ -116,9 +114,8 @@ def _moves(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
                 said = f"{name} {found:.3g} in place of {wanted:.3g} per second"
                 worst = max(worst or (-1.0, "", ""), (abs(found - wanted), said, drive.what))
     if worst:
-        return f"{worst[1]} is the farthest off of {count_of(count, 'velocity')}".replace(
-            "velocitys", "velocities"
-        ), worst[2]
+        many = "velocity" if count == 1 else "velocities"
+        return f"{worst[1]} is the farthest off of {count} {many}", worst[2]
     for leg in (one for one in _parts(recordings, targets) if isinstance(one, Leg) and one.readings):
         goal, last = leg.commands[-1].targets, leg.after(0.0)[-1:]
         for name, wanted in goal.items() if last else ():
@@ -146,22 +143,23 @@ def _stops(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
 
 def _vanishes(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     """Return how long a device went on after its last command, by how its client vanished."""
-    said, on, picture = [], "", ""
-    for drive in _drives(recordings, vanishing):
-        way = next((one for one in WAYS if drive.what.endswith(one)), "").removeprefix("and ")
+    if motion.velocity is None:
+        return _ENDS, ""
+    said, on, picture = dict.fromkeys(WAYS, -1.0), "", ""
+    for drive in _drives(recordings, let_go):
+        way = next((one for one in WAYS if drive.what.endswith(one)), "")
         took_s = _rested_s(drive, drive.commands[-1].answered, motion)
         picture = picture or drive.what
         lapse_s = drive.after[-1].received - drive.commands[-1].answered if drive.after else 0.0
         if _drives_on(drive, motion):
-            on, picture = on or f"no: it still drove {lapse_s:.1f} s later when {way.removeprefix('the ')}", drive.what
-        elif took_s is not None:
-            said.append(f"{max(0.0, took_s):.2f} s ({way})")
+            gone = way.removeprefix("and the ") or "it was let go"
+            on, picture = on or f"no: it still drove {lapse_s:.1f} s later when {gone}", drive.what
+        elif took_s is not None and way:
+            said[way] = max(0.0, took_s, said[way])
     if on:
         return on, picture
-    if not said:
-        gone = _drives(recordings, let_go)
-        return (f"let go {count_of(len(gone), 'time')}", gone[0].what) if gone else ("", "")
-    return f"it went on for {', '.join(said)}", picture
+    seen = [f"{took_s:.2f} s ({way.removeprefix('and ')})" for way, took_s in said.items() if took_s >= 0]
+    return f"it went on for {', '.join(seen)}" if seen else "", picture
 
 
 def _drives_on(drive: Drive, motion: MotionMap) -> bool:

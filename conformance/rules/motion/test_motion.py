@@ -209,17 +209,13 @@ def _given_up(leg: Leg, motion: MotionMap) -> Iterator[Outcome]:
 def last_of_many(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether the device ends at the last accepted of many targets."""
     accepted = [command for command in trace.commands if command.is_ok]
-    if not accepted:
-        yield Case(holds=False, exchange=trace.commands[-1].exchange, expected="a 2xx for one of many moves at least")
-    else:
-        yield from judge_goal(trace, accepted[-1], motion)
+    yield from judge_goal(trace, (accepted or list(trace.commands))[-1], motion)
 
 
 @rule("motion/repeated", on=(repeated,))
 def repetition(trace: Leg, motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a move that is sent twice ends where it ends when it is sent once."""
-    accepted = [command for command in trace.commands if command.is_ok]
-    yield from judge_goal(trace, (accepted or list(trace.commands))[-1], motion)
+    yield from last_of_many.judge(trace, motion)
 
 
 @rule("motion/one-client", on=(several_clients, several_drivers))

@@ -10,8 +10,8 @@ from conformance.rules.motion.judging import at, follows, is_each_late, must_res
 from conformance.scenarios.motion.measuring import end_of_travel, noise_of, speed_in
 from conformance.scenarios.motion.resting import crept, fastest
 from conformance.scenarios.motion.trace import Command, Drive, Reading
-from conformance.scenarios.motion.velocities import let_go, vanishing, velocities
-from conformance.scenarios.rule import NotTested, Outcome, rule
+from conformance.scenarios.motion.velocities import let_go, velocities
+from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.motion_map import MotionMap
 from conformance.verdict.evidence import Case
 
@@ -20,6 +20,7 @@ _HELD = (0.2, 0.7)
 _STILL_DRIVES = 0.5
 # Time that a velocity may hold beyond its hold time: as a share of it, and s.
 _LONGER, _LONGER_S = 0.4, 0.25
+_NO_HOLD = NotClaimed("the map declares no hold_s: the device goes on until it is told otherwise")
 # Time after which a device that a refusal stops is seen to be slower, s.
 _SLOWS_S = 0.1
 
@@ -72,12 +73,13 @@ def _rests(moved: str | None, drive: Drive, expected: str) -> Iterator[Outcome]:
         yield Case(not moved, last.exchange, expected, observed=moved, cause="moves")
 
 
-@rule("motion/watchdog", on=(let_go, vanishing))
+@rule("motion/watchdog", on=(let_go,))
 def watchdog(trace: tuple[Drive, ...], motion: MotionMap) -> Iterator[Outcome]:
     """Judge whether a device that gets no command any more rests after its hold time, however its client vanishes."""
+    if motion.velocity is None or motion.velocity.hold_s is None:
+        yield _NO_HOLD
+        return
     for drive in trace:
-        if motion.velocity is None or motion.velocity.hold_s is None:
-            continue
         last, within_s = drive.commands[-1], motion.velocity.hold_s + motion.velocity.settle_s
         due = last.answered + within_s + longest_s(drive.readings)
         seen_from = due if drive.rested is None else min(due, drive.rested)
@@ -130,6 +132,7 @@ def judge_hold(trace: tuple[Drive, ...], motion: MotionMap, share: float) -> Ite
     On a slow machine a drive may show too little of it; another one of the same axis is enough.
     """
     if motion.velocity is None or motion.velocity.hold_s is None:
+        yield _NO_HOLD
         return
     unseen, seen = set[str](), set[str]()
     so_far = [reading for drive in trace for reading in drive.readings]

@@ -69,11 +69,16 @@ def tried_at_rest(
     quiet = _quiet(mapped, several, settle, effect_s, beside)
     if not _has_moved(mapped, quiet):
         return quiet
-    alone: list[Quiet] = []
+    # What a device refuses seldom moves it: most attempts are cleared together.
+    alone, left = list[Quiet](), list(filter(None, (several[:-1], several[-1:])))
     try:
-        for each in several:
+        while left:
             settle()
-            alone.append(_quiet(mapped, [each], None, effect_s, beside))
+            again = _quiet(mapped, group := left.pop(0), None, effect_s, beside)
+            if len(group) > 1 and _has_moved(mapped, again):
+                left[:0] = [group[: len(group) // 2], group[len(group) // 2 :]]
+            else:
+                alone.append(again)
         _let_rest(mapped, settle)
         quiet = replace(quiet, idle=_quiet(mapped, [], None, effect_s, beside))
         settle()

@@ -33,8 +33,10 @@ _LONGER_S: Final = 0.5
 _COMMANDS: Final = 100
 # A velocity with a longer hold time is always ended by a stop, s.
 _SHORT_HOLD_S: Final = 2.0
-# Factor on the time of the first move, computed from its finished part.
+# Factor on the time of the first move, computed from its finished part. _SET_OUT: share of that part from which on it
+# counts, as a device may have to turn before it sets out.
 _SURELY: Final = 1.5
+_SET_OUT: Final = 0.1
 # Length of a way that is long enough for a stop under way, in tolerances.
 _LONG: Final = 12
 # How far beyond the limits forbidden targets lie, as shares of an axis's range.
@@ -57,7 +59,7 @@ def record_parts(made: Iterable[_Part]) -> tuple[_Part, ...]:
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
-    """Send the device to the limits of its axes and back; at quick all axes at once, at standard also at random."""
+    """Send the device to the limits of its axes; at quick all at once, at standard also back and at random."""
     return record_parts(_to_targets(mapped, effort, run.seed))
 
 
@@ -70,7 +72,6 @@ def _to_targets(mapped: MappedDevice, effort: Effort, seed: int) -> Iterator[Leg
         for side in (0, 1):
             ends = {name: axis.limits[(number + side) % 2] for number, (name, axis) in enumerate(axes.items())}
             yield mapped.go("a limit of each axis" if side else "the other limit of each axis", ends)
-        yield mapped.go("all axes back", {})
         return
     for name, axis in axes.items():
         for limit in axis.limits:
@@ -116,21 +117,27 @@ class _Way:
     behind: Position
 
     def lasts_s(self, name: str) -> float:
-        """Return how long the way along an axis may take, by the part that is done, s."""
-        seen = [reading for reading in self.readings if reading.values]
-        done = abs(seen[-1].values[name] - self.start[name]) if seen else 0.0
+        """Return how long the way along an axis may take, by the part that is done since the device set out, s."""
+        seen = [(one.received, abs(one.values[name] - self.start[name])) for one in self.readings if one.values]
+        done = seen[-1][1] if seen else 0.0
+        if not done:
+            return math.inf
+        begun = next(moment for moment, gone in seen if gone >= _SET_OUT * done)
         way = abs(self.command.targets[name] - self.start[name])
-        return _SURELY * way / done * (seen[-1].received - self.command.sent) if done else math.inf
+        return begun - self.command.sent + _SURELY * way / done * (seen[-1][0] - begun)
 
 
 def _axes(mapped: MappedDevice, effort: Effort) -> list[str]:
-    """Return the axes that are moved one by one: at quick effort only the first."""
-    axes = list(mapped.motion.state.axes)
-    return axes[:1] if effort.name == "quick" else axes
+    """Return the axes that are moved one by one, first the longest in tolerances: at quick effort only that one."""
+    axes, tolerance = mapped.motion.state.axes, mapped.motion.tolerance
+    ranked = sorted(
+        axes, key=lambda name: (axes[name].limits[0] - axes[name].limits[1]) / (tolerance(name) or math.inf)
+    )
+    return ranked[:1] if effort.name == "quick" else ranked
 
 
 def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
-    """Move to the farther end of an axis, first to the other end if needed; return once a share of the move is done."""
+    """Move to the farther end of an axis, first to the other end if needed; return once a share of it is done."""
     if not mapped.rests:
         mapped.saw_rest(mapped.watch(mapped.clock.now() + STAYS_S))
     axes = mapped.motion.state.axes
@@ -146,7 +153,7 @@ def _way(mapped: MappedDevice, name: str, share: float = _UNDER_WAY) -> _Way:
     part = abs(end - start[name]) * share
     seen = mapped.watch(
         command.answered + mapped.takes_s,
-        lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - start[name]) > part,
+        lambda so_far: bool(so_far[-1].values) and abs(so_far[-1].values[name] - start[name]) >= part,
     )
     return _Way(start, command, seen, {**beside, name: begin})
 
@@ -159,20 +166,18 @@ def stops(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 
 def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[Leg]:
-    axes, shown = mapped.motion.state.axes, False
-    for name in axes:
-        if shown and effort.name == "quick":
-            return
+    for name in _axes(mapped, effort):
         part = _UNDER_WAY
         for _ in range(TRIES):
             leg = _stop_under_way(mapped, name, part, rests_s)
             # Judge each try: if every second stop is late, the discarded try may be the late one.
             yield leg
-            under_way = leg.was_under_way(name, mapped.motion.tolerance(name))
+            goal, tolerance = leg.commands[0].targets, mapped.motion.tolerance(name)
+            under_way = leg.was_under_way(name, tolerance) or not mapped.is_near(leg.readings[-1].values, goal)
             if under_way and not leg.commands[1].was_late(leg.readings):
                 break
-            part = part if under_way else part / TRIES
-        shown = shown or under_way
+            # One that arrives sooner than it is seen on its way is stopped at once.
+            part = part if under_way else 0.0
 
 
 def _stop_under_way(mapped: MappedDevice, name: str, part: float, rests_s: float) -> Leg:
@@ -181,7 +186,9 @@ def _stop_under_way(mapped: MappedDevice, name: str, part: float, rests_s: float
     stop = mapped.stop()
     if stop is None:
         raise NotPossibleError("the stop names a value that the response to the move does not have")
-    until = min(mapped.due(stop), stop.answered + _AT_MOST_S)
+    # One that is not seen under way must be seen to stay short of its target.
+    most_s = _AT_MOST_S if part else math.inf
+    until = min(mapped.due(stop), stop.answered + most_s, way.command.answered + way.lasts_s(name))
     seen = way.readings + mapped.watch(max(until, stop.answered + rests_s + _AT_LEAST_S))
     return Leg(
         f"a stop of {name} under way", way.start, (way.command, stop), tuple(seen), mapped.due(stop), mapped.resting

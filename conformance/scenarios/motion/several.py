@@ -48,7 +48,8 @@ def several_clients(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
 
 
 def _of_clients(mapped: MappedDevice) -> Leg:
-    mapped.bring_home()
+    if not mapped.rests:
+        mapped.come_to_rest()
     start, axes = mapped.where(), mapped.motion.state.axes.items()
     # Computed so that the last one is exactly the limit, without rounding.
     shares = [client / (_CLIENTS - 1) for client in range(_CLIENTS)]

@@ -97,14 +97,14 @@ def _in_turn(mapped: MappedDevice, speeds: Position, number: int) -> _By:
 def _by_each_way(mapped: MappedDevice) -> Iterator[tuple[Position, _By]]:
     """Yield velocities for each further way to command one: of each axis alone, and of two at once."""
     for way in mapped.drives.ways:
-        several = [{name: _SLOW * limit} for name, limit in _ends(mapped) if name in way.axes]
+        several = [
+            {name: _SLOW * limit}
+            for name, axis in mapped.drives.axes.items()
+            if name in way.axes
+            for limit in _there_and_back(mapped, axis.limits, axis.of)
+        ]
         several += [item for item in _at_once(mapped) if item.keys() & way.axes]
         yield from ((speeds, _by(way, speeds)) for speeds in several)
-
-
-def _ends(mapped: MappedDevice) -> Iterator[tuple[str, float]]:
-    for name, axis in mapped.drives.axes.items():
-        yield from ((name, limit) for limit in _there_and_back(mapped, axis.limits, axis.of))
 
 
 def _plan_drives(mapped: MappedDevice, *, quick: bool) -> Iterator[tuple[Position, bool]]:
@@ -152,16 +152,16 @@ def clamped_velocities(mapped: MappedDevice) -> tuple[Drive, ...]:
 
 @scenario(needs=_NEEDS, stage=Stage.DRIVE)
 def let_go(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Drive, ...]:
-    """Command a velocity, and then nothing any more, as when the client vanishes or the network breaks.
+    """Command a velocity, and then nothing any more: in silence, reading on, with the connection closed or broken.
 
     A watchdog may work after every other command, for some directions or sizes of a velocity alone, only while somebody
     reads, until a command is refused, or while its connection is open. At quick the seed says which of them are tried.
+    Without a hold time, nothing is judged, but how the device goes on is shown.
     """
-    hold_s = mapped.drives.hold_s
-    if hold_s is None:
-        raise NotDeclaredError("the map declares no hold_s: the device goes on until it is told otherwise")
-    chance = random.Random(f"{run.seed}/let go")  # noqa: S311 - no secret
-    return record_parts(_let_go(mapped, hold_s, chance, quick=effort.name == "quick"))
+    hold_s, chance = mapped.drives.hold_s, random.Random(f"{run.seed}/let go")  # noqa: S311 - no secret
+    let_go = () if hold_s is None else _let_go(mapped, hold_s, chance, quick=effort.name == "quick")
+    ways = (CLOSED, POLLING) if hold_s is None else (CLOSED, HALF_OPEN)
+    return record_parts(itertools.chain(*(_drive_and_vanish(mapped, way) for way in ways), let_go))
 
 
 def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick: bool) -> Iterator[Drive]:
@@ -187,13 +187,6 @@ def _let_go(mapped: MappedDevice, hold_s: float, chance: random.Random, *, quick
         limit = next(_there_and_back(mapped, axes[0][1].limits, axes[0][1].of))
         what = f"{name} {limit:g}, let go, with {kind} after it, which must be refused"
         yield from left_alone(mapped, Part(what, {name: limit}), hold_s, refused=refused, brief=True)
-
-
-@scenario(needs=_NEEDS, stage=Stage.DRIVE)
-def vanishing(mapped: MappedDevice) -> tuple[Drive, ...]:
-    """Drive slowly, and vanish: in silence, with the connection closed, with the link broken, and reading on."""
-    ways = WAYS if mapped.drives.hold_s is not None else (CLOSED, POLLING)
-    return record_parts(drive for way in ways for drive in _drive_and_vanish(mapped, way))
 
 
 def _drive_and_vanish(mapped: MappedDevice, way: str) -> Iterator[Drive]:

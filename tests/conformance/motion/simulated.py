@@ -71,6 +71,20 @@ class Api:
         fields = (("Content-Type", "text/xml" if isinstance(self.device, Dome) else "application/json"),)
         return Exchange(Request(method, f"http://device{path}", headers, body), Response(status, fields, octets, 2.0))
 
+    def close(self):
+        """Close nothing: there are no connections."""
+
+
+class Unread:
+    """A whole request, whose response nobody reads."""
+
+    def __init__(self, client, method, target, *, sent, promised, headers):
+        assert promised == len(sent)
+        client.send(method, target, headers=headers, body=sent)
+
+    def vanish(self, *, reset=True):
+        """Close nothing: there is no connection."""
+
 
 class Binding(JsonBinding):
     """The description's rules without a contract: what is no number is forbidden."""
@@ -107,7 +121,10 @@ def played(name, mutant=None, *, noise=0.0, seed=0, takes_s=lambda: 0.002, toml=
     given = {"mapped": mapped, "effort": chosen, "run": Run(seed=seed), "motion": motion, "body": body}
     for scenario in _PLAYED:
         try:
-            with patch.object(several, "send_together", one_after_another):
+            with (
+                patch.object(several, "send_together", one_after_another),
+                patch.object(velocities, "PartialRequest", Unread),
+            ):
                 trace = scenario.play(**{name: given[name] for name in scenario.fixtures})
         except PartialTraceError as error:
             trace = error.trace

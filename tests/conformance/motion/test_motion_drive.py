@@ -26,11 +26,14 @@ from conformance.documents.openapi import read_operations
 from conformance.engine.commanded import commanded_by, lasting, template_of, titles_in, with_query
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.engine.finding import plan_of
+from conformance.engine.found_positions import PositionFinder
 from conformance.engine.found_velocities import VelocityFinder
+from conformance.rules.motion.test_motion import stop_rests
 from conformance.rules.motion.test_motion_attempts import unauthorised_still
 from conformance.rules.motion.test_velocities import stopped, velocity
 from conformance.scenarios.motion import attempts
 from conformance.scenarios.motion.mapped import MappedDevice
+from conformance.scenarios.motion.moves import stops
 from conformance.scenarios.motion.velocities import velocities
 from conformance.statement.statement import motion_map_of
 from conformance.transport.exchange import Exchange, Request, Response
@@ -280,6 +283,56 @@ def test_a_rover_gets_the_time_that_it_needs_to_accelerate(rule):
 
 
 _NUMBER = {"type": "number"}
+
+
+class Slide:
+    """A slide that is sent to a position; ``shows_end``: it tells where it is only once it has arrived."""
+
+    def __init__(self, clock, speed, *, shows_end=False):
+        self.clock, self.speed, self.shows_end = clock, speed, shows_end
+        self.start = self.goal = self.since = 0.0
+
+    def answer(self, method, path, octets):
+        way, done = self.goal - self.start, self.speed * (self.clock.now() - self.since)
+        here = self.goal if done >= abs(way) else self.start + (0.0 if self.shows_end else math.copysign(done, way))
+        if method == "PUT":
+            self.start, self.since = here, self.clock.now()
+            self.goal = json.loads(octets)["x"] if path == "/goto" else here
+        return 200, {"x": here}
+
+
+def _slide(speed, *, shows_end=False):
+    """Return the map that is found of a slide, and how its stops are judged."""
+    goto = {"type": "object", "properties": {"x": _NUMBER}, "required": ["x"]}
+    told = {"200": {"content": {"application/json": {"schema": goto}}}}
+    move = {"requestBody": {"content": {"application/json": {"schema": goto}}}, "responses": told}
+    paths = {"/goto": {"put": move}, "/stop": {"put": {"responses": told}}, "/state": {"get": {"responses": told}}}
+    operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": paths})
+    clock = SimulatedClock()
+    api = Api(Slide(clock, speed, shows_end=shows_end), clock, lambda: 0.002)
+    plan = plan_of(operations, "PUT /goto", None, CallRules())
+    motion = map_of("\n".join(PositionFinder(api, Binding(api), plan, clock).find().lines))
+    given = {"mapped": MappedDevice(api, motion, clock, Binding(api)), "effort": Effort("quick"), "motion": motion}
+    return motion, list(stop_rests.outcomes(stops.play(**{name: given[name] for name in stops.fixtures}), given.get))
+
+
+@pytest.mark.parametrize(("speed", "shows_end", "least", "most"), [(0.5, False, 0.15, 0.5), (0.003, True, 0.01, 0.02)])
+def test_what_is_fast_is_sent_so_far_that_it_can_be_stopped_and_what_shows_its_end_alone_is_stopped_at_once(
+    speed, shows_end, least, most
+):
+    motion, outcomes = _slide(speed, shows_end=shows_end)
+    assert least <= max(motion.state.axes["x"].limits) <= most
+    assert {getattr(one, "holds", None) for one in outcomes} == {True}
+
+
+def test_what_is_there_at_once_cannot_be_stopped_and_the_user_is_told_what_to_change():
+    motion, outcomes = _slide(1000.0)
+    assert max(motion.state.axes["x"].limits) == 0.5, "ten times a small move, and no farther"
+    assert [getattr(one, "reason", "").partition(". ")[2] for one in outcomes] == [
+        "Give x wider limits in the map, or a lower speed, so that a move takes about a second"
+    ]
+
+
 _BODY = {"type": "object", "properties": {"pan": _NUMBER, "timeout_ms": _NUMBER}}
 
 
