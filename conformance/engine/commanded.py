@@ -37,10 +37,6 @@ _TWIST: Final = re.compile(r"(?:linear|angular)[/_]?[xyz]$", re.IGNORECASE)
 _SHARES: Final = frozenset({1.0, 100.0})
 _MOVES_BY: Final = re.compile(r"relative|move_?by|nudge", re.IGNORECASE)
 _RELATIVE: Final = re.compile(r"relative|distance|delta|offset|step", re.IGNORECASE)
-# Names of numbers that say where a device is.
-POSITION: Final = re.compile(
-    r"position|(?:^|_)pos(?:_|$)|angle|location|height|level|actual|current|count", re.IGNORECASE
-)
 _UNITS: Final = {
     "mm": r"_mm(?:_|$)|\b(?:mm|millimet)", "cm": r"_cm(?:_|$)|\b(?:cm|centimet)", "m": r"_m(?:_|$)|\bmet(?:re|er)s?\b",
     "deg": r"_deg(?:rees)?(?:_|$)|\bdeg(?:rees?)?\b|°", "rad": r"_rad(?:_|$)|\brad(?:ians?)?\b",

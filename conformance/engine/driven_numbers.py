@@ -1,13 +1,14 @@
-"""The numbers that a device tells, by JSON pointer, and how they are looked at while it is driven a little."""
+"""The numbers that a device tells, by JSON pointer: as it is driven a little, and which of them tells an axis."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
+from conformance.engine.commanded import FAST, Commanded, axis_of, is_axis, member_name
 from conformance.measures.samples import Sample
 from conformance.scenarios.motion.templates import NoValueError, angle_of
 from conformance.statement.motion_map import Angle
@@ -25,6 +26,12 @@ _NUMBER: Final = re.compile(r"-?\d{1,12}\.\d{1,12}")
 #: Names of what turns without end, in rad or, if any of its values is greater than a turn in rad, in degrees.
 HEADING: Final = re.compile(r"yaw|heading|theta|orientation|bearing", re.IGNORECASE)
 _ANGLES: Final[tuple[Angle, ...]] = ("roll", "pitch", "yaw")
+
+#: Names of members that repeat a command and measure nothing; names of numbers that say where a device is.
+ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
+_POSITION: Final = re.compile(
+    r"position|(?:^|_)pos(?:_|$)|angle|location|height|level|actual|current|count", re.IGNORECASE
+)
 
 Numbers = dict[str, float]
 """Numbers by pointer; an angle of a quaternion by its pointer, `#` and the angle's name."""
@@ -73,6 +80,15 @@ def _angles(value: Mapping[str, Any]) -> dict[str, float]:
         return {}
 
 
+def _only_position(places: Sequence[str], own: str, *, alone: bool) -> list[str]:
+    """Return the place of the only position, where a number has another name; of an item the one in its place."""
+    known = [place for place in places if _POSITION.search(member_name(place)) and is_axis(member_name(place))]
+    known = [place for place in known if not (FAST.search(place) or ECHO.search(place))]
+    if own.isdecimal():
+        known = [place for place in known if place.rpartition("/")[2] == own]
+    return known if len(known) == 1 and (alone or own.isdecimal()) else []
+
+
 class Looks:
     """Readings of a device by operation: the middle of each reading's time, and its numbers.
 
@@ -96,6 +112,55 @@ class Looks:
         """Return the places that every reading of an operation has."""
         seen = self._seen.get(operation, [])
         return [place for place in seen[0][1] if all(place in one for _, one in seen)] if seen else []
+
+    def places_of(
+        self, numbers: Sequence[Commanded], path: str, operations: Iterable[str]
+    ) -> dict[str, tuple[str, str]]:
+        """Return operation and place of each commanded number: of one operation, as far as it tells them.
+
+        Args:
+            numbers: what is commanded.
+            path: of the operation that commands them.
+            operations: those that are read.
+        """
+        told = {operation: self._named(operation, numbers, path) for operation in operations}
+        found: dict[str, tuple[str, str]] = {}
+        for operation in sorted(told, key=lambda operation: -len(told[operation])):
+            found = {name: (operation, place) for name, place in told[operation].items()} | found
+        return found
+
+    def _named(self, operation: str, numbers: Sequence[Commanded], path: str) -> dict[str, str]:
+        """Return the places of an operation's numbers, by the name of the commanded number they share."""
+        places, found = self.places(operation), dict[str, str]()
+        for number in numbers:
+            words = number.place.strip("{}").split("/")
+            own = words[-1].lower()
+            is_item = own.isdecimal()
+            same = [
+                place for place in places if not is_item and place.rpartition("/")[2].partition(ANGLE)[0].lower() == own
+            ]
+            same = same or [
+                place for place in places if not FAST.search(place) and axis_of(place) == axis_of(number.place)
+            ]
+            if not is_item and own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
+                same += [place for place in places if place.lower() in {"", "/value", f"/{own}/value"}]
+            same = same or _only_position(places, own, alone=len(numbers) == 1)
+            # Of several members, prefer the one whose path is most like the command's; of things, that of the command.
+            same.sort(
+                key=lambda text: (
+                    bool(ECHO.search(text) or FAST.search(text)),
+                    -len(set(words) & set(text.split("/"))),
+                    not self._is_of_thing(operation, text, path),
+                )
+            )
+            if same and same[0] not in found.values():
+                found[number.name] = same[0]
+        return found
+
+    def _is_of_thing(self, operation: str, place: str, path: str) -> bool:
+        """Return whether a place is within an object with an id that the path of the command has."""
+        thing, ids = place.rpartition("/")[0], path.partition("?")[0].split("/")
+        return any(f"{value:g}" in ids for _, value in self.samples(operation, f"{thing}/id", 0.0)[-1:])
 
     def _turn(self, operation: str, place: str) -> float:
         """Return what a whole turn is at a place; 0: it is no angle that begins anew."""

@@ -69,8 +69,6 @@ _STATE: Final = re.compile(
     r"state|status|pose|odom|position|velocit|speed|twist|telemetry|joint|axes|angle|azimuth|altitude|heading|height",
     re.IGNORECASE,
 )
-#: Names of members that repeat a command and measure nothing.
-ECHO: Final = re.compile(r"target|command|cmd|set_?point|goal|desired|requested|last_", re.IGNORECASE)
 _LATCHES: Final = re.compile(r"emergency|e-?stop\b|latch|shut|until (?:it is )?reset", re.IGNORECASE)
 _STOPS: Final = re.compile(
     r"(?:stop|halt|cancel|abort)(?:[-_]?(?:slew|goto|go|mov(?:e|es|ing|ement)|motion|all|ax[ie]s|drives?|robot|now))?",

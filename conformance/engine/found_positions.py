@@ -9,9 +9,7 @@ from typing import Any, Final
 
 from conformance.engine.commanded import (
     FAST,
-    POSITION,
     Commanded,
-    axis_of,
     body_schema,
     bounds_of,
     is_axis,
@@ -21,7 +19,7 @@ from conformance.engine.commanded import (
     unit_of,
 )
 from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import AT_REST, ECHO, FARTHEST, READY_S, Finder
+from conformance.engine.finding import AT_REST, FARTHEST, READY_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.samples import SEVERAL, Noise, Sample, slope
 from conformance.scenarios.scenario import NotPossibleError
@@ -93,7 +91,9 @@ class PositionFinder(Finder):
     def _find(self) -> None:
         self._refused: list[str] = []
         self._watch_at_rest()
-        self._places = self._chosen_places()
+        self._places = self._looks.places_of(
+            self._plan.numbers, self._plan.drive.template, [one.label for one in self._reads]
+        )
         if not self._places:
             wanted = ", ".join(command.name for command in self._plan.numbers)
             raise NotPossibleError(
@@ -135,14 +135,6 @@ class PositionFinder(Finder):
             raise NotPossibleError(next(iter(self._refused), f"{self._plan.drive.label} {why}"))
         self.lines = list(self._goto_lines(start, moved))
 
-    def _chosen_places(self) -> dict[str, tuple[str, str]]:
-        """Return operation and place of each commanded number: of one operation, as far as it tells them."""
-        told = {operation.label: self._named_places(operation.label) for operation in self._reads}
-        found: dict[str, tuple[str, str]] = {}
-        for label in sorted(told, key=lambda label: -len(told[label])):
-            found = {name: (label, place) for name, place in told[label].items()} | found
-        return found
-
     def _ends(self) -> dict[str, float]:
         """Return where each axis is, by the last readings."""
         return {name: median(value for _, value in self._samples(name, 0.0)[-SEVERAL:]) for name in self._places}
@@ -157,50 +149,6 @@ class PositionFinder(Finder):
     def _lasts(self) -> bool:
         """Whether a move lasts as long as is asked for: as long to any place."""
         return "{seconds}" in inline(self._body or {})
-
-    def _named_places(self, operation: str) -> dict[str, str]:
-        """Return the places of an operation's numbers, by the name of the commanded number they share."""
-        places, found = self._looks.places(operation), dict[str, str]()
-        for number in self._plan.numbers:
-            words = number.place.strip("{}").split("/")
-            own = words[-1].lower()
-            is_item = own.isdecimal()
-            same = [
-                place for place in places if not is_item and place.rpartition("/")[2].partition(ANGLE)[0].lower() == own
-            ]
-            same = same or [
-                place for place in places if not FAST.search(place) and axis_of(place) == axis_of(number.place)
-            ]
-            if not is_item and own in operation.rpartition("/")[2].lower() and not ECHO.search(operation):
-                same += [place for place in places if place.lower() in {"", "/value", f"/{own}/value"}]
-            same = same or self._only_position(places, own)
-            # Of several members, prefer the one whose path is most like the command's; of things, that of the command.
-            same.sort(
-                key=lambda text: (
-                    bool(ECHO.search(text) or FAST.search(text)),
-                    -len(set(words) & set(text.split("/"))),
-                    not self._is_of_thing(operation, text),
-                )
-            )
-            if same and same[0] not in found.values():
-                found[number.name] = same[0]
-        return found
-
-    def _only_position(self, places: Sequence[str], own: str) -> list[str]:
-        """Return the place of the only position, where a number has another name; of an item the one in its place."""
-        known = [place for place in places if POSITION.search(member_name(place)) and is_axis(member_name(place))]
-        known = [place for place in known if not (FAST.search(place) or ECHO.search(place))]
-        if own.isdecimal():
-            known = [place for place in known if place.rpartition("/")[2] == own]
-        elif len(self._plan.numbers) > 1:
-            return []
-        return known if len(known) == 1 else []
-
-    def _is_of_thing(self, operation: str, place: str) -> bool:
-        """Return whether a place is within an object with an id that the path of the command has."""
-        thing, ids = place.rpartition("/")[0], self._plan.drive.template.partition("?")[0].split("/")
-        seen = self._looks.samples(operation, f"{thing}/id", 0.0)[-1:]
-        return any(f"{value:g}" in ids for _, value in seen)
 
     def _try_axes(self, numbers: Sequence[Commanded], start: Mapping[str, float]) -> dict[str, Moved]:
         """Move axes at once, a little to each side; return how each followed. Without limits, first less far."""
@@ -381,6 +329,9 @@ class PositionFinder(Finder):
             )
             declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
+            speeds = [one for at, one in numbers_in(body_schema(self._plan.drive) or {}) if FAST.search(at)]
+            if given["unit"] and (same := [one for one in speeds if unit_of("", one) == given["unit"]]):
+                given |= {"speed": ends[1]} if (ends := bounds_of(same[0])) else {}
             source = "as declared" if declared else "none are declared; so far it was seen to go"
             if declared and limits[name] != declared:
                 given["accepts"], source = list(declared), "nearby, as the declared ones are far away"

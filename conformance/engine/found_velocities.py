@@ -20,8 +20,8 @@ from conformance.engine.commanded import (
     unique_names,
     unit_of,
 )
-from conformance.engine.driven_numbers import ANGLE
-from conformance.engine.finding import AT_REST, ECHO, ROOM_M, ROOM_S, Finder
+from conformance.engine.driven_numbers import ANGLE, ECHO
+from conformance.engine.finding import AT_REST, ROOM_M, ROOM_S, Finder
 from conformance.engine.map_text import inline, key, string
 from conformance.measures.responses import Response, agreement, response_to, rests_from
 from conformance.measures.samples import SEVERAL, Sample, slope

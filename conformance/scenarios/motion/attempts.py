@@ -221,13 +221,17 @@ class _Sender:
         yield Tried(kind, what, exchange, self.mapped.has_failed(exchange))
 
     def send_without_lease(self, values: dict[str, Any]) -> Iterator[Tried]:
-        """Send a command of a client that has no lease."""
-        made, ready = self.mapped.request_of(self.given, values), self.mapped.ready
-        target = made.target.replace(quote(ready.lease, safe=""), "")
-        body = made.body.replace(ready.lease.encode(), b"")
-        made = replace(made, target=target, headers=ready.without_lease(made.headers), body=body)
-        exchange = self.mapped.api.client.send(made.method, made.target, headers=made.headers, body=made.body)
-        yield Tried("unauthorised", f"{self.what} without the lease", exchange, self.mapped.has_failed(exchange))
+        """Send a command of a client that has no lease, and of one with a token that is not the lease."""
+        made, lease = self.mapped.request_of(self.given, values), self.mapped.ready.lease
+        for other, how in (("", "without"), (lease[::-1], "with a token that is not")):
+            if other == lease:
+                continue
+            target = made.target.replace(quote(lease, safe=""), quote(other, safe=""))
+            body, texts = made.body.replace(lease.encode(), other.encode()), {lease: other}
+            headers = tuple((name, text) for name, value in made.headers if (text := texts.get(value, value)))
+            exchange = self.mapped.api.client.send(made.method, target, headers=headers, body=body)
+            what = f"{self.what} {how} the lease"
+            yield Tried("unauthorised", what, exchange, self.mapped.has_failed(exchange))
 
     def send_broken(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send a command whose body is not in its syntax."""

@@ -23,7 +23,7 @@ WRONG = {
     "stop": ("arm", "stop-ignored"),
     "stop-lasts": ("arm", "stop-resumes"),
     "new-target": ("arm", "second-then-first"),
-    "last-of-many": ("arm", "dropped@third"),
+    "last-of-many": ("arm", "second-ignored"),
     "repeated": ("arm", "short:pan"),
     "beyond-limits": ("rover", "beyond:x"),
     "velocity": ("rover", "velocity-slow:x"),

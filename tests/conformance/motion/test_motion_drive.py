@@ -415,21 +415,21 @@ def test_numbers_in_texts_are_read_and_a_heading_in_degrees_begins_anew():
 
 
 class Leasing(Api):
-    """An arm with a lease; ``wants``: whether it moves only for a client that has it."""
+    """An arm with a lease; ``wants``: whether it moves only for a client that has it, or any token."""
 
-    wants = True
+    wants = ("mine",)
 
     def send(self, method, path, *, headers=(), body=b"", **how):
         if path == "/lease":
             said = Response(200, (), b'{"token": "mine"}', 2.0)
-        elif self.wants and path == "/move" and dict(headers).get("X-Lease") != "mine":
+        elif path == "/move" and dict(headers).get("X-Lease") not in self.wants:
             said = Response(423, (), b"{}", 2.0)
         else:
             return super().send(method, path, headers=headers, body=body, **how)
         return Exchange(Request(method, f"http://device{path}", headers, body), said)
 
 
-@pytest.mark.parametrize("wants", [True, False])
+@pytest.mark.parametrize("wants", [("mine",), ("mine", "enim"), ("mine", "enim", None)])
 def test_an_arm_that_moves_for_a_client_without_its_lease_is_blamed(wants):
     clock = SimulatedClock()
     api = Leasing(Arm(Body(LIMITS, clock.now, clock.sleep)), clock, lambda: 0.002)
@@ -439,4 +439,5 @@ def test_an_arm_that_moves_for_a_client_without_its_lease_is_blamed(wants):
         trace = attempts.attempts_at_rest.play(mapped=MappedDevice(api, motion, clock, Binding(api)))
     cases = cases_of(unauthorised_still, trace, {"motion": motion})
     assert cases
-    assert all(case.holds for case in cases) == wants
+    assert sum(not case.holds for case in cases) >= len(wants) - 1
+    assert all(case.holds for case in cases) == (wants == ("mine",))
