@@ -116,8 +116,7 @@ class Plan:
         yield f"Read meanwhile: {', '.join(operation.label for operation in self.reads)}."
         yield from self.preparing.announce(at_once=self.is_prepared)
         far = max(abs(end) for command in self.numbers for end in command.limits)
-        room = max(ROOM_M, ROOM_S * far)
-        driven = f"up to {far:g} per second, no farther than {room:g} from where it is"
+        driven = f"up to {far:g} per second, no farther than {max(ROOM_M, ROOM_S * far):g} from where it is"
         yield f"Then it is judged: {driven if self.is_velocity else 'within the limits of the map that is found'}."
 
 
@@ -350,10 +349,8 @@ class Finder(ABC):
         """Note what shows that the device is ready, if it had to be awaited after the last step: what changed since."""
         if self._is_accepted and self._used.steps and self._clock.now() > self._asked + _AT_ONCE_S and self._words:
             words, read = self._states(), self._plan.reads[0].label
-            (step, ends), changed = (
-                self._used.steps[-1],
-                [at for at, word in words.items() if self._words.get(at) != word],
-            )
+            step, ends = self._used.steps[-1]
+            changed = [at for at, word in words.items() if self._words.get(at) != word]
             if changed:
                 step = msgspec.structs.replace(step, read=read, at=changed[0], shows=words[changed[0]])
                 self._used = replace(self._used, steps=(*self._used.steps[:-1], (step, ends)))

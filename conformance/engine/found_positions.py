@@ -100,8 +100,7 @@ class PositionFinder(Finder):
                 f"{self._plan.drive.label} takes {wanted}, and {', '.join(one.label for one in self._reads)} tell no "
                 "number of such a name: give --read, or write a map (docs/motion.md)"
             )
-        used = {read for read, _ in self._places.values()}
-        self._reads = [operation for operation in self._reads if operation.label in used]
+        self._reads = [one for one in self._reads if one.label in dict(self._places.values())]
         self._numbers = {command.name: command for command in self._plan.numbers if command.name in self._places}
         numbers = list(self._numbers.values())
         self._relative, self._refuses = all(command.is_relative for command in numbers), False

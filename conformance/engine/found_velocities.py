@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from statistics import median
 from typing import Any, Final
 
@@ -203,14 +204,9 @@ class VelocityFinder(Finder):
         found = {}
         for operation in (one.label for one in self._reads):
             for place in self._looks.places(operation):
+                samples = partial(self._looks.samples, operation, place)
                 seen = [
-                    response_to(
-                        speed,
-                        *(
-                            self._looks.samples(operation, place, *span)
-                            for span in ((rested, begun), (begun, ended), (ended, done))
-                        ),
-                    )
+                    response_to(speed, samples(rested, begun), samples(begun, ended), samples(ended, done))
                     for speed, rested, begun, ended, done in drives
                 ]
                 named = member_name(place).partition(ANGLE)[0]

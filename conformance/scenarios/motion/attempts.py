@@ -223,9 +223,8 @@ class _Sender:
     def send_without_lease(self, values: dict[str, Any]) -> Iterator[Tried]:
         """Send a command of a client that has no lease, and of one with a token that is not the lease."""
         made, lease = self.mapped.request_of(self.given, values), self.mapped.ready.lease
-        for other, how in (("", "without"), (lease[::-1], "with a token that is not")):
-            if other == lease:
-                continue
+        others = {"": "without", lease[::-1]: "with a token that is not"}
+        for other, how in ((other, how) for other, how in others.items() if other != lease):
             target = made.target.replace(quote(lease, safe=""), quote(other, safe=""))
             body, texts = made.body.replace(lease.encode(), other.encode()), {lease: other}
             headers = tuple((name, text) for name, value in made.headers if (text := texts.get(value, value)))
