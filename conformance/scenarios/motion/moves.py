@@ -176,8 +176,8 @@ def _to_stops(mapped: MappedDevice, effort: Effort, rests_s: float) -> Iterator[
             under_way = leg.was_under_way(name, tolerance) or not mapped.is_near(leg.readings[-1].values, goal)
             if under_way and not leg.commands[1].was_late(leg.readings):
                 break
-            # One that arrives sooner than it is seen on its way is stopped at once.
-            part = part if under_way else 0.0
+            # One that arrives sooner than it is seen on its way is stopped at once in the end.
+            part = part if under_way else part / TRIES if part == _UNDER_WAY else 0.0
 
 
 def _stop_under_way(mapped: MappedDevice, name: str, part: float, rests_s: float) -> Leg:
