@@ -123,13 +123,13 @@ class Looks:
             path: of the operation that commands them.
             operations: those that are read.
         """
-        told = {operation: self._named(operation, numbers, path) for operation in operations}
+        told = {operation: self._named_places(operation, numbers, path) for operation in operations}
         found: dict[str, tuple[str, str]] = {}
         for operation in sorted(told, key=lambda operation: -len(told[operation])):
             found = {name: (operation, place) for name, place in told[operation].items()} | found
         return found
 
-    def _named(self, operation: str, numbers: Sequence[Commanded], path: str) -> dict[str, str]:
+    def _named_places(self, operation: str, numbers: Sequence[Commanded], path: str) -> dict[str, str]:
         """Return the places of an operation's numbers, by the name of the commanded number they share."""
         places, found = self.places(operation), dict[str, str]()
         for number in numbers:
