@@ -29,9 +29,10 @@ if hasattr(signal, "SIGQUIT"):
 # minutes, the modules named here take one to three, and tests of these folders start whole commands.
 _LONGEST = (
     "test_ros_gateway.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py", "test_lost_device.py",
-    "test_servers.py", "test_things_that_end.py", "test_hanging_operations.py", "test_stateful_devices.py",
-    "test_motion_drive.py", "test_wheel.py", "test_web_servers.py", "test_gateway.py",
-    "test_load_secrets.py", "test_certify_command.py", "test_soap.py", "test_bombs.py",
+    "test_hostile_devices.py", "test_secrets.py", "test_servers.py", "test_things_that_end.py",
+    "test_stateful_devices.py", "test_hanging_operations.py", "test_motion_drive.py", "test_wheel.py",
+    "test_web_servers.py", "test_gateway.py", "test_load_secrets.py", "test_certify_command.py", "test_soap.py",
+    "test_bombs.py",
 )  # fmt: skip
 _OF_COMMANDS = {
     "ci", "cli", "described", "first_verdict", "fleet", "hostile", "loadtests", "motion", "ros", "selftest", "soap",
@@ -46,7 +47,7 @@ _HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in ("comm
 #: Their tests share nothing, and wait for most of their minutes.
 _APART = (
     "test_ros_gateway.py", "test_ros_proposals.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py",
-    "test_lost_device.py", "test_things_that_end.py", "test_hanging_operations.py", "test_bombs.py",
+    "test_lost_device.py", "test_secrets.py", "test_things_that_end.py", "test_hanging_operations.py", "test_bombs.py",
     "test_certify_command.py", "test_endings.py",
 )  # fmt: skip
 

@@ -89,8 +89,8 @@ def test_a_fleet_s_member_with_digest_authentication_and_a_login(tmp_path, kept)
             encoding="utf-8",
         )
         (tmp_path / "fleet.toml").write_text('[[robot]]\nstatement = "robot.toml"\n', encoding="utf-8")
-        command = ("certify", "--fleet", tmp_path / "fleet.toml", "--effort", "quick", "--out", tmp_path / "out")
-        done = ended(sys.executable, "-m", "roaas", *command)
+        options = ("--class", "robustness", "--effort", "quick", "--out", tmp_path / "out")
+        done = ended(sys.executable, "-m", "roaas", "certify", "--fleet", tmp_path / "fleet.toml", *options)
     assert done.returncode == 1, done.stdout + done.stderr
     (log,) = (tmp_path / "out").rglob("certify.log")
     assert "robustness/no-server-error" in log.read_text(encoding="utf-8")

@@ -1,10 +1,14 @@
-"""The contract's WSDLs load in zeep, are what the paper prints, and their XSD is valid by itself."""
+"""The WSDLs load in zeep and are what the paper prints, their XSD is valid, and all files have the same fields."""
+
+import re
 
 import pytest
 import xmlschema
 from lxml import etree
 from zeep import Client
 
+from conformance.contract.pack import Contract
+from conformance.papers_robot import delivery
 from conformance.papers_robot.delivery import XSD_FIELDS
 from conformance.papers_robot.statement import CONTRACT_DIR
 
@@ -61,3 +65,16 @@ def test_the_delivery_message_has_the_fields_of_the_paper_in_order():
     for name in ("ExecuteCoffeeRequest", "ExecuteDeliveryRequest"):
         (argument,) = schema.elements[name].type.content.iter_elements()
         assert (argument.name, argument.min_occurs) == ("arg0", 0)
+
+
+def test_the_path_of_the_openapi_description():
+    paths = Contract.load().openapi["paths"]
+    path = next(path for path in paths if "/depot_x/" in path)
+    assert tuple(re.findall(r"/(\w+)/\{", path))[1:] == delivery.PATH_NAMES
+    code = next(item for item in paths[path]["put"]["parameters"] if item["name"] in {"code", "message_code"})
+    assert code["schema"]["enum"] == [delivery.COURIER, delivery.COFFEE]
+
+
+def test_every_form_has_the_same_fields():
+    assert set(delivery.MESSAGE_FIELDS) == set(delivery.XSD_FIELDS)
+    assert tuple(delivery.EXAMPLE) == delivery.COORDINATES

@@ -119,6 +119,14 @@ def test_an_idempotent_request_on_a_connection_that_the_server_closed_is_sent_ag
     assert (client.connection.resent, client.connection.sent) == (1, 3)
 
 
+def test_where_the_run_allows_it_a_request_that_may_act_twice_is_sent_again_as_well(stale):
+    server, client = stale
+    client.connection.resends = True
+    client.send("GET", "/")
+    assert client.send("POST", "/").response.status == 204
+    assert server.seen == ["GET", "POST", "POST"]
+
+
 def test_that_never_becomes_a_failure_however_often_it_happens(stale):
     _, client = stale
     for _ in range(30):
@@ -134,17 +142,19 @@ def test_a_request_that_is_not_idempotent_and_was_read_is_not_sent_again(stale):
     assert (server.seen, client.connection.resent) == (["GET", "POST"], 0)
 
 
-def test_a_connection_that_is_closed_again_is_told_with_the_response_before(stale):
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_a_connection_that_is_closed_again_is_told_with_the_response_before(stale, method):
     server, client = stale
+    client.connection.resends = method == "POST"
     client.send("GET", "/")
     with pytest.raises(NoAnswerError) as none:
-        client.send("GET", "/broken")
+        client.send(method, "/broken")
     assert none.value.kind is NoAnswer.CLOSED
     assert str(none.value) == (
         "the server closed the connection without a response, 2 of 2 times; "
         "the request before it on the first connection was answered 204"
     )
-    assert server.seen == ["GET", "GET", "GET"]
+    assert server.seen == ["GET", method, method]
 
 
 def test_the_first_request_of_a_connection_is_sent_once(stale):
@@ -179,6 +189,27 @@ def test_a_request_that_nobody_can_have_read_is_sent_again_whatever_its_method()
         assert client.connection.resent == 1
         client.close()
         thread.join()
+
+
+def test_a_server_that_is_gone_after_a_request_has_closed_its_connection():
+    def serve() -> None:
+        connection, _ = server.accept()
+        with connection:
+            connection.recv(65536)
+            connection.sendall(b"HTTP/1.1 204 No Content\r\n\r\n")
+            connection.recv(65536)
+            server.close()
+
+    server = socket.create_server(("127.0.0.1", 0))
+    client = HttpClient(f"http://127.0.0.1:{server.getsockname()[1]}", Connection(timeout_s=60))
+    thread = threading.Thread(target=serve)
+    thread.start()
+    client.send("GET", "/")
+    with pytest.raises(NoAnswerError, match="accepts no other connection") as gone:
+        client.send("GET", "/last")
+    thread.join()
+    assert gone.value.kind is NoAnswer.CLOSED
+    assert [one.kind for one in client.connection.recent] == [None, NoAnswer.CLOSED]
 
 
 def test_what_several_clients_send_again_is_counted(stale):

@@ -1,7 +1,10 @@
-"""Requests and responses as values."""
+"""What an exchange is told as, and what is in a content that is coded."""
+
+import gzip
 
 import pytest
 
+from conformance.transport.codings import content_of
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 
 
@@ -33,3 +36,10 @@ def test_the_size_of_a_request_by_hand_is_that_of_its_bytes():
 )
 def test_requests_to_one_resource_have_one_endpoint(request_, endpoint):
     assert request_.endpoint == endpoint
+
+
+def test_members_of_gzip_are_one_content_up_to_a_hundred():
+    member = gzip.compress(b"a")
+    assert content_of(member * 99, "gzip", is_whole=True).octets == b"a" * 99
+    many = content_of(member * 100_000, "gzip", is_whole=True)  # each member copies what is left
+    assert (many.is_plain, many.octets) == (False, member * 100_000)

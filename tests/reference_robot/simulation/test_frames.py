@@ -1,11 +1,14 @@
-"""What RViz and Nav2 need of the simulated robot: its frames, and its map."""
+"""What ROS, RViz and Nav2 need of the simulated robot: its odometry, its frames and its map."""
 
 import numpy as np
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import OccupancyGrid, Odometry
 from observer import until
+from rclpy.serialization import deserialize_message
 from tf2_msgs.msg import TFMessage
 
-from reference_robot.simulation.messages import LATCHED
+from reference_robot.simulation.base import SerializedOdometry
+from reference_robot.simulation.kinematics import Motion
+from reference_robot.simulation.messages import LATCHED, quaternion_of
 from reference_robot.simulation.office import DEPOT, DESTINATION, OFFICE, SOURCE
 
 
@@ -44,3 +47,19 @@ def test_frames_and_map_are_told(robot):
     for x_min, y_min, x_max, y_max in OFFICE.boxes:
         assert cell((x_min + x_max) / 2, (y_min + y_max) / 2) == 100
     assert 0.05 < (cells == 100).mean() < 0.3
+
+
+def test_filled_octets_are_the_message_whatever_the_frames_and_the_numbers():
+    for frame in ("odom", "o", "robot_7/odometry"):  # the doubles begin wherever the strings end
+        message = Odometry(child_frame_id=f"{frame}_base")
+        message.header.frame_id = frame
+        message.pose.covariance = [0.1 * number for number in range(36)]
+        message.twist.covariance = [-0.2 * number for number in range(36)]
+        octets = SerializedOdometry(message)
+        for motion in (Motion(0.1, -0.2, 3.1, 0.7, -2.5), Motion(5e-324, -0.0, 0.0)):
+            message.header.stamp.sec, message.header.stamp.nanosec = stamp = 2_000_000_000, 999_999_999
+            message.pose.pose.position.x, message.pose.pose.position.y = motion.x, motion.y
+            message.pose.pose.orientation = quaternion_of(motion.yaw)
+            message.twist.twist.linear.x, message.twist.twist.angular.z = motion.linear, motion.angular
+            # As text, which tells -0.0 from 0.0.
+            assert repr(deserialize_message(octets.fill(stamp, motion), Odometry)) == repr(message)

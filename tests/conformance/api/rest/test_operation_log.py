@@ -1,9 +1,10 @@
 """What a run sent to the operations of a described API."""
 
+import pytest
 from small_device import contract_of
 
 from conformance.api.call_rules import CallRules
-from conformance.api.rest.operation_log import OperationLog
+from conformance.api.rest.operation_log import OperationLog, branches_in, branches_of
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.finding import Finding, Showing
 
@@ -62,3 +63,24 @@ def test_the_matrix_counts_what_was_sent_and_seen(tmp_path):
     assert [one["called"] for one in (joints, delete, state)] == [True, False, True]
     assert document["coverage"] == {"operations": [1, 3], "parameters": [2, 2], "statuses": [1, 3], "branches": [1, 4]}
     assert (document["title"], document["version"]) == ("Arm", "2")
+
+
+POSE = {"type": "object", "properties": {"x": {"type": "number"}, "frame": {"type": "string"}}}
+
+
+@pytest.mark.parametrize(
+    ("schema", "value", "shown", "hidden"),
+    [
+        ({}, {"a": 1}, set(), set()),
+        (POSE, {"x": 1}, {".x"}, {".frame"}),
+        ({"type": "array", "items": POSE}, [{"x": 1}, {"frame": "map"}], {"[].x", "[].frame"}, set()),
+        ({"anyOf": [POSE, {"type": "null"}]}, None, {"|anyOf 1"}, {"|anyOf 0", "|anyOf 0.x", "|anyOf 0.frame"}),
+        ({"allOf": [POSE]}, {"frame": "map"}, {".frame"}, {".x"}),
+        ({"properties": {"pose": POSE}}, {"pose": {"x": 1}}, {".pose", ".pose.x"}, {".pose.frame"}),
+        (POSE, [1, 2], set(), {".x", ".frame"}),
+        ({"oneOf": [{"pattern": "("}]}, "a", set(), {"|oneOf 0"}),
+    ],
+)
+def test_a_value_shows_some_of_a_schemas_branches(schema, value, shown, hidden):
+    assert set(branches_in(schema, value)) == shown
+    assert set(branches_of(schema)) == shown | hidden
