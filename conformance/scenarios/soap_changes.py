@@ -16,6 +16,7 @@ from itertools import islice, starmap
 from typing import Final
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.references import singular
 from conformance.api.soap.forms import another, boundless, extreme, rewritten, shortest
 from conformance.api.soap.messages import declarations, derivations, ordinary, simple_leaves, with_text
 from conformance.api.soap.mutations import branches, invalid_ones, mutations
@@ -51,7 +52,9 @@ _REFUSALS: Final = 3
 _LASTING: Final = 2
 _THINGS: Final = 3
 # _READS: successive reads of each operation. _ROUNDS: rounds of simultaneous reads. Both at quick and at other efforts.
+# _FEW: reads and changes of things that `soap_things` reads and changes.
 _READS: Final = (18, 60)
+_FEW: Final = 5
 _ROUNDS: Final = (6, 30)
 # Number of the change whose text is beyond ASCII.
 _BEYOND_ASCII: Final = 3
@@ -112,12 +115,14 @@ class _Changes:
     def write(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
         """Write other values repeatedly, read them, and restore the first ones."""
         readers = [one for one in self.acts if one[0].shows(act)]
+        # What a list shows of one thing is compared by `soap_things`.
+        readers = [one for one in readers if one[0].needs] or readers
         if not readers:
             return
         until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
         keys = {name for one, _, _ in readers for name in one.sent}
         forms = _forms_of(declared, node)
-        turns, refusals, whole, leaves = _TURNS[not self._is_quick], 0, *forms[0]
+        turns, refusals, whole, leaves = min(_TURNS[not self._is_quick], self._reads(act)), 0, *forms[0]
         made = whole
         for turn in range(turns):
             if time.monotonic() > until:
@@ -150,7 +155,7 @@ class _Changes:
             left_s = time.monotonic()
             yield
             until += time.monotonic() - left_s
-        self._read(readers, made, times=_READS[not self._is_quick])
+        self._read(readers, made, times=self._reads(act))
         node, free = whole, [one for one in leaves if whole.at(one[0]).name.lower() not in keys]
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
             plain = self.caller.ask(act, other, "a message with other values")
@@ -265,7 +270,7 @@ class _Changes:
             for path in node.paths()
             if node.at(path).name.lower() in {n for one, _, _ in readers for n in one.sent}
         ]
-        if len(keys) != 1:
+        if len(keys) != 1 or self._is_made(act):
             return
         name = node.at(keys[0]).name
         own = node.at(keys[0]).text
@@ -324,6 +329,15 @@ class _Changes:
         if named:
             self.caller.ask(act, with_text(node, named[0], id_), "the id of what was created")
 
+    def _is_made(self, act: Act) -> bool:
+        """Return whether an operation is for things that are created and removed, which `soap_things` does often."""
+        made, gone = ({one.noun for one, _, _ in self.by_role(role)} for role in (Role.CREATES, Role.REMOVES))
+        return not (made & gone).isdisjoint({singular(act.noun), act.noun})
+
+    def _reads(self, act: Act) -> int:
+        """Return how often an operation is called at most."""
+        return _FEW if self._is_made(act) else _READS[not self._is_quick]
+
     def read_often(self) -> None:
         """Read again and again, one after another and at the same moment."""
         # Values that writes change were read as often beside them.
@@ -333,7 +347,7 @@ class _Changes:
             for says, made in _bounded(declared, node) if declared and node else ():
                 self.caller.ask(act, made, says)  # there may be nothing of that number
             own = [(act, node), *((act, made) for made in self._about_another(act, declared, node))]
-            for turn in range(0 if any(map(act.shows, written)) else _READS[not self._is_quick]):
+            for turn in range(0 if any(map(act.shows, written)) else self._reads(act)):
                 self.caller.ask(act, own[turn % len(own)][1], "a valid message", Kind.USUAL)
             asked += own
         if len(asked) > 1:
