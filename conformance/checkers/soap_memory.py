@@ -1,4 +1,4 @@
-"""Judge the effects of SOAP operations that write, create and remove by others that read: SetGain by GetGain.
+"""Judge what SOAP operations write by others that read it, as SetGain by GetGain, and things as REST's are judged.
 
 Names alone blame nobody. A value has to be read as it was written only where two other values were, for as long, and
 only within what was kept so far: a device may limit a number, reach a target slowly, or let a command expire.
@@ -19,7 +19,7 @@ from lxml import etree
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.soap.resources import BASE, Resources, SoapExchange
-from conformance.api.soap.roles import KEEPS, MAKERS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
+from conformance.api.soap.roles import KEEPS, REFERS, SETTLES_S, Act, Role, acts_of, payload_of, texts_of
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.rest import Histories
 from conformance.documents.openapi import matching
@@ -38,8 +38,6 @@ _LOST: Final = 6
 _FEW: Final = 3
 _MOST: Final = 1_000
 _FAILED: Final = 500
-# Things of a list that are compared one by one.
-_ITEMS: Final = 50
 # What programs write in place of a text that is not there.
 _NO_TEXTS: Final = frozenset({"None", "null", "nil", "undefined", "NULL"})
 # Values that are as good as none.
@@ -123,12 +121,15 @@ class SoapMemory:
         self._types, self._paths = found.types, {urlsplit(port.url).path for port in found.ports}
         acts = acts_of(found)
         self._acts = {(urlsplit(act.port.url).path, act.operation.request): act for act in acts}
-        self._writers = {act.label: [one for one in acts if act.shows(one)] for act in acts}
+        shown = {act.label: [one for one in acts if act.shows(one)] for act in acts}
+        self._writers = {label: [one for one in some if one.role is Role.WRITES] for label, some in shown.items()}
         # Names of the elements by which a write identifies its thing.
         self._keys = {
             writer.label: {name for act in acts if act.shows(writer) for name in act.sent.keys() & writer.names.keys()}
             for writer in acts
         }
+        # Those by which others identify what an operation reads.
+        self._identifying = {label: [self._keys[one.label] for one in some] for label, some in shown.items()}
         self._written: dict[str, list[_Write]] = defaultdict(list)
         self._past: dict[tuple[str, str, str], _Past] = defaultdict(_Past)
         # What identified a thing in a response, by name.
@@ -145,7 +146,7 @@ class SoapMemory:
         act = self._acts.get((path, str(payload.tag))) if payload is not None else None
         if payload is None or act is None or not isinstance(attempt, Exchange):
             if not isinstance(attempt, Exchange) and not (act and act.role is Role.READS):
-                self._forget()
+                self._written.clear()
             return
         response, sent = attempt.response, texts_of(payload)
         answer = payload_of(response.body, response.header("content-type") or "")
@@ -157,22 +158,15 @@ class SoapMemory:
             if response.ok and answer is not None and not is_fault:
                 yield from self._judge_id(act, attempt, sent, told)
                 yield from self._values(act, attempt, sent, told)
-                # The items of a list tell what was written to each.
-                items = list(map(texts_of, answer.iterdescendants(etree.Element))) if not sent else []
-                for item in items if len(items) <= _ITEMS else ():
-                    yield from self._values(act, attempt, item, item)
             return
         self._changes += 1
         if is_fault:
             self._keep_refused(act, sent)
         elif not response.ok or self._types.invalid(payload):
-            self._forget()
+            self._written.clear()
         else:
             nil = {local(str(one.tag)).lower() for one in payload.iter(etree.Element) if one.get(_NIL) in {"true", "1"}}
             self._keep_done(act, attempt, sent, told, nil - act.emptied)
-
-    def _forget(self) -> None:
-        self._written.clear()
 
     def _keep_refused(self, act: Act, sent: _Texts) -> None:
         for write in self._written[act.label]:
@@ -186,33 +180,27 @@ class SoapMemory:
         """
         at_s, keys = exchange.response.received_s, self._keys[act.label]
         others: list[_Write] = []
-        if act.role is Role.WRITES or act.role in MAKERS:
-            named = sent if act.role is Role.WRITES else told
-            key = {name: texts[0] for name, texts in named.items() if name in keys and len(texts) == 1}
+        if act.role is Role.WRITES:
+            key = {name: texts[0] for name, texts in sent.items() if name in keys and len(texts) == 1}
             before = [write for write in self._written[act.label] if write.key == key and act.keeps]
-            names = sent.keys() & act.sent.keys() - keys - unsaid
-            if act.role is Role.OTHER:
-                names = {name for name in names if REFERS.search(name)}  # what it does may change all else
-            values = {name: _join(told.get(name, sent[name])) for name in names}
+            values = {name: _join(told.get(name, sent[name])) for name in sent.keys() & act.sent.keys() - keys - unsaid}
             earlier = {name: text for write in before for name, text in write.values.items() if name not in unsaid}
-            values = {**earlier, **values}
             others = [write for write in self._written[act.label] if write.key != key][-_MOST:]
-            others += [_Write(key, values, at_s)] if key or act.role is Role.WRITES else []
+            others.append(_Write(key, {**earlier, **values}, at_s))
         self._written.clear()
         self._written[act.label] = others
 
     def _values(self, act: Act, exchange: Exchange, sent: _Texts, told: _Texts) -> Iterator[Case]:
-        """Judge what was written before by a response, or by one item of a list in place of request and response."""
+        """Judge what was written before by a response."""
         for writer in self._writers[act.label]:
-            if sent is not told and not sent.keys() <= self._keys[writer.label]:
+            if not sent.keys() <= self._keys[writer.label]:
                 continue
             for write in self._written[writer.label]:
-                is_other = any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items())
-                if is_other or (sent is told and not write.key):
+                if any(sent.get(name, told.get(name)) != [text] for name, text in write.key.items()):
                     continue
                 for name, text in write.values.items():
-                    # A part of a list may lack what the other parts have, and a program may leave out 0 and false.
-                    has_it = text not in _NOTHING and name in act.told and sent is not told
+                    # A program may leave out 0 and false.
+                    has_it = text not in _NOTHING and name in act.told
                     if texts := told.get(name) or ([act.told[name].default] if has_it else []):
                         yield from self._judge_value(act, writer, write, name, exchange, _join(texts), text)
                 for name in writer.sent.keys() & told.keys() - write.values.keys() - write.key.keys():
@@ -247,8 +235,7 @@ class SoapMemory:
         if not is_shown:
             write.late.add(name)
         is_refused = is_shown and any(is_alike(simple, one, got) for one in write.refused.get(name, ()))
-        is_begun = writer.role is Role.OTHER
-        if age_s < SETTLES_S and not is_shown and not is_begun:
+        if age_s < SETTLES_S and not is_shown:
             return
         past.lost = [*past.lost, got][-_LOST:]
         others = [other for other in past.kept if other != text]
@@ -262,15 +249,13 @@ class SoapMemory:
             and len(others) + is_shown >= _KEPT
             and (is_shown or text in past.kept or _is_usual(simple, text, others) or _is_cut(simple, text, got))
         )
-        if is_begun:  # what was begun for one thing is not about another one
-            has_to = not is_shown and got in others
         is_ignored = self._is_ignored(act, writer, past, name)
         if has_to or is_ignored or is_merged:
             requirement = "soap/refused-keeps" if is_refused else "soap/written-is-read"
             expected += ": what was written later was refused" if is_refused else ""
             cause = f"{writer.label} {name}"
             found = case(requirement, False, exchange, expected, f"{name} {got!r}", cause)  # noqa: FBT003 - see Case
-            past.pending = [*past.pending, (0.0 if is_ignored or is_begun or is_merged else age_s, got, found)][-_MOST:]
+            past.pending = [*past.pending, (0.0 if is_ignored or is_merged else age_s, got, found)][-_MOST:]
             yield from past.overdue_cases(past.longest(got), _BETWEEN)
 
     def _is_ignored(self, act: Act, writer: Act, past: _Past, name: str) -> bool:
@@ -298,9 +283,7 @@ class SoapMemory:
             # It was told before, for the same message, and so was what is told now, for another one.
             is_another = all(past.kept.get(texts[name][0]) == self._changes for texts in (sent, told))
             stem = REFERS.sub("", name)
-            is_its = bool(stem) and (
-                stem == act.noun or any(name in self._keys[one.label] for one in self._writers[act.label])
-            )
+            is_its = bool(stem) and (stem == act.noun or any(name in keys for keys in self._identifying[act.label]))
             is_its = is_its and len(sent) == 1 and (name, sent[name][0]) in self._given
             if holds:
                 past.kept[sent[name][0]] = float(self._changes)
