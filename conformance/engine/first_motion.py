@@ -47,9 +47,8 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
     What is sent and what is read are taken for one axis if they have the same name.
     """
     reading = [item for item in operations if item.method == "GET" and item.shape]
-    sending = [
-        (item, numbers) for item in map(with_query, operations) if _acts(item) and (numbers := commanded_by(item))
-    ]
+    acting = [with_query(item) for item in operations if not (item.safe or item.never)]
+    sending = [(item, numbers) for item in acting if (numbers := commanded_by(item))]
     goes = _best(reading, [one for one in sending if not is_velocity(*one) and _GOES.search(one[0].label)], _position)
     drives = _best(reading, [one for one in sending if is_velocity(*one)], _velocity)
     goes = goes or max(
@@ -130,10 +129,6 @@ def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
         if body is not None:
             yield f"body = {inline(template_of(body, {}))}  # an id of the move: " + '"{goto:/id}"'
         yield "rests_within_s = 0.5"
-
-
-def _acts(operation: Operation) -> bool:
-    return not operation.safe and not operation.never
 
 
 def _belongs(state: Operation, sent: Operation) -> bool:

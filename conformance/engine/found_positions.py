@@ -167,7 +167,8 @@ class PositionFinder(Finder):
                     name: side * way for name, way in ways.items() if self._has_room(name, start[name] + side * way)
                 }
                 moved = self._move_axes(start, room, ways) if room else None
-                lost |= room.keys() - moved.keys() if moved is not None else set()
+                # What stays where it is on one side may stand at an end of its travel.
+                lost |= room.keys() - moved.keys() if moved is not None and not self._stood else set()
                 for name, one in (moved or {}).items() if side or found else ():
                     found.setdefault(name, []).append(one)
             found = {name: own for name, own in found.items() if name not in lost}
@@ -193,8 +194,8 @@ class PositionFinder(Finder):
 
     def _limits(self, number: Commanded) -> tuple[float, float] | None:
         """Return the limits of a position that are declared, or read beside it; or None."""
-        declared = bounds_of(self._schemas[number.name]) or (None if self._relative else number.bounds)
-        return declared or self._limits_beside(number.name)
+        told = bounds_of(self._schemas[number.name])
+        return told or (None if self._relative else number.bounds) or self._limits_beside(number.name)
 
     def _limits_beside(self, name: str) -> tuple[float, float] | None:
         """Return the limits that a reading has beside a position; or None."""
@@ -256,13 +257,15 @@ class PositionFinder(Finder):
                 last = [value for _, value in self._samples(name, sent)[-SEVERAL:]]
                 if len(last) == SEVERAL and all(abs(value - goals[name]) < near[name] for value in last):
                     took_s.setdefault(name, self._clock.now() - sent)
-            if len(took_s) == len(ways):
+            ends = self._ends()
+            has_moved = any(abs(ends[name] - before[name]) > near[name] for name in ways)
+            if len(took_s) == len(ways) or (has_moved and now > sent + _PAUSES_S and not self._moves()):
                 break
         self._watch(_BEFORE_S)
         ends = self._ends()
         self._gone = {name: ends[name] - start[name] for name in ends} if self._relative and not took_s else self._gone
         if any(ways.values()):
-            self._stood = all(abs(ends[name] - before[name]) < near[name] / 2 for name in ways)
+            self._stood = all(abs(ends[name] - start[name]) < near[name] / 2 for name in ways)
         beside = {
             one.name: f"with it {one.name} went from {start[one.name]:.4g} to {ends[one.name]:.4g}"
             for one in self._numbers.values()

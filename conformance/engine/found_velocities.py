@@ -58,10 +58,9 @@ class VelocityFinder(Finder):
             responses = self._responses()
             shown = self._measures(responses)
             name, (place, response) = next(iter(shown.items()))
-            settle_s = self._settle_s
             numbers = {command.name: command for command in self._plan.numbers}
             hold_s = self._hold_s(numbers[name], place, response)
-            settle_s = max(settle_s, *(self._rises_s(numbers[name], *seen) for name, seen in shown.items()))
+            settle_s = max(self._settle_s, *(self._rises_s(numbers[name], *seen) for name, seen in shown.items()))
         finally:
             self._command({})
         self.lines = list(self._lines(responses, shown, settle_s, hold_s))

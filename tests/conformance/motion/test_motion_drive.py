@@ -288,8 +288,8 @@ _NUMBER = {"type": "number"}
 class Slide:
     """A slide that is sent to a position; ``shows_end``: it tells where it is only once it has arrived."""
 
-    def __init__(self, clock, speed, *, shows_end=False):
-        self.clock, self.speed, self.shows_end = clock, speed, shows_end
+    def __init__(self, clock, speed, *, shows_end=False, least=-1.0):
+        self.clock, self.speed, self.shows_end, self.least = clock, speed, shows_end, least
         self.start = self.goal = self.since = 0.0
 
     def answer(self, method, path, octets):
@@ -297,11 +297,11 @@ class Slide:
         here = self.goal if done >= abs(way) else self.start + (0.0 if self.shows_end else math.copysign(done, way))
         if method == "PUT":
             self.start, self.since = here, self.clock.now()
-            self.goal = json.loads(octets)["x"] if path == "/goto" else here
+            self.goal = max(self.least, json.loads(octets)["x"]) if path == "/goto" else here
         return 200, {"x": here}
 
 
-def _slide(speed, *, shows_end=False):
+def _slide(speed, **more):
     """Return the map that is found of a slide, and how its stops are judged."""
     goto = {"type": "object", "properties": {"x": _NUMBER}, "required": ["x"]}
     told = {"200": {"content": {"application/json": {"schema": goto}}}}
@@ -309,19 +309,20 @@ def _slide(speed, *, shows_end=False):
     paths = {"/goto": {"put": move}, "/stop": {"put": {"responses": told}}, "/state": {"get": {"responses": told}}}
     operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": paths})
     clock = SimulatedClock()
-    api = Api(Slide(clock, speed, shows_end=shows_end), clock, lambda: 0.002)
+    api = Api(Slide(clock, speed, **more), clock, lambda: 0.002)
     plan = plan_of(operations, "PUT /goto", None, CallRules())
     motion = map_of("\n".join(PositionFinder(api, Binding(api), plan, clock).find().lines))
     given = {"mapped": MappedDevice(api, motion, clock, Binding(api)), "effort": Effort("quick"), "motion": motion}
     return motion, list(stop_rests.outcomes(stops.play(**{name: given[name] for name in stops.fixtures}), given.get))
 
 
-@pytest.mark.parametrize(("speed", "shows_end", "least", "most"), [(0.5, False, 0.15, 0.5), (0.003, True, 0.01, 0.02)])
-def test_what_is_fast_is_sent_so_far_that_it_can_be_stopped_and_what_shows_its_end_alone_is_stopped_at_once(
-    speed, shows_end, least, most
-):
-    motion, outcomes = _slide(speed, shows_end=shows_end)
-    assert least <= max(motion.state.axes["x"].limits) <= most
+@pytest.mark.parametrize(
+    ("speed", "how", "limits"),
+    [(0.5, {}, (-0.19, 0.19)), (0.5, {"least": 0.0}, (0.0, 0.31)), (0.003, {"shows_end": True}, (0.0, 0.01))],
+)
+def test_a_slide_is_sent_so_far_that_it_can_be_stopped_from_an_end_of_its_travel_too(speed, how, limits):
+    motion, outcomes = _slide(speed, **how)
+    assert motion.state.axes["x"].limits == pytest.approx(limits, abs=0.05)
     assert {getattr(one, "holds", None) for one in outcomes} == {True}
 
 
