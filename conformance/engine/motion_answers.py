@@ -159,7 +159,7 @@ def _vanishes(motion: MotionMap, recordings: Recordings) -> tuple[str, str]:
     if on:
         return on, picture
     seen = [f"{took_s:.2f} s ({way.removeprefix('and ')})" for way, took_s in said.items() if took_s >= 0]
-    return f"it went on for {', '.join(seen)}" if seen else "", picture
+    return f"it went on for at most {', '.join(seen)}" if seen else "", picture
 
 
 def _drives_on(drive: Drive, motion: MotionMap) -> bool:
@@ -184,7 +184,8 @@ def _rested_s(drive: Drive, since: float, motion: MotionMap) -> float | None:
             for reading in drive.after
             if abs(reading.speeds.get(name, 0.0)) > _DRIVES_ON * abs(drive.wanted[name])
         ]
-        return max(moving) - since if moving else 0.0 if drive.after[0].sent - since < 0.1 else None  # noqa: PLR2004
+        # Nobody looks while a client is silent: then it rested when it was seen next.
+        return (max(moving) if moving else drive.after[0].sent) - since
     under_way, after = _samples(drive.under_way, speed.of), _samples(drive.after, speed.of)
     rate = slope(under_way[len(under_way) // 2 :])
     if not rate or len(after) < SEVERAL:
