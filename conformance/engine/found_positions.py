@@ -331,9 +331,10 @@ class PositionFinder(Finder):
             )
             declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
-            speeds = [one for at, one in numbers_in(body_schema(self._plan.drive) or {}) if FAST.search(at)]
-            if given["unit"] and (same := [one for one in speeds if unit_of("", one) == given["unit"]]):
-                given |= {"speed": ends[1]} if (ends := bounds_of(same[0])) else {}
+            speeds = [Commanded("", *one, turns=False) for one in numbers_in(body_schema(self._plan.drive) or {})]
+            for one in speeds:
+                if FAST.search(one.place) and one.bounds and one.has_unit and unit_of("", one.schema) == given["unit"]:
+                    given |= {"speed": one.bounds[1]} if given["unit"] else {}
             source = "as declared" if declared else "none are declared; so far it was seen to go"
             if declared and limits[name] != declared:
                 given["accepts"], source = list(declared), "nearby, as the declared ones are far away"

@@ -301,9 +301,9 @@ class Slide:
         return 200, {"x": here}
 
 
-def _slide(speed, **more):
-    """Return the map that is found of a slide, and how its stops are judged."""
-    goto = {"type": "object", "properties": {"x": _NUMBER}, "required": ["x"]}
+def _slide(speed, members=None, **more):
+    """Return the map that is found of a slide whose moves have these members, and how its stops are judged."""
+    goto = {"type": "object", "properties": {"x": _NUMBER, **(members or {})}, "required": ["x"]}
     told = {"200": {"content": {"application/json": {"schema": goto}}}}
     move = {"requestBody": {"content": {"application/json": {"schema": goto}}}, "responses": told}
     paths = {"/goto": {"put": move}, "/stop": {"put": {"responses": told}}, "/state": {"get": {"responses": told}}}
@@ -324,6 +324,13 @@ def test_a_slide_is_sent_so_far_that_it_can_be_stopped_from_an_end_of_its_travel
     motion, outcomes = _slide(speed, **how)
     assert motion.state.axes["x"].limits == pytest.approx(limits, abs=0.05)
     assert {getattr(one, "holds", None) for one in outcomes} == {True}
+
+
+@pytest.mark.parametrize(("said", "most", "speed"), [("mm/s", 300, 300), ("percent of 500 mm/s", 100, None)])
+def test_a_declared_greatest_speed_of_a_move_is_that_of_its_axis(said, most, speed):
+    number = {"type": "number", "minimum": 1, "maximum": most, "description": said}
+    motion, _ = _slide(200.0, {"x": {**_NUMBER, "description": "mm"}, "speed": number})
+    assert motion.state.axes["x"].speed == speed
 
 
 def test_what_is_there_at_once_cannot_be_stopped_and_the_user_is_told_what_to_change():
