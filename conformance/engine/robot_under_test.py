@@ -77,6 +77,8 @@ class RobotUnderTest:
     _history: HistoryWriter | None = None
     _services: SoapServices | None = None
     _progress: TextIO | None = None
+    # Whether one of the first requests was not answered.
+    _hung: bool = False
     # Response to the last request that tested whether the device still responds.
     _answered: tuple[str, str] = ("", "")
 
@@ -238,6 +240,7 @@ class RobotUnderTest:
                 run.unreachable[name] = str(none)
                 if none.kind in {NoAnswer.REFUSED, NoAnswer.TLS}:
                     return
+                self._hung = True
                 self._tell(f"{name}: {method} {target}: {none}")
         # A hang before the checks was not judged: the checks send the request again.
         client.hangs.forget()
@@ -338,8 +341,8 @@ class RobotUnderTest:
         from conformance.scenarios.estimate import estimate  # noqa: PLC0415
 
         operations = [operation for operation in operations_of(run.contract) if CallRules.of(run).decide(operation).may]
-        # The first requests call no WSDL operation, so they do not show its response time.
-        measured = measured and SOAP not in run.contract.classes
+        # The first requests call no WSDL operation, so they do not show its response time; nor do those that hang.
+        measured = measured and not self._hung and SOAP not in run.contract.classes
         said = estimate(run, operations).text(run.effort.usual_ms if measured else None)
         return f"{said} It ends after about {run.limit.minutes:g} minutes." if run.limit.minutes is not None else said
 

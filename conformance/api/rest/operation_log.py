@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from http import HTTPStatus
 from types import MappingProxyType
 from typing import Any, Final
 from urllib.parse import parse_qsl
@@ -181,7 +182,12 @@ class OperationLog(Listener):
         reasons = {item: rules.decide(item) for item in operations_of(self._contract)}
         if any(record.succeeded for record in self._records.values()):
             return ""
-        if any(record.sent for record in self._records.values()):
+        if sent := [record for record in self._records.values() if record.sent]:
+            statuses = {status for record in sent for status in record.statuses}
+            if not statuses:
+                return "no operation was answered in time"
+            if self._services is None and min(statuses) >= HTTPStatus.INTERNAL_SERVER_ERROR:
+                return "no operation succeeded: each was answered 5xx"
             return "no operation succeeded; [values] in a statement names values that the device knows"
         # HEAD and OPTIONS do not make an operation count as called, because other checks send them too.
         if any(reason.may and item.method in {"HEAD", "OPTIONS"} for item, reason in reasons.items()):

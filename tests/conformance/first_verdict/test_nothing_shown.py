@@ -17,6 +17,10 @@ async def _unknown(_):
     return error(404, "no such valve")
 
 
+async def _broken(_):
+    return error(503, "no bus")
+
+
 def _judged(folder, paths, routes, *more):
     with small_device(described(paths), routes) as url:
         return certified(f"{url}/openapi.json", folder, *more)
@@ -38,12 +42,19 @@ def test_what_is_called_by_call_or_needs_no_operation_is_judged(tmp_path):
         assert outcome.result["verdict"] != "inconclusive", outcome.text
 
 
-def test_an_operation_that_never_succeeds_shows_nothing(tmp_path):
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (_unknown, "no operation succeeded; [values] in a statement names values"),
+        (_broken, "no operation succeeded: each was answered 5xx"),
+    ],
+)
+def test_an_operation_that_never_succeeds_shows_nothing(tmp_path, answer, why):
     valve = {"parameters": [{"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}]}
     paths = {"/valves/{id}": {**reading({"type": "object"}), **valve}}
-    outcome = _judged(tmp_path, paths, {"/valves/{id}": {"GET": _unknown}})
+    outcome = _judged(tmp_path, paths, {"/valves/{id}": {"GET": answer}}, "--class", "http")
     assert (outcome.exit_code, outcome.blamed) == (4, {}), outcome.text
-    assert "no operation succeeded; [values] in a statement names values" in outcome.text
+    assert why in outcome.text
 
 
 def test_a_soap_device_that_answers_faults_only_is_inconclusive(tmp_path):

@@ -84,3 +84,13 @@ POSE = {"type": "object", "properties": {"x": {"type": "number"}, "frame": {"typ
 def test_a_value_shows_some_of_a_schemas_branches(schema, value, shown, hidden):
     assert set(branches_in(schema, value)) == shown
     assert set(branches_of(schema)) == shown | hidden
+
+
+def test_operations_that_nothing_answered_are_told(tmp_path):
+    log = OperationLog(contract_of(tmp_path, API), BASE)
+    log.on_no_response(Unanswered(Request("GET", f"{BASE}/state"), "hung", NoAnswer.CLOSED))
+    assert log.nothing_shown(CallRules()) == "no operation was answered in time"
+    log.on_response(exchange("/state", status=404))
+    assert "[values]" in log.nothing_shown(CallRules())
+    log.on_response(exchange("/state"))
+    assert log.nothing_shown(CallRules()) == ""
