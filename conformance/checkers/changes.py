@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import unquote
@@ -40,6 +40,9 @@ _LEADS: Final = re.compile(
 _REFUSED: Final = re.compile(
     r"\b(?:409|refuse[sd]?|conflict)\b([^.;:]*?\b(?:if|when|while|unless)\b[^.;:]*)", re.IGNORECASE
 )
+# What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
+_CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
+_ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
 # The subject of such a condition, and its predicate; words beside a state in that.
 _IS: Final = re.compile(r"\b(unless )?(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
 _BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
@@ -63,6 +66,8 @@ _GROWS: Final = re.compile(
 # Phrases in a description which say that a state is final, and phrases that limit this.
 _IS_FINAL: Final = re.compile(r"([^.;:]*?)\b(?:is|are) (?:final|terminal)\b", re.IGNORECASE)
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
+# Members with the time at which a thing has ended.
+_END: Final = re.compile(r"(?:finished|ended|completed|cancell?ed|stopped)(?:at|on|time|date)")
 # Operations after which a counter may start again.
 _ANEW: Final = frozenset({"reset", "clear", "restart", "reboot", "restore", "zero"})
 
@@ -78,6 +83,7 @@ class _State:
         told: the operation that told it.
         by: an operation that was accepted since then, and must not change a final state; empty: none.
         refused: an operation of the thing that was refused since then.
+        ends: the times of its end that were read with it.
     """
 
     value: str
@@ -86,6 +92,7 @@ class _State:
     told: str = ""
     by: str = ""
     refused: str = ""
+    ends: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Changes:
@@ -228,11 +235,18 @@ class Changes:
                 label = claim.operation.label if claim.operation is not None else ""
                 expected = f"a refusal with 409, as {path} was {state} before and after it, and one alone may be so"
                 yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
-        before = self._known.get(path)
+        before, ends = self._known.get(path), _ends_in(occasion) if now in FINAL else {}
         if before is None or sent_s < before.at_s:
             if before is None and len(self._known) < _MOST_THINGS:
-                self._known[path] = _State(now, occasion.response.received_s)
+                self._known[path] = _State(now, occasion.response.received_s, ends=ends)
             return
+        moved = [one for one in ends if before.ends.get(one, ends[one]) != ends[one] and now == before.value]
+        if ends and before.ends:
+            expected = f"the {', '.join(ends)} of what was {now} before"
+            found = f"{ends[moved[0]]} as {moved[0]}, and {before.ends[moved[0]]} before" if moved else ""
+            is_said = now in _CANCELLED or now in self._said_final.get(operation.template.rstrip("/"), ())
+            cause, doubt = f"{operation.label} end", "" if is_said else "it may have run again meanwhile"
+            yield occasion.case("description/states", not moved, expected, found, cause=cause, doubt=doubt)
         is_late = sent_s - before.at_s > _SETTLES_S
         # The state that the response announced has not come yet.
         if before.told and now != before.value and now.casefold() not in FINAL and not is_late:
@@ -251,7 +265,7 @@ class Changes:
             # A thing that is done may start again by itself, for example by a timetable.
             wrong = now if reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
-        self._known[path] = _State(now, occasion.response.received_s)
+        self._known[path] = _State(now, occasion.response.received_s, ends=ends)
 
     def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
         """Judge the members of a thing that never decrease, by the description."""
@@ -269,6 +283,13 @@ class Changes:
     @staticmethod
     def _case(occasion: Occasion, holds: bool, expected: str, found: str, cause: str) -> Case:  # noqa: FBT001 - as case()
         return occasion.case("description/states", holds, expected, found, cause=f"{cause} state")
+
+
+def _ends_in(occasion: Occasion) -> dict[str, Any]:
+    """Return the times in a response at which a thing has ended."""
+    value = read_json(occasion.response.body).value
+    found = {str(name): one for name, one in value.items() if isinstance(one, str)} if isinstance(value, dict) else {}
+    return {name: one for name, one in found.items() if _END.fullmatch(plain_name(name))}
 
 
 def _reads(operations: Iterable[Operation]) -> dict[str, Operation]:
@@ -438,6 +459,10 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
                 if named := _values_in(rest, values):
                     found[member] |= set(values) - named if bool(unless) != bool(no) else named
+    for said in _CANNOT.finditer(operation.text) if name and is_own and "409" in operation.responses else ():
+        if not _NEGATED.search(said[1]):
+            named = {state for state in known[name] if _word(state).search(said[1])}
+            found[name] |= named or (FINAL & known[name].keys() if _ENDED.search(said[1]) else set())
     starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
     if starts and not found[name]:
         found[name] = set(known[name]) - starts

@@ -27,6 +27,8 @@ _ASKED: Final = 1000
 _COMPARED: Final = 60
 # _LEAST: a list of no more items may be shorter than the least limit to which a device raises others.
 _LEAST: Final = 10
+# A server may cut a list at a multiple of this number of items.
+_ROUND: Final = 5
 # Kinds of items that a sorted list may have: all items of one kind may come before those of another.
 _KINDS: Final = 2
 #: LEVELS: parameters that ask for a level or higher, as log filters do. _INCLUDING: boolean parameters that ask for
@@ -63,9 +65,10 @@ class Lists:
         # Lists that had fewer items than the default page size although more exist: number of items, total, case, and
         # whether a limit has shown more since then.
         self._short: dict[object, tuple[int, int, Case, bool]] = {}
-        # By operation: the items of the whole list, and cases of searches without one of them, until the list shows it.
+        # By path: the items of the whole list, and cases of filters and searches without one of them, until the whole
+        # list shows it, with what they asked for.
         self._whole: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
-        self._missed: dict[str, list[tuple[str, str, Case]]] = defaultdict(list)
+        self._missed: dict[str, list[tuple[str, Callable[[Mapping[str, Any]], bool], Case]]] = defaultdict(list)
         # How many items a list had, by each value of a parameter that bounds a member.
         self._counts: dict[tuple[str, str], dict[float, int]] = defaultdict(dict)
 
@@ -73,6 +76,8 @@ class Lists:
         """Yield the cases of one exchange."""
         if occasion.request.method not in SAFE:
             self._totals.note_change(occasion.response.received_s)
+            self._whole.clear()
+            self._missed.clear()
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
@@ -91,6 +96,7 @@ class Lists:
         yield from self._order(occasion, listing, page, sent)
         yield from self._totals(occasion, listing, page, sent)
         yield from self._search(occasion, listing, page, sent)
+        yield from self._judge_missed(occasion, listing, page, sent)
         yield from _links(occasion, listing, page, sent)
         self._learn(listing, page)
 
@@ -228,20 +234,38 @@ class Lists:
             return
         items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         text, cause = sent.get(search.name, ""), f"{label} {search.name}"
-        if not sent and not page.goes_on:
-            waiting = self._missed.pop(label, ())
-            yield from (case for one, term, case in waiting if _contains(listing, items.get(one), term))
-            self._whole[label] = items
-        elif text and sent.keys() == {search.name}:
+        # A device may leave out spaces around what is sought.
+        if text.strip() and sent.keys() == {search.name}:
             names, id_ = " or ".join(listing.searched), "description/list-filter"
             other = [one for one, item in items.items() if not _contains(listing, item, text, str.casefold)]
             expected = f"items with {text} in {names}, by the description of {search.name}"
             found, doubt = f"the item {''.join(other[:1])}", "a search may find similar words too"
             yield occasion.case(id_, not other, expected, found, cause=cause, doubt=doubt)
-            there = self._whole[label] if not page.goes_on and len(self._missed[label]) < _COMPARED else {}
-            for one in [one for one in there if one not in items and _contains(listing, there[one], text)][:1]:
-                case = occasion.case(id_, False, f"the item {one}, which has {text}", cause=cause)  # noqa: FBT003
-                self._missed[label].append((one, text, case))
+
+    def _judge_missed(
+        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]
+    ) -> Iterator[Case]:
+        """Judge that a filter or search keeps each item with what it asks for, in the whole list before and after."""
+        items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
+        path, count = occasion.context.target.partition("?")[0], len(items)
+        most = listing.most(sent)
+        is_cut = page.goes_on or max(page.totals.values(), default=0) > count or 0 < most <= count
+        if is_cut or (count >= _LEAST and count % _ROUND == 0):
+            return
+        if not sent:
+            waiting = self._missed.pop(path, ())
+            yield from (case for one, is_asked, case in waiting if one in items and is_asked(items[one]))
+            self._whole[path] = items
+            return
+        (name, text), *others = sent.items()
+        asks = None if others or not text or text.lower() in _ALL else _asking(listing, name, text)
+        there = self._whole[path] if asks is not None and len(self._missed[path]) < _COMPARED else {}
+        for one in [one for one, item in there.items() if one not in items and asks is not None and asks(item)][:1]:
+            expected, cause = f"the item {one}, which has {text}", f"{listing.operation.label} {name}"
+            found = f"{count} items without it"
+            case = occasion.case("description/list-filter", False, expected, found, cause=cause)  # noqa: FBT003
+            if asks is not None:
+                self._missed[path].append((one, asks, case))
 
     def _wrong(self, listing: Listing, name: str, asked: list[str], values: list[Any]) -> list[str] | None:
         """Return an item's value that the filter excludes; empty if there is none; None if unknown."""
@@ -318,6 +342,17 @@ def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[
         found = f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])} as {made[0]}" if wrong else ""
         cause = f"{listing.operation.label} {made[0]} said"
         yield occasion.case("description/list-order", not wrong, expected, found, cause=cause, doubt=SENTENCE)
+
+
+def _asking(listing: Listing, parameter: str, text: str) -> Callable[[Mapping[str, Any]], bool] | None:
+    """Return whether an item has what a parameter's text asks for; None of parameters of which that is not known."""
+    if listing.search is not None and listing.search.name == parameter and text.strip():
+        return lambda item: _contains(listing, item, text)
+    for name, given in listing.filters.items():
+        if given.name == parameter and not given.media_type:
+            asked = text.split(",") if "array" in kinds_of(given.schema) else [text]
+            return lambda item: isinstance(item.get(name), str | int) and _text(item[name]) in asked
+    return None
 
 
 def _contains(listing: Listing, item: Mapping[str, Any] | None, term: str, fold: Callable[[str], str] = str) -> bool:

@@ -164,8 +164,7 @@ class Totals:
         if any(number_of(text) == 0 and text != "0" for text in texts.values()):
             return
         offset = number_of(sent.get(listing.offset.name, "")) if listing.offset is not None else 0
-        names = {parameter.name for parameter in listing.filters.values()}
-        chosen = frozenset((name, text) for name, text in sent.items() if name in names)
+        chosen = frozenset((name, text) for name, text in sent.items() if name in listing.selecting)
         most = listing.most(sent)
         # A limit of 0 may ask for no items, or for all.
         is_open = listing.limit is None or listing.limit.name not in sent

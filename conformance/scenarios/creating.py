@@ -12,7 +12,7 @@ from conformance.api.rest.inputs import usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import id_member
+from conformance.api.rest.things import collection_of, id_member
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
@@ -59,8 +59,10 @@ def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:
     if location and is_same(joined(sent, location), sent):
         targets = [path_of(joined(sent, location)).removeprefix(api.client.prefix)]
     if id_ := id_member(read_json(answer.body).value, read)[1]:
-        base = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/")
-        targets += [f"{base}/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"]
+        # What is created below another thing may have a path of its own.
+        bases = urlsplit(sent).path.removeprefix(api.client.prefix).rstrip("/"), collection_of(read.template)
+        end = f"/{quote(str(id_), safe='')}{'/' if read.template.endswith('/') else ''}"
+        targets += [base + end for base in dict.fromkeys(bases) if "{" not in base]
     pattern = re.sub(r"\\{[^{}]*\\}", "[^/]+", re.escape(read.template))
     usable = list(dict.fromkeys(target for target in targets if re.fullmatch(pattern, target)))
     # The Location header may be wrong, so try it.

@@ -62,8 +62,8 @@ def draw_requests(
 
 
 def order_of(operation: Operation) -> tuple[int, int]:
-    """Return the rank of an operation: lists come before operations that need their ids, DELETE comes last."""
-    ranks = {"GET": 0, "HEAD": 0, "OPTIONS": 0, "POST": 2, "PUT": 3, "PATCH": 3, "DELETE": 5}
+    """Return the rank of an operation: lists come before operations that need their ids."""
+    ranks = {"GET": 0, "HEAD": 0, "OPTIONS": 0, "POST": 2, "PUT": 3, "PATCH": 3}
     rank = ranks.get(operation.method, 4)
     return (rank + 1 if rank == 0 and operation.parameter("path") else rank), len(operation.parameter("path"))
 

@@ -18,7 +18,7 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import collection_of, id_member, object_in
+from conformance.api.rest.things import collection_of, creator_of, id_member, object_in
 from conformance.api.rest.values import Values
 from conformance.checkers.changes import ENDING, FINAL, leads_to, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
@@ -75,7 +75,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
     operations = callable_operations(api)
     found, writer = list[Ended](), Writer(api, values)
     for (method, path), read in operations.items():
-        create = operations.get(("POST", collection_of(path)))
+        create = creator_of(operations, read)
         state = (state_of(read) or (state_member(read) if create is None else "")) if method == "GET" else ""
         actions = _actions(read, operations) if state and len(read.parameter("path")) == 1 else ()
         if not actions or len(found) >= _KINDS or not collection_of(path):

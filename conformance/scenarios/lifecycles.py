@@ -18,6 +18,7 @@ from conformance.api.rest.listing import items_of
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.things import (
     collection_of,
+    creator_of,
     doubt_of_deletion,
     id_member,
     identifier_of,
@@ -65,7 +66,7 @@ def lifecycles(api: RestInterface, values: Values) -> tuple[Life, ...]:
     lives, held = list[Life](), dict[str, int]()
     for (method, path), read in operations.items():
         collection = collection_of(path)
-        create = operations.get(("POST", collection)) or operations.get(("PUT", path))
+        create = creator_of(operations, read) or operations.get(("PUT", path))
         if method == "GET" and collection and create is not None:
             api.run.limit.check()
             # Created things are deleted even after the time limit.
@@ -110,12 +111,20 @@ class _Cycle:
 
     def __post_init__(self) -> None:
         lister = self.operations.get(("GET", collection_of(self.read.template)))
+        if self._is_below:
+            lister = self.operations.get(("GET", self.create.template.rstrip("/")))
         effort = self.writer.api.run.effort
         until = time.monotonic() + (_SLOW_BUDGETS if effort.slow else _BUDGETS) * effort.budget_s
         self.living = Living(self.writer, self.read, lister, until)
         self.item = self.read.template.rstrip("/")
         changes = (self.operations.get((name, self.item)) for name in ("PUT", "PATCH"))
         self._changes = [operation for operation in changes if operation is not None]
+
+    @property
+    def _is_below(self) -> bool:
+        """Whether things are created below another thing, and have paths of their own."""
+        above = collection_of(self.read.template)
+        return self.create.method == "POST" and self.create.template.rstrip("/") != above
 
     def run(self) -> list[Life]:
         """Create, change and delete things of a collection; return the record of each thing."""
@@ -266,7 +275,7 @@ class _Cycle:
 
     def _create(self, turn: int) -> bool:
         """Create one thing and read it; return whether another one may be tried."""
-        path, before, things = "", self._ids(), self.living.things
+        path, before, things = self.living.at, self._ids(), self.living.things
         if self.create.method == "PUT":
             path = path_chosen(self.read, turn)
             if not path or self.writer.send(self.read, path).response.status not in ABSENT:
@@ -287,6 +296,8 @@ class _Cycle:
             self._read_created(created, path, "")
             return True
         is_new = self._register(created, before)
+        if is_new and self._is_below:
+            self.living.at = urlsplit(created.request.url).path.removeprefix(self.writer.api.client.prefix)
         if not is_new:
             # A POST may have changed what is there, such as a thing with the same key.
             self.living.read_anew()
@@ -298,7 +309,7 @@ class _Cycle:
         if self.create.method != "POST" or not self.living.of(State.GONE) or self.living.is_over:
             return
         bodies = [next(iter(writer.bodies(self.create, turn)), None) for turn in turns]
-        requests = [writer.request(self.create, body=body) for body in bodies if body is not None]
+        requests = [writer.request(self.create, self.living.at, body) for body in bodies if body is not None]
         if len({request.body for request in requests}) == len(turns):
             sent = writer.api.send_together(requests)
             made = [one for one in sent if isinstance(one, Exchange) and one.response.ok]
@@ -307,8 +318,25 @@ class _Cycle:
                 if self._register(created, None) and len(new) < len(made):
                     # The other one may have changed what this one has created.
                     self.living.things[-1].life = replace(self.living.things[-1].life, writes=())
+            if writer.api.single.get(self.create.label) or writer.values.unique.knows(self.create):
+                self._create_twins(turns[-1] + 1)
             for thing in self.living.of(State.ALIVE):
                 self._delete_and_read(thing, delete)
+
+    def _create_twins(self, turn: int) -> None:
+        """Create two equal things at once, of which the device refuses the second where they come one by one."""
+        body, before = next(iter(self.writer.bodies(self.create, turn)), None), len(self.living.things)
+        if body is None:
+            return
+        request = self.writer.request(self.create, self.living.at, body)
+        sent = send_together([[(self.writer.api.client, request)] * _CLIENTS])[0]
+        made = [one for one in sent if isinstance(one, Exchange) and one.response.status == HTTPStatus.CREATED]
+        for created in made:
+            self._register(created, None)
+        if len(self.living.things) > before:
+            expected = "one creation of two equal ones at once, as of two one by one"
+            other = f"status {made[-1].response.status} for both" if len(made) == _CLIENTS else ""
+            self.living.note(Kind.THERE, self.create.label, made[-1], expected, other, self.living.things[-1])
 
     def _register(self, created: Exchange, before: set[str] | None) -> bool:
         """Register the thing that a POST created, by the identifiers known before; return whether it is new."""
@@ -369,7 +397,7 @@ class _Cycle:
             return None
         if self.living.listing is not None:
             return set(self.living.listing.ids)
-        listing = self.writer.send(self.living.lister)
+        listing = self.writer.send(self.living.lister, self.living.at)
         items = items_of(read_json(listing.response.body).value) or []
         ids = {identifier_of(item, self.read) for item in items if isinstance(item, dict)}
         return ids if listing.response.ok else None
@@ -379,7 +407,8 @@ class _Cycle:
         sent = created.request.url
         path = urlsplit(sent).path
         below = path[: len(path) - len(_end_of(path, self.create.template))]
-        by_id = f"{path.removeprefix(below).rstrip('/')}/{quote(id_, safe='')}" if id_ else ""
+        base = collection_of(self.item) if self._is_below else path.removeprefix(below).rstrip("/")
+        by_id = f"{base}/{quote(id_, safe='')}" if id_ else ""
         by_id += "/" if by_id and self.read.template.endswith("/") else ""
         location = created.response.header("location")
         if not location:

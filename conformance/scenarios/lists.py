@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timedelta, timezone
-from itertools import combinations, islice, product
+from itertools import islice
 from typing import Any, Final
 
 from conformance.api.rest.applicable import allows
@@ -26,7 +25,6 @@ from conformance.api.rest.listing import (
     members_of,
     next_texts,
     page_of,
-    searches,
 )
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
@@ -34,9 +32,10 @@ from conformance.checkers.lists import is_mixed
 from conformance.checkers.totals import SETTLES_S, says_filtered
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.openapi import operations_of
-from conformance.documents.parameters import Parameter, plain_name
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
+from conformance.scenarios.list_queries import choices_of, queries_of
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -49,8 +48,6 @@ _LARGE: Final = 50
 _PAGES: Final = 4
 _VALUES: Final = {"quick": 8}
 _MOST_VALUES: Final = 12
-# How many of these values are also sent together with a page limit.
-_WITH_PART: Final = 6
 # _BUDGETS: multiple of an exploration's time that one list may take. _SLOW_SHARE: a list that once took over a second
 # gets this fraction.
 _BUDGETS: Final = 3
@@ -68,8 +65,6 @@ _FILTERS: Final = 2
 _FEWEST: Final = 2
 # Offsets beyond the end of a list, as far as the schema allows.
 _BEYOND: Final = (1000, 100, 10, 1)
-# Difference from UTC of a distant time zone, h.
-_FAR_H: Final = 11
 # How pages are read whose links the device gives.
 _LINK: Final = "the link to the next page"
 # Phrases in a description which say that the last page has no link to a next one.
@@ -124,9 +119,16 @@ def pages_of_lists(api: RestInterface, values: Values) -> tuple[Paged, ...]:
 def _pages_of(reader: Reader) -> Iterator[Paged]:
     """Yield the records of reading a list in parts: plain, sorted, and filtered."""
     page, until = reader.page(), reader.until
+    read = list[dict[str, Any]]()
     for query, by in (({}, ""), *_selections(reader.listing, page)) if page is not None else ():
+        read.append(query)
         if time.monotonic() < until:
             yield from _Parts(replace(reader, always=query, by=by)).all(until)
+    sort, sortings = reader.listing.sort, reader.listing.sortings
+    for text in list(sortings) if sort is not None and page is not None and len(page.items) > 1 else ():
+        query = {sort.name: [text] if "array" in kinds_of(sort.schema) else text} if sort is not None else {}
+        if query not in read and time.monotonic() < until:
+            yield from _Parts(replace(reader, always=query, by=sortings[text].member)).in_turn(until)
 
 
 def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], str]]:
@@ -146,7 +148,7 @@ def _selections(listing: Listing, page: Page) -> Iterator[tuple[dict[str, Any], 
     filters = list[dict[str, Any]]()
     for name, parameter in listing.filters.items():
         there = Counter(text_of(item.get(name)) for item in items if not isinstance(item.get(name), list | dict))
-        usable = [one for one in _choices(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
+        usable = [one for one in choices_of(parameter, name, page) if _FEWEST <= there[text_of(one)] < len(items)]
         filters += [{parameter.name: usable[-1]}] if usable else []
     yield from ((one, "") for one in filters[:_FILTERS])
 
@@ -156,7 +158,7 @@ def pages_below(api: RestInterface, values: Values, listing: Listing, path: str)
     reader = Reader(api, values, listing, path=path)
     yield from _Parts(reader).all(reader.until)
     page = reader.page()
-    for query in islice(_queries(listing, page, _FEWEST), _PAGES) if page is not None and page.items else ():
+    for query in islice(queries_of(listing, page, _FEWEST), _PAGES) if page is not None and page.items else ():
         reader.read(query)
 
 
@@ -169,12 +171,9 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             page, until = reader.page(), reader.until
             if page is not None and page.items:
                 reader.send_invalid()
-                filters, doubted = {parameter.name for parameter in listing.filters.values()}, list[dict[str, Any]]()
-                for query in _queries(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
-                    found = (
-                        page_of(reader.read(query).response, listing.operation) if time.monotonic() < until else None
-                    )
-                    if found is not None and query.keys() <= filters and found.items and _is_doubted(listing, found):
+                doubted = list[dict[str, Any]]()
+                for query in queries_of(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
+                    if time.monotonic() < until and _is_doubted(listing, reader.part(query), query):
                         doubted.append(query)
                 _reread_totals(reader, doubted)
 
@@ -269,12 +268,11 @@ def _reread_totals(reader: Reader, doubted: list[dict[str, Any]]) -> None:
     agreed = [name for name, total in before.totals.items() if total >= len(before.items)]
     wrong = [query] if not now.goes_on and any(now.totals.get(name) != len(now.items) for name in agreed) else []
     # A total of all items, regardless of the filter, is right too.
-    pages = {index: part[1] for index, one in enumerate(doubted) if (part := reader.part(one)) is not None}
-    is_said = says_filtered(listing)
+    parts, is_said = [(one, reader.part(one)) for one in doubted], says_filtered(listing)
     wrong += [
-        doubted[index]
-        for index, one in pages.items()
-        if (is_said or one.totals != now.totals) and _is_doubted(listing, one)
+        query
+        for query, part in parts
+        if part is not None and (is_said or part[1].totals != now.totals) and _is_doubted(listing, part, query)
     ]
     if wrong:
         time.sleep(SETTLES_S)
@@ -282,83 +280,15 @@ def _reread_totals(reader: Reader, doubted: list[dict[str, Any]]) -> None:
             reader.read(one)
 
 
-def _is_doubted(listing: Listing, page: Page) -> bool:
-    is_cut = page.goes_on or 0 < listing.most({}) <= len(page.items)
-    return not is_cut and any(0 < total != len(page.items) for total in page.totals.values())
-
-
-def _queries(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
-    """Yield values of filters and of the sort, every second one with a limit."""
-    rows: list[dict[str, Any]] = []
-    for name, parameter in listing.filters.items():
-        rows += [{parameter.name: value} for value in _choices(parameter, name, page)[:most]]
-    rows += [both] if len(rows) > 1 and (both := _together(listing, page)) else []
-    for bound in listing.bounds:
-        there = {
-            members_of(item).get(bound.member) for item in page.items if members_of(item).get(bound.member) is not None
-        }
-        ordered = sorted(there, key=lambda item: bound.rank(str(item)) or 0)
-        # The middle of several values: items lie on both sides, and one at the bound.
-        middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
-        rows += [
-            {bound.parameter.name: text}
-            for item in middle
-            for text in (item, _elsewhere(item, is_least=bound.is_least))
-            if len(ordered) > 1 and text is not None and fitting(bound.parameter, text)
-        ]
-    if listing.sort is not None:
-        directions = flat(listing.direction.schema).get("enum", ()) if listing.direction is not None else ()
-        for number, text in enumerate(list(listing.sortings)[:most]):
-            value: Any = [text] if "array" in kinds_of(listing.sort.schema) else text
-            turned = {listing.direction.name: directions[number % len(directions)]} if listing.direction else {}
-            rows.append({listing.sort.name: value, **turned})
-    few = next((one for one in (2, 1) if fitting(listing.limit, one)), None)
-    part = {listing.limit.name: few} if listing.limit is not None and few is not None else {}
-    later = {listing.offset.name: 1} if listing.offset is not None and fitting(listing.offset, 1) else {}
-    sorts = {listing.sort.name: rows[-1][listing.sort.name]} if listing.sort is not None and listing.sortings else {}
-    yield from [part] if part and listing.filters else []
-    for number, row in enumerate([*rows, *searches(listing, page)] or [{}]):
-        yield row
-        if number >= _WITH_PART:
-            continue
-        if part and number % 2 == 0:
-            # The whole list again shows whether the total is that of the part.
-            single = {name: 1 for name in part if number and fitting(listing.limit, 1)}
-            yield from ({**row, **part, **single}, row)
-        elif later or part:
-            yield {**sorts, **row, **part, **later}
-
-
-def _elsewhere(value: Any, *, is_least: bool) -> str | None:
-    """Return an instant as clocks far away show it; a device that ignores the offset lets too many items pass."""
-    try:
-        at = datetime.fromisoformat(value)
-    except (TypeError, ValueError):
-        return None
-    zone = timezone(timedelta(hours=-_FAR_H if is_least else _FAR_H))
-    return at.astimezone(zone).isoformat(timespec="milliseconds") if at.tzinfo is not None else None
-
-
-def _together(listing: Listing, page: Page) -> dict[str, Any]:
-    """Return values of two filters, each of which excludes an item that the other keeps; else nothing."""
-    items = [members_of(one) for one in page.items]
-    for (name, first), (other, second) in combinations(listing.filters.items(), 2):
-        for one, two in product(_choices(first, name, page), _choices(second, other, page)):
-            left = {(item.get(name) == one, item.get(other) == two) for item in items}
-            if {(True, False), (False, True)} <= left:
-                return {first.name: one, second.name: two}
-    return {}
-
-
-def _choices(parameter: Parameter, name: str, page: Page) -> list[Any]:
-    """Return values to filter by: the declared ones, or two different ones that items have."""
-    schema, is_list = flat(parameter.schema), "array" in kinds_of(parameter.schema)
-    schema = flat(schema["items"]) if isinstance(schema.get("items"), dict) else schema
-    found = [True, False] if kinds_of(schema) == {"boolean"} else [item for item in schema.get("enum", ()) if item]
-    if not found:
-        there = [members_of(item).get(name) for item in page.items]
-        found = list(dict.fromkeys(item for item in there if isinstance(item, str | int) and item != ""))[:2]
-    return [item for item in ([[value] for value in found] if is_list else found) if fitting(parameter, item)]
+def _is_doubted(listing: Listing, part: tuple[Exchange, Page] | None, query: Mapping[str, Any]) -> bool:
+    """Return whether a whole list, of selected items, has another total than items."""
+    known = listing.selecting | ({listing.limit.name} if listing.limit is not None else set())
+    if part is None or not part[1].items or not query.keys() <= known:
+        return False
+    page, most = part[1], listing.most({name: text_of(value) for name, value in query.items()})
+    return not (page.goes_on or 0 < most <= len(page.items)) and any(
+        0 < total != len(page.items) for total in page.totals.values()
+    )
 
 
 @dataclass
@@ -387,6 +317,15 @@ class _Parts:
             found = self._twice(walk, whole) if time.monotonic() < until else None
             if found is not None:
                 yield found
+
+    def in_turn(self, until: float) -> Iterator[Paged]:
+        """Yield the record of reading page after page, in the first way that the list allows."""
+        whole, listing = self.reader.page(), self.reader.listing
+        ways = ((listing.cursor, self._by_cursor), (listing.offset, self._by_offset), (listing.page, self._by_page))
+        walk = next((way for parameter, way in ways if parameter is not None), None)
+        if whole is not None and walk is not None and time.monotonic() < until:
+            found = self._twice(walk, whole)
+            yield from [found] if found is not None else []
 
     def _twice(self, walk: Callable[[Page], Paged | None], whole: Page) -> Paged | None:
         """Return the record of a walk; a fault counts if it appears twice while the list stays the same."""

@@ -163,6 +163,7 @@ class Living:
         things: all of them.
         looks: what was seen.
         listing: the last reading of the list, or None.
+        at: path of the list, where it is not that above its things; empty until the first of them is created.
     """
 
     writer: Writer
@@ -172,6 +173,7 @@ class Living:
     things: list[Thing] = field(default_factory=list)
     looks: list[Look] = field(default_factory=list)
     listing: WholeList | None = None
+    at: str = ""
     _shown: bool = False
     _capped: bool = False
     # Whether a thing has survived the creation of another. Below: things lost before that was known.
@@ -379,7 +381,7 @@ class Living:
     def look_at_older(self) -> None:
         """Check whether the list has the things created before that can still be read and have a listed state."""
         lister, before, parameters = self.lister, self.listing, self.read.parameter("path")
-        if lister is None or before is None or len(parameters) > 1 or chooses(lister) or not self._shown:
+        if lister is None or before is None or len(parameters) > 1 or chooses(lister) or not self._shown or self.at:
             return
         for id_ in self.writer.values.known_ids(self.read, parameters[0]) if before.is_whole else ():
             name, text = str(id_).casefold(), quote(str(id_), safe="")
@@ -402,13 +404,13 @@ class Living:
         """Read the list that a thing is in."""
         if self.lister is None:
             raise ValueError("the collection has no list")
-        path = thing.path.rstrip("/").rpartition("/")[0] + ("/" if self.lister.template.endswith("/") else "")
+        above = thing.path.rstrip("/").rpartition("/")[0] + ("/" if self.lister.template.endswith("/") else "")
         # If a short list has several pages, read page after page.
         listing, is_more = listing_of(self.lister), len(self.of(State.ALIVE)) > _PAGE
         is_short = self.listing is not None and len(self.listing.items) <= _MANY - _PAGE
         limit = listing.limit if listing is not None and is_short and is_more else None
         few = {limit.name: _PAGE} if limit is not None and fitting(limit, _PAGE) else {}
-        return read_whole(self.writer, self.lister, self.read, path, few)
+        return read_whole(self.writer, self.lister, self.read, self.at or above, few)
 
     def _wrong(self, listing: WholeList) -> list[tuple[Thing, Kind, str, str]]:
         """Return a list's fault: the thing, the exchange, and expected and found texts."""

@@ -17,7 +17,7 @@ from conformance.api.rest.listing import Listing, fitting, listing_of, members_o
 from conformance.api.rest.patches import same
 from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, identifier_of, path_chosen
+from conformance.api.rest.things import another, collection_of, creator_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
@@ -79,7 +79,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             continue
         api.run.limit.check()
         changes = [operations[name, path] for name in ("PATCH", "PUT") if (name, path) in operations]
-        create = operations.get(("POST", collection_of(path))) or operations.get(("PUT", path))
+        create = creator_of(operations, read) or operations.get(("PUT", path))
         delete = operations.get(("DELETE", path))
         with api.run.limit.lift(), suppress(NoAnswerError):
             is_item = bool(read.parameter("path"))

@@ -72,12 +72,12 @@ def refuse_creation(living: Living, create: Operation, turn: int) -> None:
         return
     writer, tried = living.writer, list[Exchange]()
     if (body := next(_half_valid(living, create, turn, {}), None)) is not None:
-        tried.append(writer.send(create, "", body))
+        tried.append(writer.send(create, living.at, body))
     other = [next(iter(writer.bodies(create, turn + number * _STEP, {})), None) for number in (1, 2)]
     if other[0] is not None and other[1] is not None:
-        tried.append(writer.send(create, "", other[0], media_type=_TEXT))
+        tried.append(writer.send(create, living.at, other[0], media_type=_TEXT))
         if "406" in create.responses:
-            tried.append(writer.send(create, "", other[1], headers=(("Accept", NO_FORMAT),)))
+            tried.append(writer.send(create, living.at, other[1], headers=(("Accept", NO_FORMAT),)))
     refused = [exchange for exchange in tried if is_refused(exchange, create)]
     before = living.listing.ids
     listing = living.list_of(living.things[-1]) if refused else living.listing

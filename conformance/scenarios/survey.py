@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Final
+from functools import cached_property
+from typing import Final
 
 from conformance.api.rest.applicable import allows
 from conformance.api.rest.calls import Call
@@ -19,9 +19,10 @@ from conformance.api.rest.things import collection_of
 from conformance.api.rest.validity import UNCLEAR, VALID, Validity, validity
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import UNKNOWN, Kind, Variation, least_inputs, most_references
+from conformance.checkers.untouched import ALONE, OFTEN
 from conformance.documents.openapi import Operation, is_json, known_path, operations_of
 from conformance.documents.patterns import SlowPatternError
-from conformance.scenarios.drawing import SLOW_SHARE, draw_requests, has_input, order_of
+from conformance.scenarios.drawing import draw_requests, has_input, order_of
 from conformance.scenarios.lists import Paged
 from conformance.scenarios.reaching import CONFLICT, WANTS_CONDITION, Reaching
 from conformance.scenarios.scenario import NotPossibleError, PartialTraceError, scenario
@@ -36,11 +37,7 @@ from conformance.transport.exchange import (
     Unanswered,
 )
 from conformance.verdict.effort import Effort
-from conformance.verdict.explorer import Explorer
 from conformance.verdict.time_limit import TimeIsOverError
-
-if TYPE_CHECKING:
-    from conformance.api.rest.generated import Target
 
 # Members of a refused request that are sent alone.
 _MOST_PARTS: Final = 24
@@ -67,18 +64,17 @@ _DOUBTED: Final = frozenset({400, 409, 422})
 _ACCEPTED: Final = frozenset({Kind.EXAMPLE, Kind.DEFAULT, Kind.ENUM, Kind.OPTIONAL, Kind.BOUND, Kind.GENERATED})
 # Kinds of requests that generated requests cover too, so they need not be sent again.
 _JUDGED: Final = frozenset({Kind.OPTIONAL, Kind.BOUND, Kind.INVALID, Kind.MISSING})
-# REPEATS: repeats of one request; FEWEST_REPEATS at least. Below: cases of Schemathesis of each kind for an operation.
+# REPEATS: repeats of one request; FEWEST_REPEATS at least.
 REPEATS: Final = 200
 FEWEST_REPEATS: Final = 60
+#: Cases of Schemathesis for an operation: that cover its schema, and that are drawn.
 COVERAGE: Final = 150
-# _BUDGETS: multiple of an exploration's time that one operation may take, so that a slow one does not take the whole
-# run.
-_BUDGETS: Final = 3
 FUZZED: Final = 40
-# Shares of a time limit: at SURVEY_SHARE the survey sends only usual requests, at _GENERATED_SHARE generated requests
-# end.
+# BUDGETS: multiple of an exploration's time that one operation may take, so that a slow one does not take the whole
+# run.
+BUDGETS: Final = 3
+# Share of a time limit after which the survey sends only usual requests.
 SURVEY_SHARE: Final = 0.5
-_GENERATED_SHARE: Final = 0.85
 
 
 @dataclass(frozen=True)
@@ -346,27 +342,34 @@ class Surveyor:
             self.api.working[operation.label] = Call(operation, inputs).bare
             self.api.first.setdefault(operation.label, exchange)
 
-    def explore(self, operation: Operation) -> Iterator[None]:
-        """Send the usual request of an operation, and others group by group; yield after each group."""
-        run = self.api.run
+    def explore(self, operation: Operation, *, again: bool = False) -> Iterator[None]:
+        """Send the usual request of an operation, and others group by group; yield after each group.
+
+        With ``again``, the others only if nothing was there before, and something is now.
+        """
+        run, label = self.api.run, operation.label
+        if again and label in self.given_up:
+            return
+        was_absent = self.api.usual_status.get(label) == _NOT_FOUND
         try:
             self.begin(operation)
             if run.limit.has_limit:
                 self.look_elsewhere(operation)
             yield
-            if operation.label not in self.given_up:
+            is_new = was_absent and self.api.usual_status.get(label) != _NOT_FOUND
+            if label not in self.given_up and (is_new or not again):
                 yield from self.vary(operation, run.effort, run.seed)
         except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
             raise
         except Exception as error:  # noqa: BLE001 - one schema that cannot be read leaves the others to be judged
-            run.judge.fault(operation.label, error)
-            self.given_up.add(operation.label)
+            run.judge.fault(label, error)
+            self.given_up.add(label)
 
     def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
         usual = self.usual[operation.label]
         groups, parts = draw_requests(operation, usual, self.values, effort, seed, self.api.slow), _MOST_PARTS
-        left = _BUDGETS * effort.budget_s
+        left = BUDGETS * effort.budget_s
         self._time(operation, usual, effort, time.monotonic() + left)
         for variations in groups:
             began = time.monotonic()
@@ -453,6 +456,17 @@ class Surveyor:
             for item in dict.fromkeys(item for item, _ in near[:_STATES]):
                 self.send(item, Variation(Kind.AGAIN, "", "", self.usual[item.label]))
 
+    def refuse_again(self, operations: Sequence[Operation]) -> None:
+        """Send creations that were refused though they are valid a few times, each between two reads of the list."""
+        lists = {item.template.rstrip("/") for item in operations if item.method == "GET"}
+        valid = (probe for probe in self.probes if probe.status in _DOUBTED and probe.validity == VALID)
+        refused = {probe.operation: self._again(probe) for probe in valid if probe.operation.startswith("POST ")}
+        for request in [refused[item.label] for item in operations if item.label in refused and item.template in lists]:
+            read = Outgoing("GET", request.target.partition("?")[0])
+            with suppress(NoAnswerError):
+                for sent in (*[read] * ALONE, *(read, request) * OFTEN, read):
+                    self.api.send(sent)
+
     def _again(self, probe: Probe) -> Outgoing:
         """Return the request of a probe, to be sent again."""
         request = probe.attempt.request
@@ -481,17 +495,25 @@ def survey(api: RestInterface, values: Values) -> Survey:
         raise NotPossibleError("no operation of the description may be called")
     surveyor = Surveyor(api, values)
     api.values = values
-    steps = {operation.label: surveyor.explore(operation) for operation in sorted(operations, key=order_of)}
-    # Other operations still need the things that DELETE removes.
-    behind = {operation.label for operation in operations if operation.method == "DELETE"}
+    first = sorted((item for item in operations if item.method != "DELETE"), key=order_of)
+    steps = {operation.label: surveyor.explore(operation) for operation in first}
+    # Things were created and files stored meanwhile. Other operations still need what DELETE removes.
+    reads = [item for item in first if item.method == "GET" and item.parameter("path")]
+    later = {f"{item.label} again": surveyor.explore(item, again=True) for item in reads}
+    deletes = sorted((item for item in operations if item.method == "DELETE"), key=lambda item: -len(item.template))
+    behind = later | {operation.label: surveyor.explore(operation) for operation in deletes}
+    steps |= behind
     is_complete = run.limit.in_turns(steps, SURVEY_SHARE, behind)
     if is_complete:
         surveyor.create_and_delete(operations)
         surveyor.try_again(operations)
-    for operation in operations if is_complete else ():
-        if operation.method == "GET" and operation.parameter("path") and operation.label not in surveyor.given_up:
-            # Things created meanwhile have ids now.
-            surveyor.begin(operation)
+        surveyor.refuse_again(operations)
+        gone = {operation.template for operation in deletes}
+        # Other checks read what is there: what was deleted is stored again, and another thing is the usual one.
+        for method in ("PUT", "GET"):
+            for operation in (item for item in first if item.method == method and item.template in gone):
+                if operation.label not in surveyor.given_up:
+                    surveyor.begin(operation)
     for operation in operations:
         surveyor.look_elsewhere(operation)
     return _repeat_quickest(surveyor, operations)
@@ -526,71 +548,3 @@ def _repeat_quickest(surveyor: Surveyor, operations: list[Operation]) -> Survey:
                 break
             times.append(last.response.elapsed_ms)
     return Survey(tuple(surveyor.probes), tuple(times), last, surveyor.elsewhere)
-
-
-@scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.DESCRIBE)
-def generated_requests(api: RestInterface, values: Values, explore: Explorer) -> Survey:
-    """Send requests that Schemathesis generates for each operation."""
-    # Imported late: that takes half a second.
-    from conformance.api.rest.generated import NOT_GENERATED, targets  # noqa: PLC0415
-
-    run = api.run
-    operations = {
-        item.label: item for item in operations_of(run.contract) if allows(api, item) and item.label not in api.streams
-    }
-    surveyor = Surveyor(api, values)
-    for target in targets(run.contract):
-        operation = operations.get(target.label)
-        if operation is None:
-            continue
-        if run.limit.is_past(_GENERATED_SHARE):
-            run.limit.shortened.add(target.label)
-            continue
-        try:
-            _send_generated(surveyor, operation, target, explore)
-        except NOT_GENERATED:
-            continue
-        except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
-            raise
-        except Exception as error:  # noqa: BLE001 - as in survey(): others are generated
-            run.judge.fault(f"generated requests of {operation.label}", error)
-    return Survey(tuple(surveyor.probes))
-
-
-def _send_generated(surveyor: Surveyor, operation: Operation, target: Target, explore: Explorer) -> None:
-    """Send the generated requests of one operation."""
-    from conformance.api.rest.generated import NOT_GENERATED  # noqa: PLC0415 - see generated_requests()
-
-    run = surveyor.api.run
-    if operation.safe and not target.has_input:
-        return  # there is only one such request, and the survey has sent it
-    until = time.monotonic() + _BUDGETS * run.effort.budget_s
-    count = COVERAGE // (SLOW_SHARE if operation.label in surveyor.api.slow else 1)
-    chosen = run.effort.draw_passing(target.covering(), count, f"{run.seed}/coverage {target.label}")
-    run.tally.planned += len(chosen)
-    for case in chosen:
-        if time.monotonic() > until:
-            surveyor.cut_short(f"generated requests of {target.label}")
-            continue
-        _send_case(surveyor, operation, case)
-    if run.effort.name == "quick" or run.effort.slow or not target.has_input:
-        return
-    for negative in (True, False):
-        with suppress(*NOT_GENERATED):
-            explore(target.strategy(negative=negative), partial(_send_case, surveyor, operation), cases=FUZZED)
-
-
-def _send_case(surveyor: Surveyor, operation: Operation, case: Any) -> None:
-    """Send a case of Schemathesis, and record it."""
-    from conformance.api.rest.generated import as_request, own_headers  # noqa: PLC0415 - see generated_requests()
-
-    if surveyor.api.run.limit.is_past(_GENERATED_SHARE):
-        surveyor.api.run.limit.shortened.add(operation.label)
-        return
-    request, headers = as_request(case), own_headers(case)
-    if request is None or headers is None or operation.label in surveyor.given_up:
-        return
-    whole = replace(request, headers=(*headers, *request.headers))
-    if whole not in surveyor.api.judged:
-        whole = surveyor.reaching.complete(operation, whole)
-        surveyor.send(operation, Variation(Kind.GENERATED, "", "", Inputs()), whole)

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.listing import Page, cursors, listing_of, page_of
-from conformance.api.rest.things import collection_of, id_member, identifier_of
+from conformance.api.rest.things import below_others, collection_of, id_member, identifier_of
 from conformance.checkers.totals import numbers_by_items, numbers_of
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -142,7 +142,7 @@ def read_items(writer: Writer) -> None:
     """Read the first, the middle and the last item of each list, and the first one again; then all of them at once."""
     operations = callable_operations(writer.api)
     for (method, path), item in operations.items():
-        lister = operations.get(("GET", collection_of(path)))
+        lister = operations.get(("GET", collection_of(path))) or next(below_others(operations, "GET", item), None)
         if method != "GET" or lister is None or len(item.parameter("path")) > 1:
             continue
         writer.api.run.limit.check()

@@ -55,11 +55,20 @@ class Kind(StrEnum):
 
 # Kinds of which each is a whole header, unless the header is a cookie.
 _PLAIN: Final = frozenset({Kind.BEARER, Kind.HEADER})
+
+
+def _altered(secret: str) -> str:
+    """Return a secret with another character in its middle: of a signed token, not in bits that mean nothing."""
+    middle = len(secret) // 2
+    return secret[:middle] + ("1" if secret[middle : middle + 1] == "0" else "0") + secret[middle + 1 :]
+
+
 # By name: how a nearly right secret is made from the secret, and what is appended to the secret's variable.
 _NEARLY: Final[dict[str, tuple[Callable[[str], str], str]]] = {
     "": (str, ""),
     "lengthened": (lambda secret: f"{secret}-{WRONG}", f"-{WRONG}"),
     "shortened": (lambda secret: secret[:-1], "_SHORTENED"),
+    "altered": (_altered, "_ALTERED"),
     # Hexadecimal digits mean the same in both cases.
     "recased": (lambda secret: secret if _HEX.fullmatch(secret) else secret.swapcase(), "_RECASED"),
     "emptied": (lambda _: "", "_EMPTIED"),

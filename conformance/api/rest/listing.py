@@ -69,6 +69,10 @@ CASELESS: Final = re.compile(
 )
 # A search text that no item contains.
 _NOWHERE: Final = "roaas7nowhere"
+# Texts that mean something in a regular expression, and in SQL's LIKE.
+_SPECIAL: Final = ("(", "%")
+# Phrases in a description for the member of the last item that is the cursor of the next page.
+_OF_LAST: Final = re.compile(r"\b(\w+)`? of the (?:last|latest|newest|previous)\b", re.IGNORECASE)
 _SIGN: Final = re.compile(r"([+-]?)(.*)", re.DOTALL)
 _SUFFIX: Final = re.compile(r"(.+?)[:._ \-]?(asc|desc)(?:ending)?", re.IGNORECASE)
 _IDENTIFYING: Final = ("id", "uuid", "guid", "pk", "key", "slug", "name", "serial", "serialnumber", "number")
@@ -151,10 +155,15 @@ class Listing:
     def known_names(self) -> frozenset[str]:
         """The names of all parameters whose part is known."""
         parts = (
-            self.limit, self.offset, self.page, self.cursor, self.sort, self.direction, *self.filters.values(),
-            *(bound.parameter for bound in self.bounds),
+            self.limit, self.offset, self.page, self.cursor, self.sort, self.direction,
         )  # fmt: skip
-        return frozenset(parameter.name for parameter in parts if parameter is not None)
+        return self.selecting | {parameter.name for parameter in parts if parameter is not None}
+
+    @cached_property
+    def selecting(self) -> frozenset[str]:
+        """The names of the parameters that select items by a member."""
+        chosen = (*self.filters.values(), *(bound.parameter for bound in self.bounds))
+        return frozenset(parameter.name for parameter in chosen)
 
     @cached_property
     def sortings(self) -> dict[str, Sorting]:
@@ -233,11 +242,12 @@ class Page:
 
 
 def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
-    """Yield a text that no item has, and ends of words in what a search looks at, in other case if that is the same."""
+    """Yield texts: one that no item has, special ones, and ends of words in what a search looks at, in any case."""
     search = listing.search
     if search is None:
         return
     yield from [{search.name: _NOWHERE}] if listing.searched and fitting(search, _NOWHERE) else []
+    yield from ({search.name: text} for text in _SPECIAL if fitting(search, text))
     for name in listing.searched:
         texts = [value for item in page.items if isinstance(value := members_of(item).get(name), str)]
         words = [word[1:] for text in reversed(texts) for word in text.split() if word.isascii() and word.isalnum()]
@@ -529,8 +539,11 @@ def cursors(listing: Listing, exchange: Exchange, page: Page) -> Iterator[str]:
             yield linked[name]
         elif "?" not in text and "/" not in text:
             yield text
-    if plain_name(name) == "startingafter" and page.goes_on and page.items:
-        yield str(members_of(page.items[-1]).get("id", ""))
+    last = members_of(page.items[-1]) if page.items else {}
+    if plain_name(name) == "startingafter" and page.goes_on and last:
+        yield str(last.get("id", ""))
+    said = f"{listing.operation.text} {listing.cursor.says}" if listing.cursor is not None else ""
+    yield from (str(last[plain_name(one)]) for one in _OF_LAST.findall(said) if plain_name(one) in last)
 
 
 def next_texts(exchange: Exchange, page: Page) -> Iterator[str]:

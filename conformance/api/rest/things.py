@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any, Final, TypeGuard
 
@@ -30,9 +30,11 @@ _OWN: Final = re.compile(
 _DELETED: Final = re.compile(r"delet|remov|archiv|retire|decommission|trash|tombstone|gone|cancell?ed|aborted|revoked")
 _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
-# Words of a description: for a text that is stored as it is.
+# Words of a description: for a text or number that is stored as it is.
 _EXACTLY: Final = re.compile(
-    r"\b(?:exactly|verbatim|case[- ]sensitive|(?:kept|stored|returned) as (?:sent|written|given))\b", re.IGNORECASE
+    r"\b(?:exactly|verbatim|case[- ]sensitive|(?:kept|stored|returned) as (?:sent|written|given)"
+    r"|(?:any|all) (?:fraction|digits)|(?:not|never) rounded|full precision)\b",
+    re.IGNORECASE,
 )
 # Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
 # that end by themselves.
@@ -72,6 +74,23 @@ def collection_of(template: str) -> str:
     """Return the path of the collection that an item's path is in, without a slash at its end; empty if it is none."""
     before, _, last = template.rstrip("/").rpartition("/")
     return before if re.fullmatch(r"\{[^{}]+\}", last) else ""
+
+
+def below_others(operations: Mapping[tuple[str, str], Operation], method: str, item: Operation) -> Iterator[Operation]:
+    """Yield operations at an item's collection below other things, such as /rooms/{room}/lamps for /lamps/{lamp}."""
+    last = collection_of(item.template).rpartition("/")[2]
+    for operation in operations.values() if len(item.parameter("path")) == 1 else ():
+        template = operation.template.rstrip("/")
+        if operation.method == method and template.rpartition("/")[2] == last and operation.parameter("path"):
+            yield operation
+
+
+def creator_of(operations: Mapping[tuple[str, str], Operation], read: Operation) -> Operation | None:
+    """Return the POST that creates what a GET reads: at its collection, or, if it returns it whole, below others."""
+    members = parts_of(read.shape)
+    below = (one for one in below_others(operations, "POST", read) if "201" in one.responses)
+    known = (one for one in below if members and parts_of(one.shape) == members)
+    return operations.get(("POST", collection_of(read.template))) or next(known, None)
 
 
 def path_chosen(item: Operation, turn: int) -> str:
@@ -232,6 +251,11 @@ def _is_converted(part: Any) -> bool:
     return isinstance(part, dict) and bool(_CONVERTED.search(str(flat(part).get("description"))))
 
 
+def _says_exactly(part: Any) -> bool:
+    """Return whether the description of a member says that it is stored as it is."""
+    return isinstance(part, dict) and bool(_EXACTLY.search(str(flat(part).get("description", ""))))
+
+
 def _are_objects(value: Any) -> TypeGuard[list[dict[str, Any]]]:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
@@ -273,7 +297,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
     """Return the values that were written, or those that the response shows in their place.
 
     A device that tells which other value it took has written that, but for the one that was there before, and for
-    another value of an enumeration.
+    another value of an enumeration, or of the two of a boolean.
 
     Args:
         sent: the members that were sent.
@@ -285,7 +309,8 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
     told = {
         name: answer[name]
         for name, value in sent.items()
-        if isinstance(answer.get(name), str | int | float) and "enum" not in flat(parts.get(name, {}))
+        if isinstance(answer.get(name), str | int | float) and not isinstance(value, bool)
+        if "enum" not in flat(parts.get(name, {})) and not _says_exactly(parts.get(name))
         if answer[name] not in (value, before.get(name)) and not is_moved(value, answer[name])
         if "pattern" not in flat(parts.get(name, {})) or not str(value).startswith(str(answer[name]))
     }
@@ -329,7 +354,8 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
         return True
     if is_number(value):
         try:
-            near = {} if isinstance(value, int) and "number" not in kinds_of(schema) else _NEAR
+            is_exact = isinstance(value, int) and "number" not in kinds_of(schema)
+            near = {} if is_exact or _says_exactly(schema) else _NEAR
             step: Any = schema.get("multipleOf", 0)
             near = {"abs_tol": step / 2} if near and is_number(step) and step > 0 else near
             return math.isclose(value, float(other), **near)
@@ -337,7 +363,7 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
             return other is not None
     if isinstance(value, str) and str(schema.get("format", "")) not in _COMPARED:
         return True
-    if isinstance(value, str) and _EXACTLY.search(str(schema.get("description", ""))):
+    if isinstance(value, str) and _says_exactly(schema):
         return bool(value == other)
     if schema.get("format") == "date-time" and isinstance(other, str):
         one, two = _instant(value), _instant(other)

@@ -155,7 +155,14 @@ class Values:
     def known_ids(self, operation: Operation, parameter: Parameter) -> list[Any]:
         """Return values of a parameter that an earlier response named."""
         before = operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")
-        return [*self._ids.get(before, ()), *self._seen.get(plain_name(parameter.name), ())]
+        return [*self._of(self._ids, before), *self._seen.get(plain_name(parameter.name), ())]
+
+    @staticmethod
+    def _of(known: Mapping[str, list[Any]], above: str) -> list[Any]:
+        """Return the ids of a collection; last, of one with its name below another thing, where they may be made."""
+        last = above.rpartition("/")[2]
+        others = [name for name in known if name != above and name.rpartition("/")[2] == last]
+        return [one for name in (above, *others) for one in known.get(name, ())]
 
     def of(self, operation: Operation, parameter: Parameter) -> list[Any]:
         """Return values to try for a parameter, the most promising first: at most four that its schema allows."""
@@ -173,7 +180,7 @@ class Values:
             above = operation.template.split(f"{{{parameter.name}}}", 1)[0].rstrip("/")
             # A run deletes what it has created, so that other checks still find what was there before.
             is_deleted = operation.method == "DELETE" and operation.template.rstrip("/").endswith("}")
-            found = [*given, *(self._made[above] if is_deleted else ()), *found]
+            found = [*given, *(self._of(self._made, above) if is_deleted else ()), *found]
             found.sort(key=lambda value: text_of(value) in self._gone[above])
         return [value for value in _distinct(found) if value in given or fits(parameter.schema, value)][:_TRIED]
 

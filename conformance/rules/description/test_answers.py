@@ -16,12 +16,13 @@ from conformance.documents.parameter_reading import parts_of
 from conformance.documents.patterns import SlowPatternError
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
 from conformance.scenarios.anonymous import anonymous_requests
+from conformance.scenarios.generated import generated_requests
 from conformance.scenarios.held import held_operations
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotSeen, Outcome, rule
-from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
+from conformance.scenarios.survey import Probe, Survey, survey
 from conformance.transport.exchange import Exchange, Response
 from conformance.verdict.evidence import Case
 from conformance.verdict.run import Run

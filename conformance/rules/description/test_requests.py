@@ -19,8 +19,9 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
 from conformance.documents.writing import json_text
 from conformance.rules.told_once import Fault, held_back, told_once, without_numbers
+from conformance.scenarios.generated import generated_requests
 from conformance.scenarios.rule import Outcome, rule
-from conformance.scenarios.survey import Probe, Survey, generated_requests, survey
+from conformance.scenarios.survey import Probe, Survey, survey
 from conformance.transport.exchange import Exchange
 from conformance.verdict.run import Run
 

@@ -10,11 +10,12 @@ from http import HTTPStatus
 from conformance.api.rest.variations import Kind
 from conformance.rules.told_once import Fault, told_once
 from conformance.scenarios.estimate import GROWN_MS, GROWN_TIMES, TimedAgain, timed_again
+from conformance.scenarios.generated import generated_requests
 from conformance.scenarios.neighbours import neighbours
 from conformance.scenarios.other_exchanges import others
 from conformance.scenarios.own_things import own_things
 from conformance.scenarios.rule import NotTested, Outcome, rule
-from conformance.scenarios.survey import TIMED, Probe, Survey, generated_requests, survey
+from conformance.scenarios.survey import TIMED, Probe, Survey, survey
 from conformance.transport.exchange import Exchange, NoAnswer
 from conformance.verdict.evidence import Case
 from conformance.verdict.finding import Showing

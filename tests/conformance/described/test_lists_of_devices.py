@@ -1,6 +1,7 @@
 """Devices with lists in every style are certified: right ones are not blamed, and each fault is found at quick."""
 
 import random
+import re
 import time
 from urllib.parse import urlencode
 
@@ -23,6 +24,7 @@ _VALVE = {
 }
 _SEARCH = {"in": "query", "name": "q", "description": "A text that the label contains, whatever the case."}
 _SEARCH["schema"] = {"type": "string", "minLength": 1}
+_BOUND = {"in": "query", "name": "minFlow", "description": "At least this flow.", "schema": {"type": "number"}}
 _WHOLE, _ANY = {"type": "integer", "minimum": 0, "maximum": 100}, {"type": "object"}
 _TOTALS = {"total": {"type": "integer"}, "count": {"type": "integer"}}
 _VALVES = {"type": "array", "items": _VALVE}
@@ -71,6 +73,9 @@ _FAULTS = [
     ("page-1", "total of the page beside a filter, next names the same page", PAGES),
     ("offset", "search finds all, first is the second", FILTER),
     ("offset", "search finds all, first is the second", PAGES),
+    ("offset", "filter ignored beside a bound", FILTER),
+    ("linked", "filter loses an item", FILTER),
+    ("cursor", "order lost on later pages of one order", PAGES),
 ]
 
 
@@ -90,7 +95,7 @@ class _Collection:
         """Return its paths."""
         given = [(self.style[role], _WHOLE) for role in ("limit", "offset", "page") if role in self.style]
         given += [("state", {"type": "string", "enum": _STATES}), ("sort", {"type": "string", "enum": _SORTED})]
-        search = [_SEARCH] if self.manner == "offset" else []
+        search = [_SEARCH, _BOUND] if self.manner == "offset" else []
         given += [(self.style["cursor"], {"type": "string"})] if "cursor" in self.style else []
         shown = (
             {"type": "object", "properties": {self.style["in"]: _VALVES, **_TOTALS}} if "in" in self.style else _VALVES
@@ -127,7 +132,10 @@ class _Collection:
         self.reads += 1
         query, first = request.query, self.style.get("first", 0)
         known = {*(one for one in self.style.values() if isinstance(one, str)), "state", "sort"}
-        known |= {"q"} if self.manner == "offset" and query.get("q") != "" else set()
+        known |= {"q", "minFlow"} if self.manner == "offset" and query.get("q") != "" else set()
+        least = query.get("minFlow", "-1")
+        if re.fullmatch(r"-?\d+(\.\d+)?", least) is None:
+            return self._refusal()
         limit, *where = (self._number(request, role, 0) for role in ("limit", "offset", "cursor"))
         page = self._number(request, "page", first)
         is_right = query.get("state", "open") in _STATES and query.get("sort", "label") in _SORTED
@@ -135,6 +143,7 @@ class _Collection:
             return self._refusal()
         size = min(limit or (5 if self.manner == "newest" else 50), self.style.get("most", 50))
         found = self._chosen(query)
+        found = [one for one in found if one["flow"] >= float(least)]
         found = found[-size:] if self.manner == "newest" else found
         begin = self._begin(sum(where) + (page - first) * size, len(found))
         while self.fault == "equal items skipped" and "flow" in query.get("sort", "") and 0 < begin < len(found):
@@ -203,10 +212,12 @@ class _Collection:
             "filter ignored for one value": state == "moving",
             "filter ignored beside a limit": self.style.get("limit") in query,
             "order ignored after many reads": self.reads > 60,
+            "filter ignored beside a bound": "minFlow" in query,
             "one order ignored": sort == "-flow",
         }.get(self.fault, False)
         if state and not (ignores and self.fault.startswith("filter")):
             found = [one for one in found if one["state"] == state]
+            found = found[1:] if self.fault == "filter loses an item" else found
         if (term := query.get("q", "").casefold()) and "search finds" not in self.fault:
             found = [one for one in found if term in one["label"].casefold()]
         if sort and not (ignores and "order" in self.fault):
@@ -218,6 +229,8 @@ class _Collection:
             return part[:-1]
         is_later = query.get(self.style.get("page", ""), "1") != "1"
         lost = self.fault == "order lost on later pages" and "sort" in query and is_later
+        is_later = query.get(self.style.get("cursor", ""), "c0") != "c0"
+        lost |= self.fault.endswith("of one order") and query.get("sort") == "-label" and is_later
         return [*part[1:], *part[:1]] if lost else part
 
     def _begin(self, begin, end):

@@ -1,5 +1,6 @@
 """What a run created is read once more at its end; the lives of things are those of hostile/test_kept_things.py."""
 
+import asyncio
 import itertools
 
 import pytest
@@ -93,3 +94,124 @@ def test_a_creation_may_change_what_has_the_same_key(tmp_path, keeps_half):
     with small_device(document, routes) as url:
         seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*")
     assert seen.blamed == ({"description/refused-keeps": "fail"} if keeps_half else {}), seen.text
+
+
+class _Lamps:
+    """Lamps that are created in a room and have paths of their own, and their photos."""
+
+    def __init__(self, fault):
+        self.fault, self.lamps, self.made = fault, {}, itertools.count(1)
+        text, number = {"type": "string", "maxLength": 40}, {"type": "integer"}
+        lamp = {"type": "object", "required": ["name"], "properties": {"name": text}}
+        shown = {**lamp, "properties": {"id": number, "room": text, **lamp["properties"]}}
+        ids = {
+            name: {"name": name, "in": "path", "required": True, "schema": one}
+            for name, one in (("room", {"enum": ["hall"]}), ("id", number))
+        }
+        body = {"required": True, "content": {"application/json": {"schema": lamp}}}
+        octets = {"image/png": {"schema": {"type": "string", "format": "binary"}}}
+        bad, none, found = {"4XX": REFUSED}, {"description": "done"}, answers(shown)
+        self.description = described(
+            {
+                "/rooms/{room}/lamps": {
+                    "parameters": [ids["room"]],
+                    "get": {"responses": {"200": answers({"type": "array", "items": shown}), **bad}},
+                    "post": {"requestBody": body, "responses": {"201": found, **bad}},
+                },
+                "/lamps/{id}": {
+                    "parameters": [ids["id"]],
+                    **reading(shown),
+                    "put": {"requestBody": body, "responses": {"200": found, **bad}},
+                    "delete": {"responses": {"204": none, **bad}},
+                },
+                "/lamps/{id}/photo": {
+                    "parameters": [ids["id"]],
+                    "get": {"responses": {"200": {"description": "a photo", "content": octets}, **bad}},
+                    "put": {"requestBody": {"required": True, "content": octets}, "responses": {"204": none, **bad}},
+                },
+            }
+        )
+        self.routes = {
+            "/rooms/{room}/lamps": {"GET": self.in_room, "POST": self.create},
+            "/lamps/{id}": {"GET": self.one, "PUT": self.one, "DELETE": self.one},
+            "/lamps/{id}/photo": {"GET": self.photo, "PUT": self.photo},
+        }
+
+    def shown(self, number):
+        return {"id": number, "room": "hall", "name": self.lamps[number][0]}
+
+    async def name_in(self, request):
+        try:
+            body = await request.json()
+        except ValueError:
+            return None
+        name = body.get("name") if isinstance(body, dict) else None
+        return name if isinstance(name, str) and len(name) <= 40 else None
+
+    async def in_room(self, request):
+        if request.match_info["room"] != "hall":
+            return error(404, "no such room")
+        gone = "a deleted lamp is listed" in self.fault
+        there = [number for number, one in self.lamps.items() if gone or one[2]]
+        return web.json_response([self.shown(number) for number in there])
+
+    async def create(self, request):
+        name = await self.name_in(request)
+        if name is None or request.match_info["room"] != "hall":
+            return error(422, "no lamp")
+        if any(one[0] == name and one[2] for one in self.lamps.values()):
+            return error(409, "another lamp has this name")
+        if "twins" in self.fault:
+            await asyncio.sleep(0.05)
+        number = next(self.made)
+        self.lamps[number] = [name, b"", number % 3 > 0 or "the third lamp is lost" not in self.fault]
+        return web.json_response(self.shown(number), status=201, headers={"Location": f"/lamps/{number}"})
+
+    def found(self, request):
+        text = request.match_info["id"]
+        lamp = self.lamps.get(int(text)) if text.isascii() and text.isdigit() else None
+        return lamp if lamp is not None and lamp[2] else None
+
+    async def one(self, request):
+        lamp = self.found(request)
+        if lamp is None:
+            return error(404, "no such lamp")
+        if request.method == "DELETE":
+            lamp[2] = False
+            return web.Response(status=204)
+        if request.method == "PUT":
+            name = await self.name_in(request)
+            if name is None:
+                return error(422, "no lamp")
+            lamp[0] = name
+        return web.json_response(self.shown(int(request.match_info["id"])))
+
+    async def photo(self, request):
+        lamp = self.found(request)
+        if lamp is None or (request.method != "PUT" and not lamp[1]):
+            return error(404, "no photo")
+        if request.method == "PUT":
+            octets = await request.read()
+            if not octets.startswith(b"\x89PNG") or request.content_type != "image/png":
+                return error(422, "no PNG")
+            lamp[1] = octets[:4096] if "a photo is cut" in self.fault else octets
+            return web.Response(status=204)
+        return web.Response(body=lamp[1], content_type="image/png")
+
+
+@pytest.mark.parametrize(
+    ("fault", "blamed"),
+    [
+        ("", set()),
+        ("a deleted lamp is listed", {"deleted-is-gone"}),
+        ("the third lamp is lost", {"created-is-there"}),
+        ("a photo is cut", {"written-is-read"}),
+        ("twins at once", {"created-is-there"}),
+    ],
+)
+def test_things_below_others_with_paths_of_their_own(tmp_path, fault, blamed):
+    device = _Lamps(fault)
+    with small_device(device.description, device.routes) as url:
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*", "--class", "description")
+    assert {f"description/{name}" for name in blamed} <= seen.blamed.keys(), seen.text
+    assert blamed or not seen.blamed, seen.text

@@ -24,6 +24,8 @@ class _Jobs:
         if job["state"] == "running" and time.monotonic() - job["since"] > self.style.get("takes", 0.3):
             job["state"] = "done"
         value = {name: one for name, one in job.items() if name != "since"}
+        if job["state"] in {"done", "cancelled"}:
+            value["finished_at"] = str(time.monotonic() if self.fault == "the end moves" else job["since"])
         return {"job": value} if self.style.get("wrapped") else value
 
     def answer(self, job, status=200):
@@ -87,7 +89,7 @@ def _jobs(style, fault):
     device = _Jobs(style, fault)
     job = {"type": "object", "properties": {"id": {"type": "string"}, "state": {"enum": _STATES}}}
     shown = {"type": "object", "properties": {"job": job}} if style.get("wrapped") else job
-    job["properties"]["runs"] = {"type": "integer"}
+    job["properties"] |= {"runs": {"type": "integer"}, "finished_at": {"type": "string"}}
     status = str(style.get("created", 201))
     said = "In another state it is answered 409, and nothing changes."
     acting = {"200": answers(shown), "204": {"description": "done"}, "409": REFUSED, **_BAD}
@@ -206,6 +208,7 @@ _BROKEN = {
     "a refused start revives": (_jobs, {"takes": 30}, _FOLLOWS),
     "cancelled is started": (_jobs, {"fixed": True, "takes": 30}, _FOLLOWS),
     "a refused start counts": (_jobs, {"fixed": True, "takes": 30}, _KEEPS),
+    "the end moves": (_jobs, {"takes": 0.02}, _FOLLOWS),
     "a rack in use is gone": (_racks, "", _GONE),
 }
 
