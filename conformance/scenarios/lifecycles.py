@@ -329,7 +329,7 @@ class _Cycle:
         if body is None:
             return
         request = self.writer.request(self.create, self.living.at, body)
-        sent = send_together([[(self.writer.api.client, request)] * _CLIENTS])[0]
+        sent = self.writer.api.send_together([request] * _CLIENTS)
         made = [one for one in sent if isinstance(one, Exchange) and one.response.status == HTTPStatus.CREATED]
         for created in made:
             self._register(created, None)
