@@ -57,7 +57,7 @@ class Kind(StrEnum):
 _PLAIN: Final = frozenset({Kind.BEARER, Kind.HEADER})
 
 
-def _altered(secret: str) -> str:
+def _with_another_character(secret: str) -> str:
     """Return a secret with another character in its middle: of a signed token, not in bits that mean nothing."""
     middle = len(secret) // 2
     return secret[:middle] + ("1" if secret[middle : middle + 1] == "0" else "0") + secret[middle + 1 :]
@@ -68,7 +68,7 @@ _NEARLY: Final[dict[str, tuple[Callable[[str], str], str]]] = {
     "": (str, ""),
     "lengthened": (lambda secret: f"{secret}-{WRONG}", f"-{WRONG}"),
     "shortened": (lambda secret: secret[:-1], "_SHORTENED"),
-    "altered": (_altered, "_ALTERED"),
+    "altered": (_with_another_character, "_ALTERED"),
     # Hexadecimal digits mean the same in both cases.
     "recased": (lambda secret: secret if _HEX.fullmatch(secret) else secret.swapcase(), "_RECASED"),
     "emptied": (lambda _: "", "_EMPTIED"),
