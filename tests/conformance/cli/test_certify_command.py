@@ -75,7 +75,7 @@ def test_a_server_that_never_answers_is_not_reached(tmp_path, listening):
 
 
 def test_a_plain_web_server_does_not_conform(tmp_path, web_server):
-    done, result = _certify(tmp_path, "--rest", web_server, "--effort", "quick")
+    done, result = _certify(tmp_path, "--rest", web_server, "--effort", "quick", "--timeout", "4")
     assert (done.returncode, result["verdict"]) == (1, "not-conformant")
     assert result["classes"]["rest-resources"] == "fail"
     failed = next(item for item in result["requirements"] if item["id"] == "rest-resources/pose-type")

@@ -177,7 +177,7 @@ def test_a_right_device_passes_and_its_wrong_twin_fails_at_each_place(shapes, ve
         right = certified(f"{url}/openapi.json", tmp_path / "right")
     assert (right.exit_code, right.blamed) == (0, {}), right.text
     with _device(shapes, version, 1) as url:
-        wrong = certified(f"{url}/openapi.json", tmp_path / "wrong")
+        wrong = certified(f"{url}/openapi.json", tmp_path / "wrong", "--class", "description")
     named = {one["operation"] for one in wrong.result["api"]["operations"] if one["findings"]}
     assert named == {f"GET {path}" for path in shapes}, wrong.text
     assert set(wrong.blamed) == {"description/body-schema"}
