@@ -30,7 +30,7 @@ if hasattr(signal, "SIGQUIT"):
 _LONGEST = (
     "test_ros_gateway.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py", "test_lost_device.py",
     "test_hostile_devices.py", "test_secrets.py", "test_servers.py", "test_things_that_end.py",
-    "test_stateful_devices.py", "test_hanging_operations.py", "test_motion_drive.py", "test_wheel.py",
+    "test_stateful_devices.py", "test_motion_drive.py", "test_wheel.py",
     "test_web_servers.py", "test_gateway.py", "test_load_secrets.py", "test_certify_command.py", "test_soap.py",
     "test_bombs.py",
 )  # fmt: skip
@@ -41,14 +41,15 @@ _OF_COMMANDS = {
 
 
 # Load tests measure. However many processes share the tests, two at most run at a time: one of these, one of the rest.
-_HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in ("command", "workers", "locust", "against")}
+_HALF = ("command", "workers", "described_soap", "locust", "stages", "against")
+_HALF_OF_LOAD_TESTS = {f"tests/loadtests/test_load_{name}.py" for name in _HALF}
 
 
 #: Their tests share nothing, and wait for most of their minutes.
 _APART = (
     "test_ros_gateway.py", "test_ros_proposals.py", "test_sprinklers.py", "test_wired_device.py", "test_lost_robot.py",
-    "test_lost_device.py", "test_secrets.py", "test_things_that_end.py", "test_hanging_operations.py", "test_bombs.py",
-    "test_certify_command.py", "test_endings.py",
+    "test_lost_device.py", "test_secrets.py", "test_things_that_end.py", "test_bombs.py", "test_certify_command.py",
+    "test_endings.py",
 )  # fmt: skip
 
 

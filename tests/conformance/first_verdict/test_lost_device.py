@@ -1,18 +1,21 @@
-"""A device that crashes, hangs or stops listening fails, with the request that did it; a healthy one passes."""
+"""A device that crashes, hangs or stops listening fails, with the request that did it; a healthy or slow one passes."""
 
+import asyncio
 import os
 import shlex
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
+from aiohttp import web
 from processes import free_port
-from small_device import Outcome, certified
+from small_device import Outcome, certified, described, reading, small_device
 
 _ARM = Path(__file__).with_name("arm_server.py")
 
@@ -98,3 +101,27 @@ def test_a_device_that_dies_of_the_first_request_is_no_device_that_was_not_reach
     outcome = judged("first", tmp_path)
     assert outcome.exit_code == 1
     assert only_failure(outcome, "robustness/no-crash")["request"]["url"].endswith("/joints")
+
+
+_SCHEMA = {"type": "object", "required": ["level"], "properties": {"level": {"type": "integer"}}}
+_PATHS = [f"/tank{number}" for number in range(8)]
+
+
+def _device(hanging, takes_s=0.0):
+    async def handle(request: web.Request) -> web.Response:
+        await asyncio.sleep(3600 if request.path in hanging else takes_s)
+        return web.json_response({"level": "full" if request.path == _PATHS[-1] and hanging else 1})
+
+    return small_device(described(dict.fromkeys(_PATHS, reading(_SCHEMA))), {path: {"GET": handle} for path in _PATHS})
+
+
+@pytest.mark.parametrize("hanging", [_PATHS[:2], _PATHS[1:6]])
+def test_what_hangs_is_named_and_the_others_are_judged(hanging, tmp_path):
+    began = time.monotonic()
+    with _device(hanging) as url:
+        done = certified(f"{url}/openapi.json", tmp_path, "--timeout", "2")
+    assert time.monotonic() - began < 120
+    named = {one["operation"] for one in done.requirement("robustness/no-hang")["failures"][0]["operations"]}
+    assert named == {f"GET {path}" for path in hanging}
+    assert done.requirement("description/body-schema")["verdict"] == "fail"
+    assert set(done.blamed) == {"robustness/no-hang", "description/body-schema"}, done.text
