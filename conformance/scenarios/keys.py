@@ -39,6 +39,8 @@ _KEYS: Final = 2
 _IDS: Final = ("id", "uuid", "guid")
 # Statuses by which an operation may refuse a key that came with another body.
 _REFUSALS: Final = frozenset({"409", "422"})
+# Statuses of a creation, and of an activity that begins.
+_MADE: Final = frozenset({HTTPStatus.CREATED, HTTPStatus.ACCEPTED})
 # Phrases in a description which say that a retry gets the first result; below, that a refused request leaves its key
 # unused.
 _FIRST: Final = re.compile(
@@ -133,10 +135,10 @@ class _Rounds:
                 expected = "a refusal with 422 of a key that came before with another body"
                 fault = other.came if other.response.ok else ""
                 yield Keyed(self.operation.label, "other body", other, expected, fault)
-            if len(bodies) > 1 and self._item is not None and first.response.status == HTTPStatus.CREATED:
+            if len(bodies) > 1 and self._item is not None and first.response.status in _MADE:
                 new = self._send(self._request(keys[1], bodies[-1]))
                 made.append(new)
-                is_old = new.response.status == HTTPStatus.CREATED and self._name(new) == name
+                is_old = new.response.status in _MADE and self._name(new) == name
                 expected = f"something else than {name}, which was made for another key and another body"
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
                 # A retry may come after other keys; without a promise, a device may remember few keys.

@@ -58,6 +58,8 @@ _PASSES: Final = re.compile(
 _SHARED: Final = re.compile(r"(?:default|primary|active|selected|current|order|index|rank|priority|position|sequence)$")
 # Formats whose values are equal regardless of case and punctuation.
 _COMPARED: Final = frozenset({"", "email", "uuid", "hostname", "date", "date-time"})
+# Of a text with one of these, the description says how long it may be: a device that shortens it does not keep that.
+_BOUNDED: Final = frozenset({"pattern", "maxLength"})
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
@@ -312,7 +314,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         if isinstance(answer.get(name), str | int | float) and not isinstance(value, bool)
         if "enum" not in flat(parts.get(name, {})) and not _says_exactly(parts.get(name))
         if answer[name] not in (value, before.get(name)) and not is_moved(value, answer[name])
-        if "pattern" not in flat(parts.get(name, {})) or not str(value).startswith(str(answer[name]))
+        if not (_BOUNDED & flat(parts.get(name, {})).keys() and str(value).startswith(str(answer[name])))
     }
     return {**sent, **told}
 
