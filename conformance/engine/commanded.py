@@ -12,7 +12,6 @@ from urllib.parse import quote
 
 from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.openapi import Operation, is_json
-from conformance.engine.map_text import inline
 
 _LASTS: Final = re.compile(r"duration|seconds|timeout|time|hold|ttl", re.IGNORECASE)
 _TURNS: Final = re.compile(
@@ -52,7 +51,8 @@ _OPPOSITES: Final = (
     ("forward", "backward"), ("forward", "back"), ("forwards", "backwards"), ("forward", "reverse"), ("ahead", "back"),
     ("up", "down"), ("left", "right"), ("in", "out"), ("ccw", "cw"), ("positive", "negative"), ("plus", "minus"),
 )  # fmt: skip
-_DEPTH: Final = 6
+#: How deep a schema is read.
+DEPTH: Final = 6
 # A list of names in a description, as "[left, right]"; a longer list is no body of a command.
 _LISTED: Final = re.compile(r"[\[(]\s*[a-z]\w*(?:\s*,\s*[a-z]\w*)+\s*[\])]", re.IGNORECASE)
 _MOST_ITEMS: Final = 8
@@ -146,12 +146,6 @@ def unit_of(place: str, schema: Schema) -> str:
     """Return the unit of a number that its name or its description says; empty: neither does."""
     said = (place, str(schema.get("description", "")))
     return next((unit for text in said for unit, words in _UNITS.items() if re.search(words, text)), "")
-
-
-def direction_line(number: Commanded) -> str:
-    """Return the line of a map that says where a body has the sign of a number."""
-    given = dict(zip(("at", "positive", "negative"), number.direction or (), strict=True))
-    return f"direction = {inline({**given, 'of': number.name})}"
 
 
 def is_velocity(operation: Operation, numbers: Sequence[Commanded]) -> bool:
@@ -255,7 +249,7 @@ def unique_names(places: Sequence[str], titles: Mapping[str, str] = MappingProxy
         at: [part for part in re.split(r"[/#]", text.strip("{}")) if part] or ["value"] for at, text in called.items()
     }
     parts = {at: ["axis", *own] if all(map(str.isdecimal, own)) else own for at, own in parts.items()}
-    for length in range(1, _DEPTH + 2):
+    for length in range(1, DEPTH + 2):
         names = {at: "_".join(one[-_least(one, length) :]) for at, one in parts.items()}
         if len(set(names.values())) == len(names):
             break
@@ -296,11 +290,11 @@ def _lasting(name: str, schema: Schema) -> float:
     return min(max(1000.0 if _MILLI.search(name) else 1.0, least), most)
 
 
-def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Schema]]:
+def numbers_in(schema: Schema, at: str = "", depth: int = DEPTH) -> Iterator[tuple[str, Schema]]:
     """Yield the JSON pointers of the numbers in an object or a list, with their schemas, each once."""
     seen = set[str]()
     for part in parts_of(schema) if depth else ():
-        for name, member in _members(part):
+        for name, member in members_in(part):
             place = f"{at}/{name}"
             if place in seen:
                 continue
@@ -311,12 +305,12 @@ def numbers_in(schema: Schema, at: str = "", depth: int = _DEPTH) -> Iterator[tu
                 yield from numbers_in(member, place, depth - 1)
 
 
-def _members(part: Schema) -> Iterator[tuple[str, Schema]]:
+def members_in(part: Schema) -> Iterator[tuple[str, Schema]]:
     """Yield the members of an object, or the items of a list whose length is known, each with its step of a pointer."""
     for name, member in part.get("properties", {}).items():
         if isinstance(member, dict):
             yield name.replace("~", "~0").replace("/", "~1"), member
-    first, length = part.get("prefixItems", ()), _length(part)
+    first, length = part.get("prefixItems", ()), list_length(part)
     said = _WORDS.findall(str(part.get("description", "")))
     names = [str(name).lower() for name in (_item_names(part) or said)]
     for index in range(length):
@@ -331,7 +325,7 @@ def _item_names(part: Schema) -> list[str]:
     return re.findall(r"\w+", found[0]) if found else []
 
 
-def _length(part: Schema) -> int:
+def list_length(part: Schema) -> int:
     """Return the length of a list, as its schema, an example or a description such as "[left, right]" says; or 0."""
     if not {"items", "prefixItems"} & part.keys():
         return 0
@@ -344,51 +338,6 @@ def _length(part: Schema) -> int:
     most: int = part.get("maxItems", _MOST_ITEMS)
     length = min(next(filter(None, lengths), 0), most)
     return length if length <= _MOST_ITEMS else 0
-
-
-def template_of(schema: Schema, names: Mapping[str, str], at: str = "", depth: int = _DEPTH) -> Any:
-    """Return a body with a template at some places, and values for the other required members.
-
-    Args:
-        schema: of the body.
-        names: templates, or values, by JSON pointer.
-        at: the pointer of this part.
-        depth: so deep at most.
-    """
-    made: dict[str, Any] = {}
-    is_list = False
-    for part in _choose_parts(schema, names, at) if depth else ():
-        required, is_list = part.get("required", ()), is_list or bool(_length(part))
-        for step, member in _members(part):
-            place, name = f"{at}/{step}", step.replace("~1", "/").replace("~0", "~")
-            is_needed = name in required or is_list
-            if name in made:
-                continue
-            if place in names:
-                made[name] = names[place]
-            elif is_numeric(member) and re.search(r"duration|seconds", name, re.IGNORECASE):
-                made[name] = "{seconds}"
-            elif any(one.startswith(f"{place}/") for one in names) or (
-                is_needed and any("properties" in one or _length(one) for one in parts_of(member))
-            ):
-                made[name] = template_of(member, names, place, depth - 1)
-            elif is_needed:
-                made[name] = usual_value(member)
-    return list(made.values()) if is_list else made
-
-
-def _choose_parts(schema: Schema, names: Mapping[str, str], at: str) -> Iterator[Schema]:
-    """Yield a schema's parts, with the alternative that has the most of the places."""
-    yield schema
-    for part in schema.get("allOf", ()):
-        yield from _choose_parts(part, names, at)
-    for key in ("anyOf", "oneOf"):
-        ranked = sorted(
-            (part for part in schema.get(key, ()) if isinstance(part, dict)),
-            key=lambda part: sum(place in names for place, _ in numbers_in(part, at)),
-        )
-        if ranked:
-            yield from _choose_parts(ranked[-1], names, at)
 
 
 def usual_value(schema: Schema) -> Any:

@@ -23,10 +23,8 @@ from conformance.engine.commanded import (
     Commanded,
     body_schema,
     commanded_by,
-    direction_line,
     is_velocity,
     numbers_in,
-    template_of,
     titles_in,
     with_query,
 )
@@ -43,7 +41,7 @@ from conformance.engine.found_preparation import (
     wants_lease,
     wants_more,
 )
-from conformance.engine.map_text import inline, string
+from conformance.engine.map_text import direction_line, inline, string, template_of
 from conformance.measures.samples import SEVERAL, Sample
 from conformance.observe.clock import WALL_CLOCK, Clock
 from conformance.scenarios.motion.binding import Binding

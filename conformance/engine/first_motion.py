@@ -16,16 +16,14 @@ from conformance.engine.commanded import (
     body_schema,
     bounds_of,
     commanded_by,
-    direction_line,
     is_velocity,
     numbers_in,
     parts_of,
-    template_of,
     unit_of,
     with_query,
 )
 from conformance.engine.finding import stop_beside
-from conformance.engine.map_text import inline, key
+from conformance.engine.map_text import direction_line, inline, key, template_of
 
 _GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
 _STAMP: Final = re.compile(r"stamp|timestamp", re.IGNORECASE)

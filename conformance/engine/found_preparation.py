@@ -17,8 +17,8 @@ import msgspec
 
 from conformance.api.call_rules import CallRules, harmful_words, matches, words_of
 from conformance.documents.openapi import Operation
-from conformance.engine.commanded import body_schema, commanded_by, parts_of, template_of, with_query
-from conformance.engine.map_text import inline
+from conformance.engine.commanded import body_schema, commanded_by, parts_of, with_query
+from conformance.engine.map_text import inline, template_of
 from conformance.scenarios.motion.preparing import WANTS_LEASE
 from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.scenario import NotPossibleError

@@ -23,11 +23,12 @@ from winch import Winch
 
 from conformance.api.call_rules import CallRules
 from conformance.documents.openapi import read_operations
-from conformance.engine.commanded import commanded_by, lasting, template_of, titles_in, with_query
+from conformance.engine.commanded import commanded_by, lasting, titles_in, with_query
 from conformance.engine.driven_numbers import Looks, numbers_of
 from conformance.engine.finding import plan_of
 from conformance.engine.found_positions import PositionFinder
 from conformance.engine.found_velocities import VelocityFinder
+from conformance.engine.map_text import template_of
 from conformance.rules.motion.test_motion import stop_rests
 from conformance.rules.motion.test_motion_attempts import unauthorised_still
 from conformance.rules.motion.test_velocities import stopped, velocity
