@@ -330,8 +330,7 @@ def test_a_slide_is_sent_so_far_that_it_can_be_stopped_from_an_end_of_its_travel
 @pytest.mark.parametrize(("said", "most", "speed"), [("mm/s", 300, 300), ("percent of 500 mm/s", 100, None)])
 def test_a_declared_greatest_speed_of_a_move_is_that_of_its_axis(said, most, speed):
     number = {"type": "number", "minimum": 1, "maximum": most, "description": said}
-    motion, _ = _slide(200.0, {"x": {**_NUMBER, "description": "mm"}, "speed": number})
-    assert motion.state.axes["x"].speed == speed
+    assert _slide(200.0, {"x": {**_NUMBER, "description": "mm"}, "speed": number})[0].state.axes["x"].speed == speed
 
 
 def test_what_is_there_at_once_cannot_be_stopped_and_the_user_is_told_what_to_change():
