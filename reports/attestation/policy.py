@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 
@@ -80,6 +80,12 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cases: _Share = 0.04
     max_age_days: Annotated[float, msgspec.Meta(gt=0, le=100_000)] = 365
     nonce: str | None = None
+
+
+#: The default policy for a device that was judged by its own description: one that only read will do.
+OF_DESCRIBED: Final = Policy(
+    classes=("description", "robustness", "http"), requirement_sets=("unfrozen",), motion=False
+)
 
 
 def read_policy(path: Path, known: Known) -> Policy:

@@ -30,9 +30,8 @@ NOT_PROVED = (
     "result. You have to know who holds the key, and decide whether to trust them."
 )
 DESCRIBED = (
-    "This device was judged by its own description, for which the default policy is not made: give a policy for such "
-    "devices and the folder of the description, as in --policy device.toml --contract description "
-    "(docs/certificates.md#a-device-that-was-judged-by-its-own-description)."
+    "This device was judged by its own description: give the folder of the description too, as in "
+    "--contract description (docs/certificates.md#a-device-that-was-judged-by-its-own-description)."
 )
 
 

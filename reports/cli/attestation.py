@@ -9,8 +9,9 @@ import msgspec
 
 from reports.attestation.envelope import read_envelope
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
+from reports.attestation.policy import OF_DESCRIBED
 from reports.attestation.statement import RESULT_SUBJECT
-from reports.attestation.verifying import DESCRIBED, NOT_PROVED, PROVED, Verification
+from reports.attestation.verifying import DESCRIBED, NOT_PROVED, PROVED, Verification, unseal
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.errors import EnvelopeRefusedError
@@ -35,7 +36,9 @@ def keygen(directory: Path) -> None:
 @click.command()
 @click.argument("file", type=FILE)
 @click.option("--key", required=True, type=FILE, metavar="PUB", help="Public key (PEM) of the signer whom you trust.")
-@click.option("--policy", type=FILE, help="What a certificate must meet (TOML).  [default: the strict policy]")
+@click.option(
+    "--policy", type=FILE, help="What a certificate must meet (TOML).  [default: as docs/certificates.md says]"
+)
 @CONTRACT
 @click.option("--nonce", help="The nonce that you gave to the vendor: the run must have been made with it.")
 @click.option("--result", type=FOLDER, metavar="DIR", help="Compare the files of DIR as well.")
@@ -54,17 +57,21 @@ def verify(
 
     Exit code: 0 accepted; 1 refused; 2 wrong usage, or a file cannot be read.
     """
-    wanted, known = policy_of(door, policy, pack)
-    if nonce is not None:
-        wanted = msgspec.structs.replace(wanted, nonce=nonce)
-    trusted = public_key(key)
+    trusted, envelope = public_key(key), read_envelope(file)
     try:
-        found = verified(read_envelope(file), trusted, wanted, known, now=dt.datetime.now(dt.UTC), directory=result)
+        is_described = unseal(envelope, trusted).predicate.roaas.described
+        folder = (result or file.parent) / "description"
+        # Nothing in the folder of a description is run.
+        pack = str(folder) if is_described and pack is None and folder.is_dir() else pack
+        wanted, known = policy_of(door, policy, pack)
+        wanted = OF_DESCRIBED if is_described and policy is None else wanted
+        wanted = msgspec.structs.replace(wanted, nonce=wanted.nonce if nonce is None else nonce)
+        found = verified(envelope, trusted, wanted, known, now=dt.datetime.now(dt.UTC), directory=result)
     except EnvelopeRefusedError as error:
         click.echo(f"REFUSED: {on_a_line(str(error), 500)}\n\nNothing is proved.")
         raise SystemExit(EXIT_REFUSED) from error
     _print(found, trusted.keyid)
-    if not found.accepted and found.statement.predicate.roaas.described and None in {policy, pack}:
+    if not found.accepted and is_described and pack is None:
         click.echo(f"\n{fill(DESCRIBED, 100)}")
     if not found.accepted:
         raise SystemExit(EXIT_REFUSED)

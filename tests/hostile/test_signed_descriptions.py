@@ -7,7 +7,7 @@ import pytest
 from signed_results import Vendor, roaas
 from small_device import certified, constant, described, reading, small_device
 
-from reports.attestation.keys import PRIVATE_NAME, generate
+from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate
 
 _POLICY = """
 classes = ["description", "robustness", "http"]
@@ -63,6 +63,15 @@ def test_the_certificate_of_a_described_device_is_accepted_with_its_files(device
     assert done.exit_code == 0, done.output
     assert "but not signed: readme.txt. Nothing is proved" in " ".join(done.output.split())
     assert ": junit.xml. They were not compared" in " ".join(done.output.split())
+
+
+def test_the_default_policy_of_a_described_device_reads_the_description_beside_the_certificate(device, tmp_path):
+    done = device.verify()
+    assert "REFUSED by your policy: efforts\n" in done.output, "the run was quick"
+    alone = tmp_path / device.envelope.name
+    shutil.copy(device.envelope, alone)
+    done = roaas("verify", alone, "--key", device.keys / PUBLIC_NAME)
+    assert (done.exit_code, "give the folder of the description too" in done.output) == (1, True), done.output
 
 
 def test_a_file_added_to_the_description_is_refused(device, tmp_path):
