@@ -10,7 +10,18 @@ from datetime import datetime
 from itertools import combinations, pairwise
 from typing import Any, Final
 
-from conformance.api.rest.listing import CASELESS, IN_TIME, Listing, Page, listing_of, members_of, number_of, page_of
+from conformance.api.rest.listing import (
+    CASED,
+    CASELESS,
+    IN_TIME,
+    Bound,
+    Listing,
+    Page,
+    listing_of,
+    members_of,
+    number_of,
+    page_of,
+)
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.totals import Totals
 from conformance.documents.json_schema import is_number, kinds_of
@@ -29,6 +40,8 @@ _COMPARED: Final = 60
 _LEAST: Final = 10
 # A server may cut a list at a multiple of this number of items.
 _ROUND: Final = 5
+# How often two lists from a level on must be apart, as an item may come or go meanwhile.
+_SEEN: Final = 2
 # Kinds of items that a sorted list may have: all items of one kind may come before those of another.
 _KINDS: Final = 2
 #: LEVELS: parameters that ask for a level or higher, as log filters do. _INCLUDING: boolean parameters that ask for
@@ -71,6 +84,9 @@ class Lists:
         self._missed: dict[str, list[tuple[str, Callable[[Mapping[str, Any]], bool], Case]]] = defaultdict(list)
         # How many items a list had, by each value of a parameter that bounds a member.
         self._counts: dict[tuple[str, str], dict[float, int]] = defaultdict(dict)
+        # Values that lists from a level on had since the last change, and how often two such lists were apart.
+        self._shown: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(dict)
+        self._apart: dict[tuple[str, str], int] = defaultdict(int)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -78,6 +94,7 @@ class Lists:
             self._totals.note_change(occasion.response.received_s)
             self._whole.clear()
             self._missed.clear()
+            self._shown.clear()
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
@@ -213,6 +230,9 @@ class Lists:
             text, values = sent.get(name), list(self._known_values(listing, page, bound.member))
             if not text:
                 continue
+            if "enum" in flat(bound.parameter.schema):
+                yield from self._levels(occasion, listing, page, sent, bound)
+                continue
             counts, is_sure = self._counts[listing.operation.label, name], bound.is_said
             if len(sent) == 1 and (rank := bound.rank(text)) is not None and len(counts) < _COMPARED:
                 counts[rank] = len(page.items)
@@ -227,6 +247,27 @@ class Lists:
                 doubt = "" if bound.is_said else f"no description says what {name} means"
                 yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
 
+    def _levels(
+        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str], bound: Bound
+    ) -> Iterator[Case]:
+        """Judge a list from a level on by that from another level: in any order, one has the items of both."""
+        name, label = bound.parameter.name, listing.operation.label
+        text, shown = sent[name], self._shown[label, name]
+        limit = {listing.limit.name} if listing.limit is not None else set()
+        if sent.keys() - limit != {name} or _is_cut(listing, page, sent):
+            return
+        shown[text] = {text_of(members_of(item).get(bound.member)) for item in page.items}
+        for other, values in shown.items():
+            if other == text or text not in shown[text] or other not in values:
+                continue
+            wrong = other not in shown[text] and text not in values
+            self._apart[label, name] += wrong
+            if not wrong or self._apart[label, name] >= _SEEN:
+                expected = f"an item with {other} for {name}={text}, or one with {text} for {name}={other}"
+                found, cause = f"only items with {text}", f"{label} {name}"
+                doubt = "" if bound.is_said else f"no description says what {name} means"
+                yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
+
     def _search(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge a search in members that the description names: items that contain the text, and no others."""
         search, label = listing.search, listing.operation.label
@@ -237,7 +278,8 @@ class Lists:
         # A device may leave out spaces around what is sought.
         if text.strip() and sent.keys() == {search.name}:
             names, id_ = " or ".join(listing.searched), "description/list-filter"
-            other = [one for one, item in items.items() if not _contains(listing, item, text, str.casefold)]
+            fold = str if CASED.search(search.says) else str.casefold
+            other = [one for one, item in items.items() if not _contains(listing, item, text, fold)]
             expected = f"items with {text} in {names}, by the description of {search.name}"
             found, doubt = f"the item {''.join(other[:1])}", "a search may find similar words too"
             yield occasion.case(id_, not other, expected, found, cause=cause, doubt=doubt)
@@ -248,9 +290,7 @@ class Lists:
         """Judge that a filter or search keeps each item with what it asks for, in the whole list before and after."""
         items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         path, count = occasion.context.target.partition("?")[0], len(items)
-        most = listing.most(sent)
-        is_cut = page.goes_on or max(page.totals.values(), default=0) > count or 0 < most <= count
-        if is_cut or (count >= _LEAST and count % _ROUND == 0):
+        if _is_cut(listing, page, sent):
             return
         if not sent:
             waiting = self._missed.pop(path, ())
@@ -324,6 +364,13 @@ class Lists:
             f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])}" if wrong else "",
             cause=f"{listing.operation.label} {sorting.member}",
         )
+
+
+def _is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
+    """Return whether a list may have more items than the response shows."""
+    count = len(page.items)
+    is_said = page.goes_on or max(page.totals.values(), default=0) > count or 0 < listing.most(sent) <= count
+    return is_said or (count >= _LEAST and count % _ROUND == 0)
 
 
 def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:

@@ -281,7 +281,8 @@ class _Cycle:
             if not path or self.writer.send(self.read, path).response.status not in ABSENT:
                 return False
         usual = [None] if not things and self.create.method == "POST" else []
-        for body in [*usual, *self.writer.with_items(self.create, self.writer.bodies(self.create, turn), turn)]:
+        bodies = self.writer.bodies(self.create, turn)
+        for body in [*usual, *self.writer.with_items(self.create, bodies, turn, whole=True)]:
             created = self.writer.send(self.create, path, body)
             status = created.response.status
             if status in HELD and not things:

@@ -36,8 +36,9 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
             members_of(item).get(bound.member) for item in page.items if members_of(item).get(bound.member) is not None
         }
         ordered = sorted(there, key=lambda item: bound.rank(str(item)) or 0)
-        # The middle of several values: items lie on both sides, and one at the bound.
-        middle = ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
+        # The middle of several values: items lie on both sides, and one at the bound. Levels have an unknown order.
+        is_level = "enum" in flat(bound.parameter.schema)
+        middle = ordered if is_level else ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
         rows += [
             {bound.parameter.name: text, **whole}
             for item in middle

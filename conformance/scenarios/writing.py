@@ -137,11 +137,19 @@ class Writer:
         first = full if fits(schema, full) else base
         return [another(schema, first, turn, self.values.collections), first, usual.body]
 
-    def with_items(self, operation: Operation, bodies: list[dict[str, Any]], turn: int) -> list[dict[str, Any]]:
-        """Return bodies, before them the first one with several items in each list of objects, if that is another."""
-        schemas = [operation.bodies[name].schema for name in operation.bodies if bodies and is_json(name)]
-        rich = [with_items(schema, bodies[0], turn, self.values.collections) for schema in schemas[:1]]
-        return [*(body for body in rich if body != bodies[0]), *bodies]
+    def with_items(
+        self, operation: Operation, bodies: list[dict[str, Any]], turn: int, *, whole: bool = False
+    ) -> list[dict[str, Any]]:
+        """Return bodies, before them the first one with several items in each list of objects, if that is another.
+
+        Before that one comes another with many items and their optional members, if ``whole``.
+        """
+        schemas = [operation.bodies[name].schema for name in operation.bodies if bodies and is_json(name)][:1]
+        made, collections = list[dict[str, Any]](), self.values.collections
+        for schema in schemas:
+            made += [with_items(schema, bodies[0], turn, collections, whole=True)] if whole else []
+            made += [with_items(schema, bodies[0], turn, collections)]
+        return [*(body for number, body in enumerate(made) if body not in (bodies[0], *made[:number])), *bodies]
 
     def until(self, read: Callable[[], _Read], holds: Callable[[_Read], bool]) -> _Read:
         """Return the first read that meets a condition, or the last one after a few seconds."""
@@ -199,7 +207,7 @@ class Writer:
         """Write other values to a thing, and read them back; None if the device does not accept them, or only later."""
         before = self.send(read, path)
         bodies = self.bodies(operation, turn, members(before, ())) if before.response.ok else []
-        for body in self.with_items(operation, bodies, turn):
+        for body in self.with_items(operation, bodies, turn, whole=True):
             sent = self.conditional(operation, read, path, body)
             if sent.response.ok:
                 is_later = sent.response.status == _ACCEPTED

@@ -52,10 +52,11 @@ _NO_FILTERS: Final = frozenset(
 # Parameters that search texts, and phrases in a description on what they find.
 _SEARCHES: Final = ("q", "search", "query", "text")
 _INCLUDES: Final = re.compile(r"(?:include|with|show)(\w+)")
+_OTHERWISE: Final = re.compile(
+    r"\b(?:words?|prefix|starts?|begins?|fuzzy|similar|tokens?|pattern|response|order\w*|sort\w*)\b", re.IGNORECASE
+)
 _CONTAINS: Final = re.compile(
-    r"^(?!.*\b(?:words?|prefix|starts?|begins?|fuzzy|similar|tokens?|pattern|response|order\w*|sort\w*)\b)"
-    r".*\b(?:contain(?:s|ing)?|substring|occurs|occurring|appears|somewhere in|part of)\b",
-    re.IGNORECASE | re.DOTALL,
+    r"\b(?:contain(?:s|ing)?|substring|occurs|occurring|appears|somewhere in|part of)\b", re.IGNORECASE
 )
 #: Phrases in a description for an order in time; the first group: the newest items come first.
 IN_TIME: Final = re.compile(
@@ -67,6 +68,11 @@ CASELESS: Final = re.compile(
     r"|\bcase (?:is|does) (?:ignored|not)",
     re.IGNORECASE,
 )
+#: Phrases in a description which say that upper and lower case differ. Below: that a search text has no wildcards.
+CASED: Final = re.compile(
+    r"\bcase.?sensitive|\bupper(?:case)? and lower(?:case)? (?:case )?(?:differ|are (?:not|diff))", re.IGNORECASE
+)
+_PLAIN: Final = re.compile(r"\b(?:without|no|not) (?:any )?wildcards?\b", re.IGNORECASE)
 # A search text that no item contains.
 _NOWHERE: Final = "roaas7nowhere"
 # Texts that mean something in a regular expression, and in SQL's LIKE.
@@ -132,6 +138,8 @@ class Listing:
     @cached_property
     def searched(self) -> tuple[str, ...]:
         """The plain names of the members that a search looks at, by its description."""
+        if self.search is not None and (found := _member_in(self.search, self.members)):
+            return (found,)
         said = re.split(r"[.;]\s", self.search.says) if self.search is not None else []
         words = {plain_name(word) for text in said if _CONTAINS.search(text) for word in re.findall(r"\w+", text)}
         return tuple(name for name, part in self.members.items() if name in words and "string" in kinds_of(part))
@@ -254,8 +262,11 @@ def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
         # A word that begins no text, and that some items do not have, shows more.
         words.sort(key=lambda word: (any(text.startswith(word) for text in texts), all(word in text for text in texts)))
         for word in [one for one in words if len(one) > 1][:1]:
-            term = word.swapcase() if CASELESS.search(search.says) else word
-            yield from [{search.name: term}] if fitting(search, term) else []
+            turned = [word.swapcase()] if CASELESS.search(search.says) or CASED.search(search.says) else []
+            terms = turned if CASELESS.search(search.says) else [word, *turned]
+            yield from ({search.name: term} for term in terms if fitting(search, term))
+    if _PLAIN.search(search.says) and fitting(search, "%"):
+        yield {search.name: "%"}
 
 
 def number_of(text: str) -> int:
@@ -386,7 +397,7 @@ def listing_of(operation: Operation) -> Listing | None:
         len(directions) > 1 or not _REVERSING.isdisjoint(query),
         filters,
         tuple(bound for parameter in rest if (bound := bound_of(parameter, plain.members))),
-        next((one for name, one in query.items() if name in _SEARCHES and _CONTAINS.search(one.says)), None),
+        next((one for one in query.values() if _is_search(one, plain.members)), None),
         {
             found[1]: one
             for name, one in query.items()
@@ -394,6 +405,17 @@ def listing_of(operation: Operation) -> Listing | None:
             if kinds_of(plain.members.get(found[1], {})) == {"boolean"}
         },
     )
+
+
+def _member_in(parameter: Parameter, members: Mapping[str, Schema]) -> str:
+    """Return the plain name of the member that a parameter such as `nameContains` searches; empty if there is none."""
+    found = re.fullmatch(r"(\w+)contains", plain_name(parameter.name))
+    return found[1] if found and "string" in kinds_of(members.get(found[1], {})) else ""
+
+
+def _is_search(parameter: Parameter, members: Mapping[str, Schema]) -> bool:
+    is_named = _plain(parameter.name) in _SEARCHES and bool(_CONTAINS.search(parameter.says))
+    return (is_named or bool(_member_in(parameter, members))) and not _OTHERWISE.search(parameter.says)
 
 
 def _plain(name: str) -> str:
@@ -484,8 +506,8 @@ class Bound(NamedTuple):
 def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | None:
     """Return the member that a parameter bounds, by its name, type and description; None if it is no bound."""
     words = [item.lower() for item in _WORD.findall(parameter.name)]
-    kind = _kind(parameter.schema)
-    for index in (0, -1) if words and kind else ():
+    kind, levels = _kind(parameter.schema), flat(parameter.schema).get("enum")
+    for index in (0, -1) if words and (kind or levels) else ():
         if words[index] not in _LEAST | _MOST:
             continue
         rest = "".join(words[1:] if index == 0 else words[:-1])
@@ -494,7 +516,9 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
         named = [name for name in members if name in {f"{rest}{end}" for end in ends}]
         dated = [name for name, one in members.items() if _kind(one) == "date-time"]
         found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [])
-        if found and (kind in _DATES) is (_kind(members[found[0]]) in _DATES) and _kind(members[found[0]]):
+        own, is_level = _kind(members[found[0]]) if found else "", words[index].startswith(("min", "max"))
+        is_level = is_level and bool(levels and named) and flat(members[named[0]]).get("enum") == levels
+        if is_level or (kind and own and (kind in _DATES) is (own in _DATES)):
             is_least = words[index] in _LEAST
             says = _SAYS_LEAST if is_least else _SAYS_MOST
             return Bound(parameter, found[0], is_least, bool(says.search(parameter.says)))

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any, Final, TypeGuard
 
 from conformance.api.rest.references import refers, singular
-from conformance.api.rest.samples import FORMATS, alike_and_apart, fits
+from conformance.api.rest.samples import FORMATS, alike_and_apart, fits, sample
 from conformance.api.rest.values import IDS
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import clip
@@ -63,8 +63,8 @@ _BOUNDED: Final = frozenset({"pattern", "maxLength"})
 # Identifiers that the suite chooses where the client may choose them.
 _CHOSEN: Final = ("roaas-{}", "roaas{}", "3fa85f64-5717-4562-b3fc-2c963f66af{:02}")
 _CHOSEN_NUMBER: Final = 987_001
-# Other items of a list of objects that are made from one.
-_ITEMS: Final = 2
+# Other items of a list of objects that are made from one; _MANY where the schema says how many there may be.
+_ITEMS, _MANY = 2, 12
 # Added to numbers that may have a fraction. Below: offset of a distant time zone.
 _PART: Final = 0.375
 _ELSEWHERE: Final = "-05:00"
@@ -176,8 +176,11 @@ def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozen
     return changed
 
 
-def with_items(schema: Schema, body: Any, turn: int, collections: frozenset[str]) -> Any:
-    """Return a body with several different items in each list of objects, as far as the schema allows it."""
+def with_items(schema: Schema, body: Any, turn: int, collections: frozenset[str], *, whole: bool = False) -> Any:
+    """Return a body with several different items in each list of objects, as far as the schema allows it.
+
+    If ``whole``, the items have their optional members, and there are many where the schema declares a greatest number.
+    """
     parts = flat(schema).get("properties", {}) if isinstance(body, dict) else {}
     changed = dict(body) if parts else body
     for name in [name for name in parts if not is_devices(name, parts[name], collections)]:
@@ -185,7 +188,12 @@ def with_items(schema: Schema, body: Any, turn: int, collections: frozenset[str]
         if isinstance(value, list) and value and isinstance(value[0], dict) and isinstance(items, dict):
             made = [another(items, value[0], turn + number, collections) for number in range(_ITEMS)]
             made = [one for place, one in enumerate(made) if one not in (value[0], *made[:place])]
-            longer = ([*made[:1], value[0], *made[1:]], [*made[:1], value[0]])
+            longer = [[*made[:1], value[0], *made[1:]], [*made[:1], value[0]]]
+            full = {**dict(sample(items, whole=True)), **value[0]} if whole else value[0]
+            if whole and fits(items, full):
+                most = min(_MANY, int(flat(parts[name]).get("maxItems", _ITEMS)))
+                many = [another(items, full, turn + number, collections) for number in range(most)]
+                longer = [[*many[:1], full, *many[2:]], *longer]
             changed[name] = next(
                 (one for one in longer if len(one) > 1 and fits(schema, {**changed, name: one})), value
             )

@@ -480,9 +480,13 @@ def _openapi_of(place: Place) -> dict[str, Any]:
             schema = schema_of(one)
             schema = schema if one.maximum == 1 else {"type": "array", "items": schema}
             given = {"name": name, "in": "query", "required": name.lower() in act.needs, "schema": schema}
-            parameters.append({**given, "description": one.documentation} if one.documentation else given)
+            parameters.append({"description": one.documentation or _sentences_on(name, act), **given})
     success: dict[str, Any] = {"description": ""}
-    success |= {"content": {_JSON: {"schema": schema_of(place.response)}}} if place.response else {}
+    if place.response is not None:
+        shown = schema_of(place.response)
+        for name, one in shown.get("properties", {}).items():
+            one.setdefault("description", _sentences_on(name, act))
+        success["content"] = {_JSON: {"schema": shown}}
     is_made = place.method == "POST" and not place.key and act.makes
     responses = {str(_MADE if is_made else _FOUND): success}
     responses |= {str(_ABSENT): {"description": ""}} if place.method == "GET" and place.key else {}
@@ -512,6 +516,12 @@ def _read_of_item(place: Place) -> dict[str, Any]:
     }
     text = _text_with_409(place.act)
     return {"operationId": place.act.operation.name, "description": text, "parameters": [parameter], "responses": found}
+
+
+def _sentences_on(name: str, act: Act) -> str:
+    """Return the sentences of an operation's documentation that name a value."""
+    sentences = re.split(r"(?<=[.;])\s+", act.operation.documentation)
+    return " ".join(one for one in sentences if re.search(rf"\b{re.escape(name)}\b", one))
 
 
 def _text_with_409(act: Act) -> str:

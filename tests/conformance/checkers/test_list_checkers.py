@@ -213,6 +213,26 @@ def test_a_bound_that_nobody_describes_shows_by_its_effect(counts, blamed, tmp_p
     assert seen.broken == ({FILTER} if blamed else set())
 
 
+@pytest.mark.parametrize(
+    ("name", "kept", "blamed"),
+    [
+        ("min_level", lambda asked, own: own == asked, True),
+        ("min_level", lambda asked, own: own >= asked, False),
+        ("levelMax", lambda asked, own: own <= asked, False),
+        ("begin_level", lambda asked, own: own == asked, False),
+    ],
+)
+@pytest.mark.parametrize("changes", [True, False])
+def test_a_list_from_a_level_on_has_those_above_it(name, kept, blamed, changes, tmp_path):
+    seen = Seen(tmp_path, [word(name, enum=LEVELS)]).read(VALVES)
+    for level in LEVELS:
+        there = [one for one in VALVES if kept(LEVELS.index(level), LEVELS.index(one["level"]))]
+        seen.read(there, **{name: level})
+        if changes:
+            seen.write()
+    assert seen.broken == ({FILTER} if blamed and not changes else set())
+
+
 def test_a_filter_that_takes_a_list_allows_each_of_it(tmp_path):
     parameter = {**word("state"), "schema": {"type": "array", "items": MEMBERS["state"]}, "explode": False}
     seen = Seen(tmp_path, [parameter]).read(VALVES)
@@ -397,6 +417,8 @@ def test_links_by_offset(query, links, blamed, tmp_path):
         ("Searches the names.", "lph", VALVES[1:], False),
     ],
 )
-def test_searches(says, text, found, blamed, tmp_path):
-    seen = Seen(tmp_path, [{**word("q"), "description": says}])
-    assert (FILTER in seen.read(VALVES).read(found, q=text).read(VALVES).broken) == blamed
+@pytest.mark.parametrize("name", ["q", "nameContains"])
+def test_searches(says, text, found, blamed, name, tmp_path):
+    seen = Seen(tmp_path, [{**word(name), "description": says}])
+    blamed |= name != "q" and says.startswith("Searches")
+    assert (FILTER in seen.read(VALVES).read(found, **{name: text}).read(VALVES).broken) == blamed

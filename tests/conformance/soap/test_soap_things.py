@@ -53,6 +53,15 @@ def test_a_second_port_of_one_version_has_things_of_its_own():
     assert {"/jobs/{jobId}", "/other/jobs/{jobId}"} <= found
 
 
+def test_the_documentation_of_an_operation_is_that_of_the_values_that_have_none():
+    text = "<documentation>Jobs by name. limit: at most that many. total: how many.</documentation>"
+    found = _resources(WSDL.replace('<operation name="ListJobs">', f'<operation name="ListJobs">{text}', 1))
+    (listed,) = (one for one in operations_of(found.contract) if one.id == "ListJobs")
+    says = {one.name: one.says.strip() for one in listed.parameters}
+    assert says["limit"] == "limit: at most that many."
+    assert listed.shape["properties"]["total"]["description"] == "How many jobs match, on all pages."
+
+
 @pytest.mark.parametrize(
     ("words", "barred"),
     [

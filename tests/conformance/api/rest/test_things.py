@@ -49,3 +49,12 @@ def test_lists_of_objects_get_as_many_different_items_as_may_be(most, count):
     schema = {"properties": {"steps": {**_SCHEMA["properties"]["steps"], "type": "array", "maxItems": most}}}
     made = with_items(schema, {"steps": [{"a": 1}]}, 1, frozenset())["steps"]
     assert len({one["a"] for one in made}) == len(made) == count
+
+
+@pytest.mark.parametrize(("more", "count"), [({"maxItems": 20}, 12), ({"maxItems": 3}, 3), ({}, 2)])
+def test_whole_items_have_optional_members_and_are_many_where_the_schema_says_how_many(more, count):
+    item = {"type": "object", "required": ["a"], "properties": {"a": {"type": "integer"}, "b": {"type": "boolean"}}}
+    schema = {"properties": {"steps": {"type": "array", "items": item, **more}}}
+    made = with_items(schema, {"steps": [{"a": 1}]}, 1, frozenset(), whole=True)["steps"]
+    assert len(made) == count
+    assert {one["b"] for one in made} == {True, False}
