@@ -174,7 +174,7 @@ class PositionFinder(Finder):
             found = {name: own for name, own in found.items() if name not in lost}
             kept |= {name: _worst(own) for name, own in found.items()}
             took_s = max((one.took_s for one in kept.values()), default=0.0)
-            if part < 1 and took_s > _SLOW_S:
+            if part < 1 and took_s > _SLOW_S and len(numbers) == 1 and not self._lasts:
                 break
             if is_free and part == 1 and found and took_s < _SEEN_S / 2:
                 # It is there too soon to be stopped under way.
