@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -37,6 +38,8 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 # _BEGINNING: operations that start an activity. _KINDS: kinds of things that are tried.
 _BEGINNING, _KINDS = 2, 3
+# How long after it was cancelled an activity is read again, s.
+_GOES_ON_S: Final = 2.5
 # Phrases in a description which say that 409 means a thing in use.
 _IN_USE: Final = re.compile(
     r"\b(?:in use|while|empty|refer|contain|assign|attach|link|need|depend|belong|stand|used|uses|has|have)",
@@ -58,12 +61,14 @@ class Ended:
         state: the member with its state.
         actions: operations of one of them, those that end it last.
         paths: of those that were cancelled, and left to go on.
+        at_s: when that was, s of the monotonic clock.
     """
 
     read: Operation
     state: str
     actions: tuple[Operation, ...]
     paths: tuple[str, ...] = ()
+    at_s: float = 0.0
 
 
 def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
@@ -100,7 +105,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                 if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
                     _walk(writer, kind, path, steps)
-        found.append(replace(kind, paths=tuple(paths)))
+        found.append(replace(kind, paths=tuple(paths), at_s=time.monotonic()))
     return found
 
 
@@ -109,6 +114,8 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
     writer = Writer(api, values)
     for kind in begun:
         ends = [operation for operation in kind.actions if _ends(operation)][:1]
+        # What was cancelled and goes on all the same shows that when it is done.
+        time.sleep(max(0.0, kind.at_s + _GOES_ON_S - time.monotonic()) if kind.paths and ends else 0)
         with suppress(NoAnswerError):
             done = ""
             for path in kind.paths:

@@ -164,6 +164,8 @@ class _Cycle:
                 self._change(self.living.things[0], 0)
                 if self.create.method == "POST" and not self.living.is_over:
                     refuse_creation(self.living, self.create, _REFUSED + 2 * self.round)
+            if self.create.method == "POST" and self.living.things:
+                self._ask_for_next(self.living.things[-1].path)
             if self.living.is_over or not self._create(count * self.round + turn):
                 break
             thing = self.living.things[-1]
@@ -303,6 +305,13 @@ class _Cycle:
             # A POST may have changed what is there, such as a thing with the same key.
             self.living.read_anew()
         return is_new
+
+    def _ask_for_next(self, path: str) -> None:
+        """Read what the next thing may be called: a device must not keep in mind that it was not there."""
+        number = re.search(r"\d{1,9}(?=/?$)", path)
+        if number is not None:
+            text = str(int(number[0]) + 1).rjust(len(number[0]), "0")
+            self.writer.send(self.read, path[: number.start()] + text + path[number.end() :])
 
     def _create_at_once(self, delete: Operation, count: int) -> None:
         """Create things by two clients at the same moment, of which each gets its own, and delete them."""

@@ -113,14 +113,16 @@ class Reaching:
             return False
         self._asked.add(label)
         with suppress(*_QUIET):
-            for names, body in unique.trials(operation, inputs.body, operation.bodies[inputs.media_type].schema):
+            trials = unique.trials(operation, inputs.body, operation.bodies[inputs.media_type].schema)
+            for number, (names, body) in enumerate(trials):
                 exchange = self.api.send(request_of(operation, replace(inputs, body=body)))
                 if exchange.response.ok:
                     self.values.learn(operation, exchange)
                     unique.remember(operation, names)
-                if found is exchange.response.ok:
-                    break
-                found = True
+                    found = True
+                    # The first trial changes all members, of which one may be what has to be new.
+                    if number:
+                        break
         self.api.single[label] = self.api.single.get(label, False) and not found
         return found
 

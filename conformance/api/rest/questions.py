@@ -2,8 +2,9 @@
 
 import itertools
 import json
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from http import HTTPStatus
 from typing import Final
 from urllib.parse import quote
@@ -16,6 +17,7 @@ from conformance.documents.json_schema import Schema, is_numeric
 from conformance.documents.json_shape import shape_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import is_json, operations_of
+from conformance.documents.parameters import plain_name
 from conformance.documents.patterns import PatternError
 from conformance.documents.representation import UnreadableError, read
 from conformance.transport.exchange import BUSY, Outgoing, Response
@@ -24,6 +26,9 @@ from conformance.transport.parallel import Addressed
 # _MARK: start of values that only one client sends. _UNKNOWN: questions for unknown paths.
 _MARK: Final = "roaas-client-"
 _UNKNOWN: Final = 4
+# Fields by which a client recognizes its response, and how many values of one are sent.
+_ECHOED: Final = frozenset({"xrequestid", "requestid", "xcorrelationid", "correlationid", "xtraceid"})
+_ECHOES: Final = 8
 # Characters of a mismatch that a message shows.
 _SHOWN: Final = 400
 
@@ -37,16 +42,23 @@ class Question:
         accept: media type.
         mismatch: returns why a response cannot be the one to this request; empty where it can.
         comes_and_goes: whether the resource may cease to be there, as a goal that ends.
+        headers: further header fields.
     """
 
     path: str
     accept: str
     mismatch: Callable[[Response], str]
     comes_and_goes: bool = False
+    headers: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def fields(self) -> tuple[tuple[str, str], ...]:
+        """The header fields of its request."""
+        return ("Accept", self.accept), *self.headers
 
     def outgoing(self, api: RestInterface) -> Addressed:
         """Return the request of one of several concurrent clients."""
-        return api.client, Outgoing("GET", self.path, (("Accept", self.accept),))
+        return api.client, Outgoing("GET", self.path, self.fields)
 
 
 def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Question]:
@@ -58,9 +70,9 @@ def questions(api: RestInterface, more: Iterable[Question] = ()) -> list[Questio
         api: the robot's REST interface.
         more: further questions, of the contract pack.
     """
-    others = [*_refused_reads(api), *_unknown(), *more]
+    others = [*_refused_reads(api), *_unknown(), *_echoes(api), *more]
     alone = _reads(api)
-    alone += [(item, api.client.send("GET", item.path, headers=(("Accept", item.accept),)).response) for item in others]
+    alone += [(item, api.client.send("GET", item.path, headers=item.fields).response) for item in others]
     usual = [(item, answer.status) for item, answer in alone if not item.mismatch(answer)]
     return [_of_status(item, status) for item, status in usual if status not in CRASHES | BUSY]
 
@@ -74,7 +86,7 @@ def mismatch_of(api: RestInterface, question: Question, answer: Response) -> str
     mismatch = question.mismatch(answer)
     if not mismatch or answer.status in CRASHES | BUSY:
         return ""
-    alone = api.client.send("GET", question.path, headers=(("Accept", question.accept),)).response
+    alone = api.client.send("GET", question.path, headers=question.fields).response
     return "" if question.mismatch(alone) and alone.status == answer.status else mismatch
 
 
@@ -93,7 +105,7 @@ def _of_status(question: Question, status: int) -> Question:
             "" if answer.status in usual else f"status {answer.status} instead of {status}"
         )
 
-    return Question(question.path, question.accept, mismatch)
+    return replace(question, mismatch=mismatch, comes_and_goes=False)
 
 
 def _reads(api: RestInterface) -> list[tuple[Question, Response]]:
@@ -183,6 +195,23 @@ def _refused_reads(api: RestInterface) -> list[Question]:
             path = call.having(name, f"{_MARK}{number}-").path
             found.append(Question(path, JSON, _mark_test(number)))
     return found
+
+
+def _echoes(api: RestInterface) -> Iterator[Question]:
+    """Yield reads with different request ids, where a request and its response have such a field by the description."""
+    for call in working_reads(api):
+        shown = call.operation.headers.get("200", {})
+        names = [one.name for one in call.operation.parameter("header") if plain_name(one.name) in _ECHOED]
+        for name in [name for name in names if name.lower() in shown][:1]:
+            for text in [f"{_MARK}{number}" for number in range(_ECHOES)]:
+                yield Question(call.path, JSON, partial(_other_echo, name, text), headers=((name, text),))
+            return
+
+
+def _other_echo(name: str, text: str, answer: Response) -> str:
+    """Return which value of a request's field a response has in place of its own; empty if it has its own."""
+    came = answer.header(name)
+    return "" if came == text else f"{came} as {name} instead of {text}"
 
 
 def _unknown() -> list[Question]:

@@ -26,6 +26,7 @@ _STEP: Final = 7919
 _STEPS: Final = 40
 # Greatest integer to send where no bound is declared: every language can hold it.
 _GREATEST: Final = 2**31 - 1
+_TIMES: Final = frozenset({"date", "date-time", "time", "duration"})
 _ALPHABETS: Final = (string.digits, string.ascii_lowercase, string.ascii_uppercase)
 
 
@@ -61,7 +62,13 @@ class Unique:
     def _may_be(self, name: str, schema: Schema) -> bool:
         given = flat(schema)
         plain = not given.keys() & {"enum", "const"} and bool(kinds_of(given) & {"string", "integer"})
-        return plain and not given.get("readOnly") and not refers(name, schema, self._collections)
+        # Another digit makes no date of a date.
+        return (
+            plain
+            and given.get("format") not in _TIMES
+            and not given.get("readOnly")
+            and not refers(name, schema, self._collections)
+        )
 
     def remember(self, operation: Operation, names: tuple[str, ...]) -> None:
         """Remember that these members must be new."""

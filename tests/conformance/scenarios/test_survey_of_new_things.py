@@ -1,5 +1,6 @@
 """What must be new in each creation is found by trying, and a write that needs a condition has the entity tag."""
 
+import datetime as dt
 import itertools
 import json
 import re
@@ -33,8 +34,9 @@ _MEMBERS = {
     "slot": {"type": "integer", "minimum": 1, "maximum": 100000},
     "kind": {"type": "string", "enum": ["dna", "rna"]},
     "note": {"type": "string", "maxLength": 40},
+    "filled": {"type": "string", "format": "date", "example": "2021-04-30"},
 }
-_SCHEMA = {"type": "object", "required": ["code", "label", "slot", "kind"], "properties": _MEMBERS}
+_SCHEMA = {"type": "object", "required": ["code", "label", "slot", "kind", "filled"], "properties": _MEMBERS}
 _BODY = {"required": True, "content": {"application/json": {"schema": _SCHEMA}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}
 _TAG = {"name": "If-Match", "in": "header", "required": True, "schema": {"type": "string"}}
@@ -56,6 +58,13 @@ def _description(*headers):
     }
 
 
+def _is_date(text):
+    try:
+        return bool(dt.date.fromisoformat(text))
+    except ValueError:
+        return False
+
+
 class _Tubes:
     """A device that keeps tubes, of which some members are unique.
 
@@ -64,11 +73,12 @@ class _Tubes:
         refusal: the status of a second one.
         there: whether one that reads as the example is there from the beginning.
         wants_tag: the status without If-Match, or 0.
+        labels: those that it takes; empty: all.
     """
 
-    def __init__(self, unique=(), refusal=409, *, there=True, wants_tag=0):
-        self.unique, self.refusal, self.wants_tag = unique, refusal, wants_tag
-        first = {"code": "BX204417", "label": "roaas", "slot": 1, "kind": "dna"}
+    def __init__(self, unique=(), refusal=409, *, there=True, wants_tag=0, labels=()):
+        self.unique, self.refusal, self.wants_tag, self.labels = unique, refusal, wants_tag, labels
+        first = {"code": "BX204417", "label": "roaas", "slot": 1, "kind": "dna", "filled": "2021-04-30"}
         self.tubes = {1: first} if there else {}
         self.posts = []
         self.version = 0
@@ -82,7 +92,7 @@ class _Tubes:
         read = read_json(content)
         body = read.value
         id_ = int(found[1]) if (found := re.fullmatch(r"/tubes/(\d+)", target)) else None
-        if method != "GET" and (read.unreadable or not fits(_SCHEMA, body)):
+        if method != "GET" and (read.unreadable or not fits(_SCHEMA, body) or not _is_date(body["filled"])):
             return 400, {}
         if method == "POST":
             return self._created(body)
@@ -93,6 +103,8 @@ class _Tubes:
 
     def _created(self, body):
         self.posts.append(body)
+        if self.labels and body["label"] not in self.labels:
+            return 422, {"title": "no such label"}
         if self._is_taken(body):
             return self.refusal, {"title": "there is one"}
         self.tubes[max(self.tubes, default=0) + 1] = body
@@ -185,6 +197,14 @@ def test_what_must_be_new_is_new(tmp_path, unique, refusal, there):
     # What another place says may be there already, as the least label of all.
     assert [one.says for one in accepted if not one.ok and one.place.removeprefix("body /") not in unique] == []
     assert again == 201
+
+
+def test_one_member_must_be_new_although_the_device_refuses_all_members_changed(tmp_path):
+    with _surveyor(tmp_path, _Tubes(("code",), labels=("roaas", "a"))) as (surveyor, operations):
+        post = operations["POST /tubes"]
+        for _ in surveyor.explore(post):
+            pass
+        assert surveyor.values.unique.names(post) == ("code",)
 
 
 def test_an_optional_member_that_must_be_new_is_found(tmp_path):
