@@ -142,7 +142,7 @@ class _Lamps:
 
     async def name_in(self, request):
         try:
-            body = await request.json()
+            body = await request.json() if request.content_type == "application/json" else None
         except ValueError:
             return None
         name = body.get("name") if isinstance(body, dict) else None
