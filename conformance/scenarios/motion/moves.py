@@ -11,7 +11,7 @@ from typing import Final, TypeVar
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
-from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, PartialTraceError, scenario
+from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, NotSeenError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Speed
 from conformance.transport.exchange import NoAnswerError
@@ -261,4 +261,19 @@ def _in_a_row(mapped: MappedDevice, what: str, wanted: list[Position]) -> Leg:
     start = mapped.where()
     commands = [mapped.goto(item) for item in wanted]
     last = next((command for command in reversed(commands) if command.is_ok), commands[-1])
-    return Leg(what, start, tuple(commands), tuple(mapped.follow(last)) if last.is_ok else (), mapped.due(last))
+    seen = tuple(mapped.follow(last)) if last.is_ok else ()
+    if seen and not mapped.is_near(seen[-1].values, last.targets):
+        need_reached_alone(mapped, start, last.targets)
+    return Leg(what, start, tuple(commands), seen, mapped.due(last))
+
+
+def need_reached_alone(mapped: MappedDevice, start: Position, target: Position) -> None:
+    """Send a target that was not reached among others alone from the same place: axes may limit each other.
+
+    Raises:
+        NotSeenError: it is not reached then either.
+    """
+    mapped.go("back", start)
+    seen = mapped.go("alone", target).readings
+    if not (seen and mapped.is_near(seen[-1].values, target)):
+        raise NotSeenError("the target is not reached from here when it is sent alone either")

@@ -7,7 +7,7 @@ from typing import Final
 from conformance.scenarios.motion.driving import driven_for_a_moment, with_room
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.measuring import end_of_travel, steady_since
-from conformance.scenarios.motion.moves import need_positions, record_parts
+from conformance.scenarios.motion.moves import need_positions, need_reached_alone, record_parts
 from conformance.scenarios.motion.trace import Command, Drive, Leg, Reading
 from conformance.scenarios.motion.velocities import MEASURED_S
 from conformance.scenarios.scenario import NotPossibleError, scenario
@@ -61,6 +61,13 @@ def _of_clients(mapped: MappedDevice) -> Leg:
         if command.is_ok:
             mapped.note(command.exchange)
     seen = mapped.follow(commands[-1], wanted)
+    here = seen[-1].values if seen else {}
+    if here and not any(mapped.is_near(here, item) for item in wanted):
+        need_reached_alone(
+            mapped,
+            start,
+            min(wanted, key=lambda item: sum(abs(axis.apart(here[name], item[name])) for name, axis in axes)),
+        )
     return Leg("targets of several clients", start, tuple(commands), tuple(seen), mapped.due(commands[-1]))
 
 
