@@ -509,11 +509,11 @@ def survey(api: RestInterface, values: Values) -> Survey:
         surveyor.try_again(operations)
         surveyor.refuse_again(operations)
         gone = {operation.template for operation in deletes}
-        # Other checks read what is there: what was deleted is stored again, and another thing is the usual one.
-        for method in ("PUT", "GET"):
-            for operation in (item for item in first if item.method == method and item.template in gone):
-                if operation.label not in surveyor.given_up:
-                    surveyor.begin(operation)
+        # Other checks read what is there: a file that was deleted is stored again, and another thing is the usual one.
+        stored = [item for item in first if item.method == "PUT" and not collection_of(item.template)]
+        for operation in (*stored, *(item for item in first if item.method == "GET")):
+            if operation.template in gone and operation.label not in surveyor.given_up:
+                surveyor.begin(operation)
     for operation in operations:
         surveyor.look_elsewhere(operation)
     return _repeat_quickest(surveyor, operations)

@@ -24,7 +24,7 @@ WRONG = {
     "stop-lasts": ("arm", "stop-resumes"),
     "new-target": ("arm", "second-then-first"),
     "last-of-many": ("arm", "second-ignored"),
-    "repeated": ("arm", "short:pan"),
+    "repeated": ("arm", "second-stops"),
     "beyond-limits": ("rover", "beyond:x"),
     "velocity": ("rover", "velocity-slow:x"),
     "velocity-stop": ("rover", "velocity-stop-creeps"),
