@@ -4,11 +4,14 @@ Since version 1.2 a failure's `message` says what the suite sent, what it expect
 Before 1.2 `message` held only what the suite got; then the text is composed here.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Protocol, TypeVar
 
+# The end of a sentence before the next one.
+_SENTENCE = re.compile(r"(?<=[.])\s+(?=[A-Z`])")
 CAUSES = {
     "no-response": "No response",
     "hang": "No complete response in time",
@@ -66,6 +69,21 @@ class Finding:
         expected, got = (self.failure[key].rstrip(". ") for key in ("expected", "message"))
         seen = f" Seen {self.failure['seen']:,} times." if self.failure["seen"] > 1 else ""
         return f"{sent}Expected {expected} ({rule}). Got {got}.{seen}"
+
+    @property
+    def rule(self) -> str:
+        """Return the first sentence of the requirement."""
+        return _SENTENCE.split(str(self.requirement["text"]), maxsplit=1)[0]
+
+    @property
+    def brief(self) -> str:
+        """Return what was expected of the request and what it got, without the request's fields and body."""
+        if "observed" not in self.failure:
+            return self.text
+        expected, got = (str(self.failure[key]).rstrip(". ") for key in ("expected", "observed"))
+        doubt = self.failure.get("doubt")
+        may = f" This is a warning, because a right device may do the same: {doubt}." if doubt else ""
+        return f"`{self.subject}`: expected {expected}. Got {got}.{may}"
 
 
 def findings(requirements: Sequence[Mapping[str, Any]], result: Mapping[str, Any]) -> list[Finding]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
     from conformance.engine.certification import Certification
 
+# The end of a sentence before the next one.
+_SENTENCE = re.compile(r"(?<=[.])\s+(?=[A-Z`])")
 _COLOURS = {"pass": "green", "fail": "red", "inconclusive": "yellow"}
 _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-claimed": "not claimed"}
 # A device that is judged by its own description conforms to no contract.
@@ -173,7 +176,8 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     head = f"{_word(requirement, failure)} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}")
-    click.echo(wrap(requirement["text"], "  "))
+    # The others are in the report and in roaas explain.
+    click.echo(wrap(_SENTENCE.split(requirement["text"], maxsplit=1)[0], "  "))
     click.echo(wrap(inert(cause["text"]), "  "))
     if "breaks" in requirement:
         click.echo(wrap(f"what breaks in practice: {requirement['breaks']}", "  "))
