@@ -26,7 +26,9 @@ from nav_msgs.msg import Odometry
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as rclpy_c
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -155,11 +157,20 @@ class ForeignRobot(Node):
             self.finished.set()
 
 
+def _keep_spinning(executor: MultiThreadedExecutor) -> None:
+    while True:
+        try:
+            executor.spin()
+        except (rclpy_c.RCLError, InvalidHandle):
+            continue  # an action server was destroyed while the executor, in this thread, was about to wait for it
+        return
+
+
 def spin(node: Any, context: Context) -> tuple[MultiThreadedExecutor, threading.Thread]:
     """Spin a node and have it obey each line of stdin, until that ends. Returns its executor, in its thread."""
     executor = MultiThreadedExecutor(4, context=context)
     executor.add_node(node)
-    spinner = threading.Thread(target=executor.spin, daemon=True)
+    spinner = threading.Thread(target=_keep_spinning, args=(executor,), daemon=True)
     spinner.start()
     tell(ready=True)
     for line in sys.stdin:
