@@ -56,7 +56,9 @@ _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"}
 #: Operations that end or interrupt an activity.
 ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
 #: Phrases in a description which say that an operation is refused while another thing is in a certain state.
-ANOTHER: Final = re.compile(r"\b(?:while|if|when) another\b[^.;]*", re.IGNORECASE)
+ANOTHER: Final = re.compile(r"\b(?:while|if|when) (?:another\b|one is\b)[^.;]*", re.IGNORECASE)
+# Words in such a phrase for things that share something: two that do not share it may be in that state.
+_SHARING: Final = re.compile(r"\b(?:same|its|this|that|each|per|on|of|for|in|with|by|not)\b", re.IGNORECASE)
 # Phrases in a description which say that a number never decreases.
 _GROWS: Final = re.compile(
     r"\b(?:never|not) (?:falls?|decreases?|drops?|goes? (?:back|down))\b(?! (?:below|under|to))"
@@ -66,6 +68,8 @@ _GROWS: Final = re.compile(
 # Phrases in a description which say that a state is final, and phrases that limit this.
 _IS_FINAL: Final = re.compile(r"([^.;:]*?)\b(?:is|are) (?:final|terminal)\b", re.IGNORECASE)
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
+# What the description does not exclude.
+_OWN_REASON: Final = "the thing may have changed its state for a reason of its own"
 # Members with the time at which a thing has ended.
 _END: Final = re.compile(r"(?:finished|ended|completed|cancell?ed|stopped)(?:at|on|time|date)")
 # Operations after which a counter may start again.
@@ -119,6 +123,15 @@ class Changes:
             operation.label: found
             for operation in operations
             if "409" in operation.responses and (found := _alone(operation))
+        }
+        # By the thing's path template: such states, by what the description says of its creation.
+        self._single = {
+            template: found
+            for operation in operations
+            for template in self._states
+            if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
+            if (found := self._alone.get(operation.label))
+            if not _SHARING.search(_said_alone(operation).partition(",")[0])
         }
         # By operation: the state to which it leads by its description.
         self._leads = {
@@ -187,17 +200,13 @@ class Changes:
         if now and before is not None and before.value in self._said_final.get(template, ()):
             expected = f"{before.value} as {name}, which is final by the description, or a refusal"
             holds = now == before.value or now.casefold() in _AWAY
-            yield self._case(occasion, holds, expected, f"{now} as {name}", operation.label)
+            yield self._case(occasion, holds, expected, f"{now} as {name}", operation.label, doubt="")
         is_kept = was.casefold() in FINAL and "409" in operation.responses and words_of(operation.template) & ENDING
         if is_kept and now:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
-        for said in self._alone.get(operation.label, ()) if now else ():
-            if said == now:
-                near = path.rpartition("/")[0]
-                others = [one for one, state in self._known.items() if state.value == now]
-                for other in (one for one in others if one.rpartition("/")[0] == near):
-                    self._claims[other].append((occasion, now))
+        if now in self._alone.get(operation.label, ()):
+            self._claim(occasion, path, now)
         if now:
             # A device may act later than it responds.
             now = self._leads.get(operation.label, now) if now == was else now
@@ -206,6 +215,12 @@ class Changes:
             self._known[path] = _State(now, at_s, was if is_news else "", operation.label if is_news else "")
         elif is_kept and before is not None:
             self._known[path] = _State(was, before.at_s, by=operation.label)
+
+    def _claim(self, occasion: Occasion, path: str, now: str) -> None:
+        """Note for each other thing of the collection that has a state that another one has it too."""
+        for other, state in self._known.items():
+            if state.value == now and other != path and other.rpartition("/")[0] == path.rpartition("/")[0]:
+                self._claims[other].append((occasion, now))
 
     def _read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Judge a read of a resource."""
@@ -233,8 +248,11 @@ class Changes:
         for claim, state in self._claims.pop(path, ()):
             if now == state and sent_s >= claim.response.received_s:
                 label = claim.operation.label if claim.operation is not None else ""
-                expected = f"a refusal with 409, as {path} was {state} before and after it, and one alone may be so"
+                other = f"a state other than {state}" if claim.request.method == "GET" else "a refusal with 409"
+                expected = f"{other}, as {path} was {state} before and after it, and one alone may be so"
                 yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
+        if now in self._single.get(operation.template.rstrip("/"), ()):
+            self._claim(occasion, path, now)
         before, ends = self._known.get(path), _ends_in(occasion) if now in FINAL else {}
         if before is None or sent_s < before.at_s:
             if before is None and len(self._known) < _MOST_THINGS:
@@ -264,7 +282,9 @@ class Changes:
             expected += f" and as {reason} must leave it" if reason else ""
             # A thing that is done may start again by itself, for example by a timetable.
             wrong = now if reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
-        yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label)
+        is_said = before.value in self._said_final.get(operation.template.rstrip("/"), ())
+        doubt = "" if is_said else _OWN_REASON
+        yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label, doubt=doubt)
         self._known[path] = _State(now, occasion.response.received_s, ends=ends)
 
     def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
@@ -281,8 +301,15 @@ class Changes:
             self._grown[path] = now, answer.received_s
 
     @staticmethod
-    def _case(occasion: Occasion, holds: bool, expected: str, found: str, cause: str) -> Case:  # noqa: FBT001 - as case()
-        return occasion.case("description/states", holds, expected, found, cause=f"{cause} state")
+    def _case(
+        occasion: Occasion,
+        holds: bool,  # noqa: FBT001 - as case()
+        expected: str,
+        found: str,
+        cause: str,
+        doubt: str = _OWN_REASON,
+    ) -> Case:
+        return occasion.case("description/states", holds, expected, found, cause=f"{cause} state", doubt=doubt)
 
 
 def _ends_in(occasion: Occasion) -> dict[str, Any]:
@@ -310,10 +337,13 @@ def state_of(read: Operation) -> str:
     return next(named, "")
 
 
+def _said_alone(operation: Operation) -> str:
+    return " ".join(found[0] for found in ANOTHER.finditer(operation.text))
+
+
 def _alone(operation: Operation) -> frozenset[str]:
-    """Return the words, in backticks or alone, for the state of another thing in which an operation is refused."""
-    said = [found[0] for found in ANOTHER.finditer(operation.text)]
-    return frozenset(word for text in said for word in re.findall(r"`([\w -]+)`", text))
+    """Return the words in backticks for the state of another thing in which an operation is refused."""
+    return frozenset(re.findall(r"`([\w -]+)`", _said_alone(operation)))
 
 
 def _states_of(read: Operation, name: str) -> tuple[str, ...]:

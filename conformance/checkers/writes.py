@@ -59,6 +59,10 @@ GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
 )
+_STAYS: Final = re.compile(
+    r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:keeps?|kept|stays?|remains?|unchanged)\b",
+    re.IGNORECASE,
+)
 # Members with the time of the last change.
 _CHANGED_AT: Final = re.compile(r"(?:last)?(?:updated|modified|changed|edited)(?:at|on|time|date)?")
 _READ, _PATCH, _OWN = (f"description/{name}" for name in ("written-is-read", "patch", "read-only"))
@@ -164,6 +168,8 @@ class Writes:
         self._collections = collections_of(operations)
         self._states: dict[str, _State] = {}
         self._writes: dict[str, list[Occasion]] = defaultdict(list)
+        # By path: members in the last response, to a read or a patch.
+        self._last: dict[str, dict[str, Any]] = {}
         # By path: writes that no read has shown yet.
         self._late: dict[str, Occasion] = {}
         self._moving: set[tuple[str, str]] = set()
@@ -184,6 +190,7 @@ class Writes:
         """Forget all reads: something else may have changed the resources."""
         self._states.clear()
         self._writes.clear()
+        self._last.clear()
         self._late.clear()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -200,12 +207,26 @@ class Writes:
                 self._writes[path].append(occasion)
             return
         state = self._states.get(path) if item is not None else None
-        writes = self._writes.get(path, [])
+        writes, last = self._writes.get(path, []), self._last.get(path, {})
         if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
             self._accepted[path] = read_json(request.body).value
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]
+        if item is not None and operation is not None and occasion.response.ok and request.method == "PATCH":
+            yield from self._answer(occasion, item, operation, last)
+
+    def _answer(
+        self, occasion: Occasion, item: Operation, operation: Operation, before: dict[str, Any]
+    ) -> Iterator[Case]:
+        """Judge a patch by its own response, if that shows all members that the response before it has shown."""
+        moving = frozenset(name for name in before if (item.template, name) in self._moving)
+        change = _Change(occasion, operation, before, before, moving, is_old=True)
+        change = change._replace(now=change.shown_members)
+        if before.keys() <= change.now.keys() and occasion.is_valid and isinstance(change.sent_value, dict):
+            if before:
+                yield from self._others(occasion, item, change)
+            self._last[occasion.context.target] = change.now
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         response = occasion.response
@@ -227,7 +248,7 @@ class Writes:
                     # A device may act later: a later read is compared as well.
                     self._late[path] = write
         if len(self._states) < _MOST:
-            self._states[path] = _State(now, response.received_s)
+            self._states[path], self._last[path] = _State(now, response.received_s), now
 
     def _judge_write(self, occasion: Occasion, item: Operation, write: Occasion, reads: _Sandwich) -> Iterator[Case]:
         operation, request = write.operation, write.request
@@ -489,6 +510,7 @@ class Writes:
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps the members that it does not name; it takes two bodies to rule out chance."""
         parts, label = parts_of(change.schema), change.operation.label
+        is_said = bool(_STAYS.search(change.operation.text))
         for name in change.before.keys() & parts.keys() - change.sent_value.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])
             if was is None or is_devices(name, given, self._collections) or is_shared(name):
@@ -500,10 +522,10 @@ class Writes:
             bodies = self._doubts[label, f"{name} to {clip(now)}"]
             bodies.add(change.write.request.body)
             named = set.intersection(*(set(read_json(body).value) for body in bodies))
-            if len(bodies) >= _SEEN and (is_empty or not named):
+            if len(bodies) >= _SEEN and (is_empty or is_said or not named):
                 expected = f"{clip(was)} as {name}, which {change.label} does not name"
                 found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
-                doubt = "" if is_empty and not named else f"{name} may follow {min(named, default='other members')}"
+                doubt = "" if is_said or (is_empty and not named) else f"{name} may follow {min(named, default='other members')}"
                 yield occasion.case(_PATCH, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
 

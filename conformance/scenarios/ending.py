@@ -21,7 +21,7 @@ from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, id_member, object_in
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ENDING, FINAL, leads_to, state_member, state_of
+from conformance.checkers.changes import ANOTHER, ENDING, FINAL, leads_to, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import read_json
@@ -91,6 +91,10 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         pauses = [operation for operation in ends if words_of(operation.template.rpartition("/")[2]) & _PAUSING][:1]
         ends = [operation for operation in ends if operation not in pauses][:1]
         first = [*pauses, *begins[:1], *begins]
+        is_single = create is not None and bool(ends) and _is_single(create)
+        if is_single:
+            with api.run.limit.lift(), suppress(NoAnswerError):
+                _begin_together(writer, kind, create, ends)
         for steps in (
             [*first, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)],
             first,
@@ -101,12 +105,35 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                 if create is None:
                     _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
                     break
+                if is_single and create is not None:
+                    _end_active(writer, kind, ends)
                 made = writer.send(create)
                 if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
                     _walk(writer, kind, path, steps)
         found.append(replace(kind, paths=tuple(paths), at_s=time.monotonic()))
     return found
+
+
+def _is_single(create: Operation) -> bool:
+    """Return whether a creation is refused by its description while another thing is active."""
+    return "409" in create.responses and bool(ANOTHER.search(create.text))
+
+
+def _end_active(writer: Writer, kind: Ended, ends: list[Operation]) -> None:
+    """End a listed thing that is active."""
+    if active := _listed(writer, kind, is_done=False):
+        _walk(writer, kind, active, ends)
+
+
+def _begin_together(writer: Writer, kind: Ended, create: Operation, ends: list[Operation]) -> None:
+    """Begin two things by two clients at once, of which one has to be refused; read both."""
+    _end_active(writer, kind, ends)
+    sent = writer.api.send_together([writer.request(create)] * 2)
+    made = [one for one in sent if isinstance(one, Exchange) and one.response.ok]
+    paths = [path for one in made if (path := location_of(writer.api, kind.read, one))]
+    for path in (*paths, *paths[:1]):
+        writer.send(kind.read, path)
 
 
 def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
@@ -121,7 +148,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
             for path in kind.paths:
                 now = members(writer.send(kind.read, path), (kind.state,)).get(kind.state)
                 done = path if str(now).casefold() in FINAL and path != kind.paths[0] else done
-            done = done or (_listed_as_done(writer, kind) if ends else "")
+            done = done or (_listed(writer, kind, is_done=True) if ends else "")
             if done:
                 _walk(writer, kind, done, ends)
 
@@ -151,13 +178,14 @@ def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
     return [*forth, *reversed(actions), *reversed(actions)]
 
 
-def _listed_as_done(writer: Writer, kind: Ended) -> str:
-    """Return the path of a listed thing that is done."""
+def _listed(writer: Writer, kind: Ended, *, is_done: bool) -> str:
+    """Return the path of a listed thing that is done, or of one that is not."""
     lister = callable_operations(writer.api).get(("GET", collection_of(kind.read.template)))
     items = items_of(read_json(writer.send(lister).response.body).value) if lister is not None else None
     for item in items or []:
         id_ = id_member(item, kind.read)[1]
-        if isinstance(item, dict) and id_ is not None and str(item.get(kind.state)).casefold() in FINAL:
+        state = str(item.get(kind.state, "")).casefold() if isinstance(item, dict) and id_ is not None else ""
+        if state and (state in FINAL) is is_done:
             return f"{collection_of(kind.read.template)}/{id_}"
     return ""
 

@@ -18,8 +18,9 @@ _TOGETHER: Final = 3
 _WITH_PART: Final = 6
 # A total is taken to be exceeded by this limit.
 _MORE: Final = 2
-# Difference from UTC of a distant time zone, h.
-_FAR_H: Final = 11
+# _LATER: between the last item and an instant after it. _FAR: difference from UTC of a distant time zone.
+_LATER: Final = timedelta(hours=1)
+_FAR: Final = timedelta(hours=11)
 
 
 def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
@@ -39,10 +40,10 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
         # The middle of several values: items lie on both sides, and one at the bound. Levels have an unknown order.
         is_level = "enum" in flat(bound.parameter.schema)
         middle = ordered if is_level else ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
+        beyond = [_beyond(ordered[-1 if bound.is_least else 0], is_least=bound.is_least)] if ordered else []
         rows += [
             {bound.parameter.name: text, **whole}
-            for item in middle
-            for text in (item, _elsewhere(item, is_least=bound.is_least))
+            for text in (*middle, *beyond)
             if len(ordered) > 1 and text is not None and fitting(bound.parameter, text)
         ]
     if listing.sort is not None:
@@ -68,14 +69,15 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
             yield {**sorts, **row, **part, **later}
 
 
-def _elsewhere(value: Any, *, is_least: bool) -> str | None:
-    """Return an instant as clocks far away show it; a device that ignores the offset lets too many items pass."""
+def _beyond(value: Any, *, is_least: bool) -> str | None:
+    """Return an instant that excludes all items, as clocks far away show it; without its offset it excludes none."""
+    sign = 1 if is_least else -1
     try:
         at = datetime.fromisoformat(value)
-    except (TypeError, ValueError):
+        far = (at + sign * _LATER).astimezone(timezone(-sign * _FAR)) if at.tzinfo is not None else None
+    except (TypeError, ValueError, OverflowError):
         return None
-    zone = timezone(timedelta(hours=-_FAR_H if is_least else _FAR_H))
-    return at.astimezone(zone).isoformat(timespec="milliseconds") if at.tzinfo is not None else None
+    return far.isoformat(timespec="milliseconds") if far is not None else None
 
 
 def _together(listing: Listing, page: Page) -> list[dict[str, Any]]:

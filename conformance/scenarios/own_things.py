@@ -184,8 +184,13 @@ class _Thing:
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._send_refusable(change, refusable)
             self._at_once(change, bodies)
-            singles = bodies[:_SINGLES] if change.method == "PATCH" else []
-            alone = bodies if self.tag and change is changes[0] else bodies[-1:] + singles
+            singles = bodies[:-1][:_SINGLES] if change.method == "PATCH" else []
+            # The second member is written between two writes of the first one, which must leave it as it is.
+            now = members(first.exchange, ())
+            old = {name: now[name] for name in singles[0] if name in now} if len(singles) > 1 else {}
+            again = [old, *reversed(singles[:2])] if old else []
+            first_all = self.tag and change is changes[0]
+            alone = [*bodies[:-1], *again, *bodies[-1:]] if first_all else [*bodies[-1:], *singles, *again]
             for turn, body in enumerate(
                 alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
             ):

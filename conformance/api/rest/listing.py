@@ -515,7 +515,8 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
         ends = ("", "at", "on", "date", "time") if rest and kind in _DATES else ("",)
         named = [name for name in members if name in {f"{rest}{end}" for end in ends}]
         dated = [name for name, one in members.items() if _kind(one) == "date-time"]
-        found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [])
+        said = {name for text in re.findall(r"`([\w.-]+)`", parameter.says) if (name := plain_name(text)) in members}
+        found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [*said] * (len(said) == 1))
         own, is_level = _kind(members[found[0]]) if found else "", words[index].startswith(("min", "max"))
         is_level = is_level and bool(levels and named) and flat(members[named[0]]).get("enum") == levels
         if is_level or (kind and own and (kind in _DATES) is (own in _DATES)):
