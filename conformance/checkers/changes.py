@@ -66,7 +66,10 @@ _GROWS: Final = re.compile(
     re.IGNORECASE,
 )
 # Phrases in a description which say that a state is final, and phrases that limit this.
-_IS_FINAL: Final = re.compile(r"([^.;:]*?)\b(?:is|are) (?:final|terminal)\b", re.IGNORECASE)
+_IS_FINAL: Final = re.compile(
+    r"((?:[^.;:]*[;:,] (?=(?:both|they|these|all|all of them) are ))?[^.;:]*?)\b(?:is|are) (?:final|terminal)\b",
+    re.IGNORECASE,
+)
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
 # What the description does not exclude.
 _OWN_REASON: Final = "the thing may have changed its state for a reason of its own"
@@ -130,7 +133,7 @@ class Changes:
             for operation in operations
             for template in self._states
             if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
-            if (found := self._alone.get(operation.label))
+            if (found := self._alone.get(operation.label, frozenset()))
             if not _SHARING.search(_said_alone(operation).partition(",")[0])
         }
         # By operation: the state to which it leads by its description.
@@ -243,15 +246,10 @@ class Changes:
 
     def _state(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
         """Judge the state of a thing by its earlier states in responses."""
-        name = self._states[operation.template.rstrip("/")]
-        sent_s = occasion.sent_s
-        for claim, state in self._claims.pop(path, ()):
-            if now == state and sent_s >= claim.response.received_s:
-                label = claim.operation.label if claim.operation is not None else ""
-                other = f"a state other than {state}" if claim.request.method == "GET" else "a refusal with 409"
-                expected = f"{other}, as {path} was {state} before and after it, and one alone may be so"
-                yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
-        if now in self._single.get(operation.template.rstrip("/"), ()):
+        template = operation.template.rstrip("/")
+        name, sent_s = self._states[template], occasion.sent_s
+        yield from self._judge_claims(occasion, path, now)
+        if now in self._single.get(template, ()):
             self._claim(occasion, path, now)
         before, ends = self._known.get(path), _ends_in(occasion) if now in FINAL else {}
         if before is None or sent_s < before.at_s:
@@ -262,7 +260,7 @@ class Changes:
         if ends and before.ends:
             expected = f"the {', '.join(ends)} of what was {now} before"
             found = f"{ends[moved[0]]} as {moved[0]}, and {before.ends[moved[0]]} before" if moved else ""
-            is_said = now in _CANCELLED or now in self._said_final.get(operation.template.rstrip("/"), ())
+            is_said = now in _CANCELLED or now in self._said_final.get(template, ())
             cause, doubt = f"{operation.label} end", "" if is_said else "it may have run again meanwhile"
             yield occasion.case("description/states", not moved, expected, found, cause=cause, doubt=doubt)
         is_late = sent_s - before.at_s > _SETTLES_S
@@ -282,10 +280,19 @@ class Changes:
             expected += f" and as {reason} must leave it" if reason else ""
             # A thing that is done may start again by itself, for example by a timetable.
             wrong = now if reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
-        is_said = before.value in self._said_final.get(operation.template.rstrip("/"), ())
+        is_said = before.value in self._said_final.get(template, ())
         doubt = "" if is_said else _OWN_REASON
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label, doubt=doubt)
         self._known[path] = _State(now, occasion.response.received_s, ends=ends)
+
+    def _judge_claims(self, occasion: Occasion, path: str, now: str) -> Iterator[Case]:
+        """Judge whether another thing had a state while this one had it too, which one alone may have."""
+        for claim, state in self._claims.pop(path, ()):
+            if now == state and occasion.sent_s >= claim.response.received_s:
+                label = claim.operation.label if claim.operation is not None else ""
+                other = f"a state other than {state}" if claim.request.method == "GET" else "a refusal with 409"
+                expected = f"{other}, as {path} was {state} before and after it, and one alone may be so"
+                yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
 
     def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
         """Judge the members of a thing that never decrease, by the description."""
@@ -380,6 +387,7 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
         for operation in operations
         if f"{operation.template}/".startswith(f"{read.template.rstrip('/')}/")
     ]
+    own.append(str(given.get("description", "")))
     said = [found[1] for text in own for found in _IS_FINAL.finditer(text) if not _UNLESS.search(found[1])]
     words = {word for text in said for word in re.findall(r"[\w-]+", text.casefold())}
     return frozenset(str(item) for item in given.get("enum", ()) if str(item).casefold() in words)

@@ -7,7 +7,7 @@ from typing import Final
 
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.things import doubt_of_write
-from conformance.checkers import declared, fields, problem
+from conformance.checkers import declared, fields, problem, texts
 from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
@@ -30,7 +30,7 @@ from conformance.verdict.evidence import Case
 _ANY: Final = (fields.framing, fields.content_type, fields.once, fields.date, fields.last_modified, fields.formats)
 _DOCUMENTS: Final = (
     fields.json, fields.charset, problem.inside, problem.same_status, problem.form, fields.allow, fields.challenge,
-    fields.promised_fields, declared.crash, declared.server_error, declared.status, declared.body,
+    fields.promised_fields, declared.crash, declared.server_error, declared.status, declared.body, texts.whole,
 )  # fmt: skip
 
 # What a device may show later, or as what is in effect, if its description says so.

@@ -8,15 +8,20 @@ from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from conformance.api.rest.listing import items_of
+from conformance.api.rest.things import object_in, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import is_json
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.transport.reach import joined
 from conformance.verdict.evidence import Case
 
 # URLs that are remembered.
 _MOST: Final = 1000
+# Shorter texts are compared with later reads only.
+_LONG: Final = 100
 _SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
 
@@ -83,6 +88,23 @@ class Texts:
             is_begin = seen and text.startswith(seen) and text[len(seen) :].strip()[:1] < "\U00010000"
             doubt, found = "it may keep only the beginning of a text" if is_begin else "", f"{name} {clip(seen)}"
             yield occasion.case("description/written-is-read", same, expected, found, cause=cause, doubt=doubt)
+
+
+def whole(occasion: Occasion) -> Iterator[Case]:
+    """Judge whether the response to a write shows long texts whole, if its schema allows their length."""
+    answer, operation = occasion.response, occasion.operation
+    is_told = answer.status in {HTTPStatus.OK, HTTPStatus.CREATED} and is_json(answer.media_type)
+    if operation is None or occasion.request.method in SAFE_METHODS or not is_told or not occasion.is_valid:
+        return
+    sent, parts = _members(occasion.request.body, occasion.request.media_type), parts_of(operation.shape)
+    told = object_in(read_json(answer.body).value, {plain_name(name) for name in sent})
+    for name, value in sent.items():
+        now, most = told.get(name), flat(parts.get(name) or {}).get("maxLength")
+        if isinstance(value, str) and isinstance(now, str) and isinstance(most, int) and _LONG < len(value) <= most:
+            is_cut = len(now) < len(value) and value.startswith(now.rstrip(".… "))
+            expected, found = f"{len(value)} characters as {name}, as sent", f"the first {len(now)} of them"
+            cause = f"{operation.label} {name} cut"
+            yield occasion.case("description/written-is-read", not is_cut, expected, found * is_cut, cause=cause)
 
 
 def _members(body: bytes, media_type: str) -> dict[str, Any]:

@@ -60,7 +60,7 @@ GONE: Final = re.compile(
     re.IGNORECASE,
 )
 _STAYS: Final = re.compile(
-    r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:keeps?|kept|stays?|remains?|unchanged)\b",
+    r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:keep|kept|stay|remain|unchanged)",
     re.IGNORECASE,
 )
 # Members with the time of the last change.
@@ -213,19 +213,16 @@ class Writes:
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]
-        if item is not None and operation is not None and occasion.response.ok and request.method == "PATCH":
-            yield from self._answer(occasion, item, operation, last)
+        if item is not None and occasion.response.ok and request.method == "PATCH":
+            yield from self._answer(occasion, item, last)
 
-    def _answer(
-        self, occasion: Occasion, item: Operation, operation: Operation, before: dict[str, Any]
-    ) -> Iterator[Case]:
+    def _answer(self, occasion: Occasion, item: Operation, before: dict[str, Any]) -> Iterator[Case]:
         """Judge a patch by its own response, if that shows all members that the response before it has shown."""
         moving = frozenset(name for name in before if (item.template, name) in self._moving)
-        change = _Change(occasion, operation, before, before, moving, is_old=True)
+        change = _Change(occasion, occasion.operation or item, before, before, moving, is_old=True)
         change = change._replace(now=change.shown_members)
         if before.keys() <= change.now.keys() and occasion.is_valid and isinstance(change.sent_value, dict):
-            if before:
-                yield from self._others(occasion, item, change)
+            yield from self._others(occasion, item, change) if before else ()
             self._last[occasion.context.target] = change.now
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
@@ -513,11 +510,9 @@ class Writes:
         is_said = bool(_STAYS.search(change.operation.text))
         for name in change.before.keys() & parts.keys() - change.sent_value.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])
-            if was is None or is_devices(name, given, self._collections) or is_shared(name):
+            if was is None or same(was, now) or is_devices(name, given, self._collections) or is_shared(name):
                 continue
             default = flat(parts_of(item.shape).get(name) or {}).get("default", given.get("default"))
-            if same(was, now):
-                continue
             is_empty = now is None or same(now, default) or now in ("", [], {}, 0, False)
             bodies = self._doubts[label, f"{name} to {clip(now)}"]
             bodies.add(change.write.request.body)
@@ -525,7 +520,8 @@ class Writes:
             if len(bodies) >= _SEEN and (is_empty or is_said or not named):
                 expected = f"{clip(was)} as {name}, which {change.label} does not name"
                 found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
-                doubt = "" if is_said or (is_empty and not named) else f"{name} may follow {min(named, default='other members')}"
+                follows = f"{name} may follow {min(named, default='other members')}"
+                doubt = "" if is_said or (is_empty and not named) else follows
                 yield occasion.case(_PATCH, False, expected, found, cause=cause, doubt=doubt)  # noqa: FBT003
 
 

@@ -92,7 +92,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         ends = [operation for operation in ends if operation not in pauses][:1]
         first = [*pauses, *begins[:1], *begins]
         is_single = create is not None and bool(ends) and _is_single(create)
-        if is_single:
+        if is_single and create is not None:
             with api.run.limit.lift(), suppress(NoAnswerError):
                 _begin_together(writer, kind, create, ends)
         for steps in (
@@ -105,7 +105,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                 if create is None:
                     _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
                     break
-                if is_single and create is not None:
+                if is_single:
                     _end_active(writer, kind, ends)
                 made = writer.send(create)
                 if (path := location_of(api, read, made)) and made.response.ok:

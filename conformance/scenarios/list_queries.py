@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any, Final
 
 from conformance.api.rest.listing import Listing, Page, fitting, members_of, searches
@@ -12,6 +12,8 @@ from conformance.documents.json_schema import kinds_of
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
 
+# _FILTERS: filters of a list by which one thing is chosen. _MOST_ITEMS: items of that list.
+_FILTERS, _MOST_ITEMS = 3, 1000
 # Pairs of parameters that are sent together.
 _TOGETHER: Final = 3
 # How many values are also sent together with a page limit.
@@ -98,6 +100,17 @@ def _together(listing: Listing, page: Page) -> list[dict[str, Any]]:
         if first != second and these - those and those - these:
             found.setdefault((first, second), {first: one, second: other})
     return list(found.values())[:_TOGETHER]
+
+
+def choosing(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the queries of a list that choose a thing by a member, or sort all, with as many items as may be."""
+    limit, own = listing.limit, members_of(thing)
+    most = flat(limit.schema).get("maximum") if limit is not None else None
+    many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
+    found = [(one, own.get(name)) for name, one in listing.filters.items()]
+    usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)][:_FILTERS]
+    usable += [(listing.sort, text) for text in islice(listing.sortings, 1) if listing.sort is not None]
+    yield from ({one.name: value, **many} for one, value in usable)
 
 
 def choices_of(parameter: Parameter, name: str, page: Page) -> list[Any]:

@@ -13,7 +13,7 @@ from urllib.parse import quote
 from conformance.api.rest.applicable import allows, callable_operations
 from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.listing import Listing, fitting, listing_of, members_of, page_of
+from conformance.api.rest.listing import Listing, listing_of, page_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
@@ -28,6 +28,7 @@ from conformance.documents.openapi import Operation, is_json, operations_of, res
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
 from conformance.scenarios.creating import created_path, other_texts, with_texts
+from conformance.scenarios.list_queries import choosing
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
@@ -46,9 +47,8 @@ ANOTHER: Final = "another thing"
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 # Members of a resource that are written singly.
 _MEMBERS: Final = 6
-# _FILTERS: filters of a list that are tried. _SETTLES_S: how long a deleted thing may still be listed, s. _PAUSE_S:
-# between reads.
-_FILTERS, _SETTLES_S, _PAUSE_S, _MOST_ITEMS = 3, 3.2, 0.4, 1000
+# _SETTLES_S: how long a deleted thing may still be listed, s. _PAUSE_S: pause between reads, s.
+_SETTLES_S, _PAUSE_S = 3.2, 0.4
 # _NEITHER: a list of entity tags that no content has.
 _NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
 _GONE_PLACE: Final = "path of what was deleted"
@@ -184,13 +184,7 @@ class _Thing:
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._send_refusable(change, refusable)
             self._at_once(change, bodies)
-            singles = bodies[:-1][:_SINGLES] if change.method == "PATCH" else []
-            # The second member is written between two writes of the first one, which must leave it as it is.
-            now = members(first.exchange, ())
-            old = {name: now[name] for name in singles[0] if name in now} if len(singles) > 1 else {}
-            again = [old, *reversed(singles[:2])] if old else []
-            first_all = self.tag and change is changes[0]
-            alone = [*bodies[:-1], *again, *bodies[-1:]] if first_all else [*bodies[-1:], *singles, *again]
+            alone = self._singly(change, bodies, whole_last=bool(self.tag and change is changes[0]))
             for turn, body in enumerate(
                 alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
             ):
@@ -215,6 +209,16 @@ class _Thing:
                     waits = time.monotonic() < until
                     time.sleep(_PAUSE_S if waits else 0)
                     self.get()
+
+    def _singly(self, change: Operation, bodies: list[Any], *, whole_last: bool) -> list[Any]:
+        """Return bodies of several writes: each member alone, and all together, which restores them.
+
+        The second member is written between two writes of the first one, which must leave it as it is.
+        """
+        singles, now = bodies[:-1][:_SINGLES] if change.method == "PATCH" else [], self._members()
+        old = [{name: now[name] for name in singles[0] if name in now}] if len(singles) > 1 else []
+        again = [*old, *reversed(singles[: 2 * len(old)])]
+        return [*bodies[:-1], *again, *bodies[-1:]] if whole_last else [*bodies[-1:], *singles, *again]
 
     def _send_refusable(self, change: Operation, bodies: Sequence[Any] = ()) -> None:
         """Send requests whose headers alone let the device refuse them, and read after each.
@@ -511,7 +515,7 @@ class _Thing:
         was, began = members(self.last, ()) if self.last is not None else {}, time.monotonic()
         listing = listing_of(lister) if lister is not None and lister.label not in self.api.streams else None
         id_ = identifier_of(was, self.read)
-        queries = list(_filters(listing, was)) if listing is not None and id_ else []
+        queries = list(choosing(listing, was)) if listing is not None and id_ else []
         read_numbers(Writer(self.api, self.surveyor.values), lister, self.target.rpartition("/")[0])
         for query in queries:
             # A device may cache the response.
@@ -588,17 +592,6 @@ def _fits(change: Operation, tags: str) -> bool:
     return all(
         fits(parameter.schema, tags) for parameter in change.parameter("header") if parameter.name.lower() == "if-match"
     )
-
-
-def _filters(listing: Listing, thing: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the queries of a list that choose a thing by a member, or sort all, with as many items as may be."""
-    limit, own = listing.limit, members_of(thing)
-    most = flat(limit.schema).get("maximum") if limit is not None else None
-    many = {limit.name: min(most, _MOST_ITEMS)} if limit is not None and isinstance(most, int) else {}
-    found = [(one, own.get(name)) for name, one in listing.filters.items()]
-    usable = [(one, value) for one, value in found if isinstance(value, str | int) and fitting(one, value)][:_FILTERS]
-    usable += [(listing.sort, text) for text in islice(listing.sortings, 1) if listing.sort is not None]
-    yield from ({one.name: value, **many} for one, value in usable)
 
 
 def _is_beyond_ascii(body: dict[str, Any]) -> bool:
