@@ -67,7 +67,8 @@ _GROWS: Final = re.compile(
 )
 # Phrases in a description which say that a state is final, and phrases that limit this.
 _IS_FINAL: Final = re.compile(
-    r"((?:[^.;:]*[;:,] (?=(?:both|they|these|all|all of them) are ))?[^.;:]*?)\b(?:is|are) (?:final|terminal)\b",
+    r"((?:[^.;:]*[;:,] (?=(?:both|all(?: of them)?|they|these|that|it) (?:is|are) ))?[^.;:]*?)"
+    r"\b(?:is|are) (?:final|terminal)\b",
     re.IGNORECASE,
 )
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
@@ -267,6 +268,8 @@ class Changes:
         # The state that the response announced has not come yet.
         if before.told and now != before.value and now.casefold() not in FINAL and not is_late:
             return
+        is_said = before.value in self._said_final.get(template, ())
+        is_final = is_said or before.value.casefold() in FINAL
         wrong, expected = "", f"{before.value} as {name}, as it was read before"
         if before.told and now != before.value:
             expected = f"{before.value} as {name}, to which {before.told} led by its response or description"
@@ -275,12 +278,11 @@ class Changes:
         elif before.refused and now.casefold() in _CANCELLED and before.value.casefold() not in FINAL:
             expected += f" and as {before.refused} must leave it"
             wrong = now
-        elif before.value.casefold() in FINAL and now != before.value and now.casefold() not in _AWAY:
+        elif is_final and now != before.value and now.casefold() not in _AWAY:
             reason = before.refused or before.by
             expected += f" and as {reason} must leave it" if reason else ""
             # A thing that is done may start again by itself, for example by a timetable.
-            wrong = now if reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
-        is_said = before.value in self._said_final.get(template, ())
+            wrong = now if is_said or reason or before.value.casefold() in _CANCELLED or now.casefold() in FINAL else ""
         doubt = "" if is_said else _OWN_REASON
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label, doubt=doubt)
         self._known[path] = _State(now, occasion.response.received_s, ends=ends)

@@ -13,7 +13,10 @@ _BELT = {
     "type": "object",
     "properties": {
         "id": {"type": "string"},
-        "state": {"enum": ["stopped", "running", "paused", "done"]},
+        "state": {
+            "enum": ["stopped", "running", "paused", "done", "scrapped"],
+            "description": "It becomes `scrapped` by wear; that is final.",
+        },
         "runs": {},
         "archived": {"type": "boolean"},
     },
@@ -42,6 +45,8 @@ def _contract(tmp_path_factory):
     }
     put = {"summary": "409 if the belt is archived.", "responses": acted}
     paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}, "put": put}
+    begin = {"summary": "Only one belt runs at a time: while one is `running`, 409.", "responses": acted}
+    paths["/belts"] = {"post": begin}
     paths["/belts/{id}/goods"] = {"parameters": [_ID], "post": put}
     document = described(paths, "3.1.0")
     return contract_of(tmp_path_factory.mktemp("pack"), document)
@@ -52,7 +57,8 @@ def _broken(contract, steps):
     for number, (line, *seen) in enumerate(steps):
         method, path, status = line.split()
         body = json.dumps(dict(zip(("state", "runs", "archived"), seen, strict=False))).encode() if seen else b""
-        request = Request(method, f"{_BASE}/belts/1{path.removeprefix('.')}", (("Host", "device:8000"),), b"")
+        place = f"/{path}" if path.isdecimal() else f"/1{path.removeprefix('.')}"
+        request = Request(method, f"{_BASE}/belts{place}", (("Host", "device:8000"),), b"")
         kind = (("Content-Type", "application/json"),) if body else ()
         exchange = Exchange(request, Response(int(status), kind, body, 1.0, received_s=float(number)))
         broken |= {one.requirement for one in checkers(exchange) if not one.holds}
@@ -82,6 +88,8 @@ _BROKEN = {
         _STATES,
     ),
     "resumed from stopped": (_RESUMED * 2, _STATES),
+    "two run at once": ([(f"GET {number} 200", "running") for number in (1, 2, 1)], _STATES),
+    "a scrapped one that is done": ([("GET . 200", "scrapped"), ("GET . 200", "stopped")], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
 }
 _RIGHT = {
@@ -100,6 +108,7 @@ _RIGHT = {
         *(("GET . 200", "running", 1), ("GET . 200", "running", 2)), *_refused("start", 2, 3, 4),
     ],
     "a count of all refusals": [*_refused("start", 1, 2, 3)[:-1], *_refused("resume", 3, 4, 5)],
+    "one that runs after another": [("GET 1 200", "running"), ("GET 2 200", "running"), ("GET 1 200", "stopped")],
     "a refusal of which nothing is said": _refused("pause", 1, 2, 3),
     "a refusal that keeps": _refused("start", 1, 2, 3, change=0)[:3],
 }  # fmt: skip

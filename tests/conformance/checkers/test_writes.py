@@ -14,7 +14,7 @@ _PARTS = {
     "count": {"type": "integer", "format": "int64", "default": 5},
     "mode": {"type": "string", "enum": ["off", "on", "auto"], "default": "on"},
     "loud": {"type": "boolean", "default": False},
-    "note": {"type": ["string", "null"]},
+    "note": {"type": ["string", "null"], "maxLength": 500},
     "exact": {"type": "number", "format": "double"},
     "from": {"type": "string", "format": "date-time"},
     "path": {"type": "array", "items": {"type": "number"}},
@@ -54,6 +54,10 @@ _PATHS = {
     "/steps": _item(STEPS, _STEPS),
     "/things/{id}": {"parameters": [_ID], **_item(MERGE, _SCHEMA)},
     "/said": {**_item(MERGE, _SCHEMA), "put": {**_item(MERGE, _SCHEMA)["put"], "summary": "What is not sent is gone."}},
+    "/kept": {
+        **_item(MERGE, _SCHEMA),
+        "patch": {**_item(MERGE, _SCHEMA)["patch"], "summary": "Members left out keep their value."},
+    },
     "/reset": {"post": {"responses": _OK}},
 }
 READ, KEPT, DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
@@ -89,6 +93,14 @@ def _two_changes(**stamps):
     return steps
 
 
+def _patched(at, counts):
+    """Return patches of a note, each of which shows a count, after one of the count; nothing reads between them."""
+    steps = [_get(at)]
+    for text, count in zip(("b", "c"), counts, strict=True):
+        steps += [_patch(at, {"count": 9}, count=9), _patch(at, {"note": text}, note=text, count=count)]
+    return steps
+
+
 _OLD, _NEW = ["2026-03-01T00:00:00Z"] * 3, [f"2026-03-01T00:16:4{second}Z" for second in (0, 2, 4)]
 _LONG, _ZONE = 2**53 + 1, {"a": 5, "b": 6}
 _EAST = "2026-02-01T12:34:56+02:00"
@@ -96,6 +108,8 @@ _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
+    "a patch resets what it does not name, against its words": (_patched("/kept", (3, 3)), PATCH),
+    "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
     "a JSON patch moves, and leaves what it moves": (
         [
@@ -350,6 +364,9 @@ RIGHT = {
         *(_put("/merge", **_WHOLE), _get("/merge")),
         *(_patch("/merge", {"gain": 3.5}), _get("/merge", gain=3.5, mode="off")),
     ],
+    "a text of which the response shows the beginning, as it may": [_get(), _put(note="é" * 600, told={"note": "é"})],
+    "a count that follows the note": _patched("/merge", (3, 3)),
+    "a count that moves by itself": _patched("/kept", (9, 8)),
     "one reset by another mode": [_get(), _patch("/plain", {"mode": "off"}), _get(mode="off", loud=False)],
 }  # fmt: skip
 
@@ -364,7 +381,7 @@ def _broken(contract, steps):
     checkers, now, broken = RestCheckers(contract, BASE), 1000.0, set()
     for method, path, sent, status, seen in steps:
         now += 1.0
-        kinds = {"/merge": MERGE, "/steps": STEPS, "/things/1": MERGE} if method == "PATCH" else {}
+        kinds = {"/merge": MERGE, "/kept": MERGE, "/steps": STEPS, "/things/1": MERGE} if method == "PATCH" else {}
         fields = [("Host", "device:8000"), *([("Content-Type", kinds.get(path, "application/json"))] if sent else [])]
         body = json.dumps(sent).encode() if sent else b""
         answer = json.dumps(seen).encode() if seen is not None and status < 300 else b""
