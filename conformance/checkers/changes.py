@@ -135,7 +135,7 @@ class Changes:
             for template in self._states
             if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
             if (found := self._alone.get(operation.label, frozenset()))
-            if not _SHARING.search(_said_alone(operation).partition(",")[0])
+            if not _SHARING.search(_condition_text(operation).partition(",")[0])
         }
         # By operation: the state to which it leads by its description.
         self._leads = {
@@ -346,13 +346,13 @@ def state_of(read: Operation) -> str:
     return next(named, "")
 
 
-def _said_alone(operation: Operation) -> str:
+def _condition_text(operation: Operation) -> str:
     return " ".join(found[0] for found in ANOTHER.finditer(operation.text))
 
 
 def _alone(operation: Operation) -> frozenset[str]:
     """Return the words in backticks for the state of another thing in which an operation is refused."""
-    return frozenset(re.findall(r"`([\w -]+)`", _said_alone(operation)))
+    return frozenset(re.findall(r"`([\w -]+)`", _condition_text(operation)))
 
 
 def _states_of(read: Operation, name: str) -> tuple[str, ...]:

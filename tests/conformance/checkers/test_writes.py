@@ -93,7 +93,7 @@ def _two_changes(**stamps):
     return steps
 
 
-def _patched(at, counts):
+def _patches_between(at, counts):
     """Return patches of a note, each of which shows a count, after one of the count; nothing reads between them."""
     steps = [_get(at)]
     for text, count in zip(("b", "c"), counts, strict=True):
@@ -108,7 +108,7 @@ _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
-    "a patch resets what it does not name, against its words": (_patched("/kept", (3, 3)), PATCH),
+    "a patch resets what it does not name, against its words": (_patches_between("/kept", (3, 3)), PATCH),
     "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
     "a JSON patch moves, and leaves what it moves": (
@@ -365,8 +365,8 @@ RIGHT = {
         *(_patch("/merge", {"gain": 3.5}), _get("/merge", gain=3.5, mode="off")),
     ],
     "a text of which the response shows the beginning, as it may": [_get(), _put(note="é" * 600, told={"note": "é"})],
-    "a count that follows the note": _patched("/merge", (3, 3)),
-    "a count that moves by itself": _patched("/kept", (9, 8)),
+    "a count that follows the note": _patches_between("/merge", (3, 3)),
+    "a count that moves by itself": _patches_between("/kept", (9, 8)),
     "one reset by another mode": [_get(), _patch("/plain", {"mode": "off"}), _get(mode="off", loud=False)],
 }  # fmt: skip
 
