@@ -122,7 +122,7 @@ def _is_single(create: Operation) -> bool:
 
 def _end_active(writer: Writer, kind: Ended, ends: list[Operation]) -> None:
     """End a listed thing that is active."""
-    if active := _listed(writer, kind, is_done=False):
+    if active := _path_in_list(writer, kind, is_done=False):
         _walk(writer, kind, active, ends)
 
 
@@ -148,7 +148,7 @@ def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> Non
             for path in kind.paths:
                 now = members(writer.send(kind.read, path), (kind.state,)).get(kind.state)
                 done = path if str(now).casefold() in FINAL and path != kind.paths[0] else done
-            done = done or (_listed(writer, kind, is_done=True) if ends else "")
+            done = done or (_path_in_list(writer, kind, is_done=True) if ends else "")
             if done:
                 _walk(writer, kind, done, ends)
 
@@ -178,7 +178,7 @@ def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:
     return [*forth, *reversed(actions), *reversed(actions)]
 
 
-def _listed(writer: Writer, kind: Ended, *, is_done: bool) -> str:
+def _path_in_list(writer: Writer, kind: Ended, *, is_done: bool) -> str:
     """Return the path of a listed thing that is done, or of one that is not."""
     lister = callable_operations(writer.api).get(("GET", collection_of(kind.read.template)))
     items = items_of(read_json(writer.send(lister).response.body).value) if lister is not None else None
