@@ -21,6 +21,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from reports.pages.untrusted import visible
+
 P = ParamSpec("P")
 INK, SOFT, LINE = "#16202a", "#55616d", "#d9dfe5"
 COLOUR = {"rest": "#0072B2", "soap": "#D55E00", "rosbridge": "#009E73", "both": "#7a4d8f"}
@@ -105,7 +107,8 @@ class Panel:
         """Return the drawing as an SVG element in which every id begins with `name`."""
         buffer = io.BytesIO()
         self._figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-        return Markup(_inline(buffer.getvalue(), name, self._alt))  # noqa: S704 - drawn here, its text escaped by lxml
+        drawn = visible(buffer.getvalue().decode()).encode()  # XML allows no control characters
+        return Markup(_inline(drawn, name, self._alt))  # noqa: S704 - drawn here, its text escaped by lxml
 
 
 def picture(name: str, caption: str) -> Callable[[Callable[P, Iterator[Panel]]], Callable[P, Picture | None]]:
@@ -129,11 +132,7 @@ def _inline(document: bytes, name: str, alt: str) -> str:
     Its ids are prefixed with `name`, `alt` becomes its alternative text, and its fixed size is removed.
     """
     root = etree.fromstring(document, etree.XMLParser(resolve_entities=False, no_network=True))
-    svg = "{http://www.w3.org/2000/svg}"
-    for element in [*root.iter(f"{svg}metadata"), *root.iter(f"{svg}style")]:
-        parent = element.getparent()
-        if parent is not None:
-            parent.remove(element)
+    etree.strip_elements(root, "{http://www.w3.org/2000/svg}metadata", "{http://www.w3.org/2000/svg}style")
     for element in root.iter():
         for key, value in list(element.attrib.items()):
             text = str(value)
@@ -147,11 +146,10 @@ def _inline(document: bytes, name: str, alt: str) -> str:
     for key in ("width", "height", "version"):
         root.attrib.pop(key, "")
     root.set("role", "img")
-    root.set("aria-label", alt)
+    root.set("aria-label", visible(alt))
     root.set("id", name)
     etree.cleanup_namespaces(root)
-    text = etree.tostring(root, encoding="unicode")
-    return re.sub(r"\n\s*", "\n", text)
+    return re.sub(r"\n\s*", "\n", etree.tostring(root, encoding="unicode"))
 
 
 def milliseconds(value: float) -> str:
