@@ -91,7 +91,7 @@ types: install
 
 # The order of the modules is that of tests/conftest.py. Asserts are rewritten once, and not by each process in each run.
 tests: install
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations=30
 
 # Fails on each warning, a broken link or anchor, and a page that would load something from another host.
 docs: $(VENV)/.docs

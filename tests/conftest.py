@@ -78,22 +78,27 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileS
 
 
 class _Failures:
-    """Names each failing test at once; pytest names them in the end."""
+    """Names each failing test at once; pytest names them in the end. Then it shows how busy each process was."""
 
     def __init__(self, terminal: TerminalReporter) -> None:
-        self._terminal = terminal
+        self._terminal, self._seconds = terminal, Counter[str]()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Write the name of a test that failed."""
         if report.failed:
             self._terminal.write_line(f"\nfailed: {report.nodeid}")
+        if node := getattr(report, "node", None):
+            self._seconds[node.gateway.id] += report.duration
+
+    def pytest_terminal_summary(self) -> None:
+        """Write for how long each process ran tests: one with far less than the whole run had nothing left to do."""
+        for process, seconds in sorted(self._seconds.items()):
+            self._terminal.write_line(f"{process}: {seconds:.0f} s of tests")
 
 
 @pytest.hookimpl(trylast=True)  # pytest makes the reporter in this hook
 def pytest_configure(config: pytest.Config) -> None:
-    """Name failing tests on a terminal, which gw0, gw1, ... have not; let load tests, in gw0 and gw1, go first."""
-    if os.environ.get("PYTEST_XDIST_WORKER", "gw0") not in {"gw0", "gw1"}:
-        os.nice(10)  # inherited by what the tests start
+    """Name failing tests on a terminal, which gw0, gw1, ... have not."""
     if terminal := config.pluginmanager.get_plugin("terminalreporter"):
         config.pluginmanager.register(_Failures(terminal))
 
@@ -113,7 +118,12 @@ def _turn(module: Path) -> tuple[int, bool]:
 
 
 def pytest_collection_finish() -> None:
-    """Look seldom for garbage in circles, and never among modules and tests, which live as long as the process."""
+    """Look seldom for garbage in circles, and never among modules and tests, which live as long as the process.
+
+    Let load tests, in gw0 and gw1, go first. All processes collect at one priority, as each waits for the last.
+    """
+    if os.environ.get("PYTEST_XDIST_WORKER", "gw0") not in {"gw0", "gw1"}:
+        os.nice(10)  # inherited by what the tests start
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 50)
