@@ -137,20 +137,6 @@ def _soap(operation):
     return f'<e:Envelope xmlns:e="http://schemas.xmlsoap.org/soap/envelope/"><e:Body>{inside}</e:Body></e:Envelope>'.encode()
 
 
-@pytest.mark.parametrize(
-    "raw",
-    [
-        b"GET / HTTP/1.1\r\nHost: r2\r\n\r\nPUT /robot/velocity/ HTTP/1.1\r\nHost: r2\r\n\r\n",
-        b"GET / HTTP/1.1\r\nHost: r2\r\nContent-Length: 1\r\n\r\nxDELETE /a/ HTTP/1.1\r\n\r\n",
-        b"GET / HTTP/1.1\n\npost\t/a HTTP/1.1\n\n",
-        b"PATCH / HTTP/1.1\r\n\r\n",
-        b"GET / HTTP/1.1\r\nX-HTTP-Method-Override: PUT\r\n\r\n",
-    ],
-)
-def test_octets_that_hold_another_request_move_the_robot(raw):
-    assert _moves(raw=raw)
-
-
 def test_what_moves_is_told_by_what_is_sent():
     reading = "/turtlesim_subscriber_ws"
     assert not any((_moves(), _moves("HEAD"), _moves("POST", body=_soap("GetPose"), path=reading)))
@@ -180,17 +166,6 @@ def test_a_sequence_that_no_run_wrote_is_refused(part):
         read_request({**item, **part})
 
 
-def test_a_bomb_in_a_result_is_wrong_usage(robot, tmp_path):
-    result = _result(tmp_path, robot.url, ("GET",))
-    document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
-    bomb = base64.b64encode(zlib.compress(bytes(60 * 1024 * 1024), 1)).decode()
-    document["requirements"][0]["failures"][0]["sequence"][0]["body"] = bomb
-    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    refused = _replay(result)
-    assert (refused.exit_code, robot.asked) == (2, [])
-    assert "no well-made" in refused.output
-
-
 @pytest.mark.parametrize("requirement", ["http/head", "http/no-such"])
 def test_a_requirement_without_findings_is_wrong_usage(tmp_path, requirement):
     done = _replay(_result(tmp_path, "http://127.0.0.1:1"), requirement)
@@ -200,11 +175,6 @@ def test_a_requirement_without_findings_is_wrong_usage(tmp_path, requirement):
 def test_a_robot_that_is_not_there(tmp_path):
     done = _replay(_result(tmp_path, "http://127.0.0.1:1", ("GET",)))
     assert (done.exit_code, done.output.split(":")[0]) == (4, "cannot tell")
-
-
-def test_a_file_that_is_no_result(tmp_path):
-    (tmp_path / "result.json").write_text("{}", encoding="utf-8")
-    assert _replay(str(tmp_path)).exit_code == 2
 
 
 @pytest.mark.parametrize("body", [b"", b"\xff\x00", b" " * 10_000_000])

@@ -1,6 +1,5 @@
 """What a replay says of a device that has changed since, that is away, and of a result that someone else wrote."""
 
-import json
 import socket
 import sys
 from contextlib import contextmanager
@@ -99,26 +98,3 @@ def test_what_is_declared_since_is_gone_by_the_statement_that_names_the_descript
         statement.write_text(f'[api]\nopenapi = "{url}/openapi.json"\n')
         code, text = _replayed(found[0], "description/status-declared", "--statement", statement)
     assert (code, text.split(":")[0]) == (0, "gone"), text
-
-
-def test_a_result_is_data(found, tmp_path):
-    """Code beside a result, and a pack that is a path, are not executed."""
-    marker = tmp_path / "executed"
-    code = f"open({str(marker)!r}, 'w').close()\n"
-    out = tmp_path / "out"
-    (out / "description" / "rules").mkdir(parents=True)
-    for name in ("conftest.py", "plugin.py", "rules/test_all.py", "rules/conftest.py"):
-        (out / "description" / name).write_text(code)
-    for file in (found[0] / "description").glob("*.json"):
-        (out / "description" / file.name).write_bytes(file.read_bytes())
-    manifest = (found[0] / "description" / "pack.toml").read_text()
-    (out / "description" / "pack.toml").write_text(f'plugin = "plugin.py"\n{manifest}')
-    document = json.loads((found[0] / "result.json").read_text())
-    document["pack"]["name"] = str(out / "description")
-    for kind in ("described", "named"):
-        if kind == "named":
-            del document["api"]
-        (out / "result.json").write_text(json.dumps(document))
-        assert _replayed(out)[0] == 4
-        assert _replayed(out, "--recorded")[0] in {0, 1, 2}
-    assert not marker.exists()

@@ -1,6 +1,5 @@
 """What is HTTP is read, in whatever pieces it comes; what is not stays as it came."""
 
-import h11
 import pytest
 
 from proof.mutation.parsing import RequestParser, ResponseParser
@@ -17,12 +16,6 @@ def test_a_request_is_read_in_pieces_of_any_size(size):
     assert found[:-1] == [None] * (len(found) - 1)
     assert (found[-1].method, found[-1].target, found[-1].body) == ("PUT", "/p", b"abc")
     assert found[-1].fields == [("Host", "a"), ("X-Two", "b"), ("Content-Length", "3")]
-
-
-def test_what_follows_a_request_is_left_for_the_next():
-    parser = RequestParser("rest")
-    assert parser.feed(b"\r\n" + PUT + b"GET / HT").body == b"abc"
-    assert parser.rest == b"GET / HT"
 
 
 def test_chunks_are_put_together():
@@ -49,20 +42,6 @@ def test_what_is_no_http_stays_as_it_came(octets):
     assert (request.raw, request.octets(), request.method) == (octets, octets, "")
 
 
-def test_a_body_may_wait_to_be_asked_for():
-    parser = RequestParser("rest")
-    head = b"PUT / HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\nContent-Length: 1\r\n\r\n"
-    assert (parser.feed(head), parser.waits_for_continue) == (None, True)
-    request = parser.feed(b"x")
-    assert (request.body, request.field("Expect")) == (b"x", None)
-
-
-def test_a_half_request_is_kept():
-    parser = RequestParser("rest")
-    assert parser.feed(PUT[:-1]) is None
-    assert parser.octets == PUT[:-1]
-
-
 def test_a_response_is_read_past_informational_ones():
     parser = ResponseParser("GET")
     assert parser.feed(b"HTTP/1.1 100 Continue\r\n\r\n" + FINE[:20]) is None
@@ -79,10 +58,3 @@ def test_a_body_without_length_ends_with_the_connection():
     assert parser.feed(b"HTTP/1.0 200 OK\r\n\r\nab") is None
     assert parser.feed(b"c") is None
     assert parser.feed(b"").body == b"abc"
-
-
-@pytest.mark.parametrize("octets", [b"", FINE[:10], FINE[:-1]])
-def test_a_response_that_ends_too_early_is_none(octets):
-    parser = ResponseParser("GET")
-    with pytest.raises(h11.RemoteProtocolError):
-        [parser.feed(piece) for piece in (octets, b"")]

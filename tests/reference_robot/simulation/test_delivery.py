@@ -34,25 +34,6 @@ def test_the_papers_coffee_goes_source_destination_depot(robot):
 
 
 @FAST
-def test_missions_run_one_after_the_other(robot):
-    robot.request(SOURCE, DESTINATION, DEPOT)
-    robot.request(*NEAR, code=3)
-    until(lambda: robot.states == ["active", "queued"])
-    until(lambda: robot.states == ["done", "active"])
-    until(lambda: robot.states == ["done", "done"])
-
-
-@pytest.mark.parametrize("robot", [{"time_scale": 1.0}], indirect=True)
-def test_the_queue_is_bounded(robot):
-    robot.request(SOURCE, DESTINATION, DEPOT)  # which takes minutes
-    until(lambda: robot.states == ["active"])
-    for _ in range(22):
-        robot.request(*NEAR, code=3)
-    until(lambda: robot.states == ["active", *["queued"] * 20, "dropped", "dropped"])
-    assert [mission["reason"] for mission in robot.missions[-2:]] == ["the queue is full with 20 missions"] * 2
-
-
-@FAST
 def test_a_request_with_another_code_is_ignored(robot):
     robot.request(*NEAR, code=5)
     robot.request(*NEAR, code=0)

@@ -7,7 +7,6 @@ import time
 
 import pytest
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import PoseStamped
 from nav2_msgs.action import ComputePathToPose
 from nav_msgs.msg import Odometry
 from observer import Observer, pose, until
@@ -68,13 +67,6 @@ def test_a_newer_goal_displaces_an_older_one_which_ends_aborted(robot):
     assert robot.is_at(66.0, 37.0, 1.0)
 
 
-def test_after_a_goal_the_robot_obeys_velocity_commands_again(robot):
-    assert robot.end_of(robot.send(pose(68.5, 38.7))) == GoalStatus.STATUS_SUCCEEDED
-    until(lambda: robot.current_goal is None and robot.rests)
-    robot.command(0.25)
-    until(lambda: robot.velocity == (0.25, 0.0))
-
-
 @pytest.mark.parametrize("unreachable", [(0.0, 0.0), (82.0, 47.0), (72.0, 35.0), (math.nan, 38.0)])
 def test_an_unreachable_goal_is_refused_and_the_reason_is_told(robot, unreachable):
     assert not robot.send(pose(*unreachable)).accepted
@@ -82,12 +74,6 @@ def test_an_unreachable_goal_is_refused_and_the_reason_is_told(robot, unreachabl
     assert "goal" in told["reason"]
     assert told["pose"]["pose"]["position"]["y"] == unreachable[1]
     assert robot.current_goal is None
-
-
-def test_a_refused_goal_leaves_the_active_one_alone(robot):
-    handle = robot.send(pose(70.0, 38.7))
-    assert not robot.send(pose(0.0, 0.0)).accepted
-    assert robot.end_of(handle) == GoalStatus.STATUS_SUCCEEDED
 
 
 def test_a_goal_in_an_unknown_frame_or_without_orientation_is_refused(robot):
@@ -106,22 +92,6 @@ def check_plan(plan, start, goal):
     assert plan.poses[-1].pose == goal.pose
     assert all(item.header.frame_id == goal.header.frame_id for item in plan.poses)
     assert max(math.dist(a, b) for a, b in itertools.pairwise(points)) <= 0.25
-
-
-@pytest.mark.parametrize("frame_id", ["map", "odom"])
-def test_get_plan_starts_at_the_robot_and_ends_at_the_asked_pose_in_the_asked_frame(robot, frame_id):
-    goal = pose(*SOURCE, 0.3, frame_id)
-    check_plan(robot.plan(goal), DEPOT, goal)
-
-
-def test_get_plan_takes_a_start(robot):
-    goal = pose(*DEPOT, -1.0)
-    check_plan(robot.plan(goal, start=pose(*SOURCE)), SOURCE, goal)
-
-
-def test_get_plan_is_empty_where_no_way_leads(robot):
-    for goal in (pose(82.0, 47.0), pose(0.0, 0.0), pose(70.0, 38.7, frame_id="moon"), PoseStamped()):
-        assert not robot.plan(goal).poses
 
 
 def test_compute_path_to_pose_plans_or_says_why_not(robot):

@@ -190,20 +190,6 @@ def test_long_run_keeps_its_stall_and_its_size(latency):
     assert "5,000 ms" in drawn
 
 
-def test_hostile_text_stays_text(latency):
-    latency.update(FEW, series=latency["series"][:2])
-    attack = "</svg></script><script>alert(1)</script>\x1b[2J\u202e"
-    latency["environment"].update(cpu=attack, command=attack, robot_command=attack)
-    latency["environment"]["robot"].update(name=attack, vendor=attack, version=attack, servers={attack: attack})
-    latency["errors"][0].update(kind=attack, message=attack)
-    latency["notes"] = [attack]
-    latency["slo"][0].update(operation=attack, reason=attack)
-    document = page(latency)
-    assert len(document.findall(".//script")) == 1
-    assert not set(document.text_content()) & set("\x1b\u202e")
-    assert "\n<script" not in latency_markdown(latency)
-
-
 def test_bad_histogram_is_told(latency):
     latency["series"][2]["histogram"] = "garbage"
     with pytest.raises(ResultInvalidError, match=r"latency\.json: at \$\.series\[2\]\.histogram"):
