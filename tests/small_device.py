@@ -51,6 +51,16 @@ def reading(schema: Any, **members: Any) -> dict[str, Any]:
     return {"get": {"responses": {"200": answers(schema), "4XX": REFUSED}, **members}}
 
 
+def object_of(*required: str, **properties: Any) -> dict[str, Any]:
+    """Return the schema of an object with these properties, of which some are required."""
+    return {"type": "object", "properties": properties} | ({"required": list(required)} if required else {})
+
+
+def body_of(schema: Any, media_type: str = "application/json") -> dict[str, Any]:
+    """Return a required request body whose content has this schema."""
+    return {"required": True, "content": {media_type: {"schema": schema}}}
+
+
 def constant(value: Any) -> dict[str, Handle]:
     """Return the handlers of a path whose GET answers the same JSON each time."""
 

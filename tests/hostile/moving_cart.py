@@ -12,25 +12,16 @@ import time
 from typing import Final
 
 from aiohttp import web
-from small_device import REFUSED, answers, described
+from small_device import REFUSED, answers, body_of, described, object_of
 
 FASTEST: Final = 0.5
 _NUMBER: Final = {"type": "number"}
-_STATE: Final = {"type": "object", "properties": {"x": _NUMBER}, "required": ["x"]}
-_VELOCITY: Final = {
-    "type": "object",
-    "properties": {"ahead": {"type": "number", "minimum": -0.5, "maximum": 0.5}},
-    "required": ["ahead"],
-}
+_STATE: Final = object_of("x", x=_NUMBER)
+_VELOCITY: Final = object_of("ahead", ahead={"type": "number", "minimum": -0.5, "maximum": 0.5})
 _ANSWER: Final = {"200": answers({"type": "object"}), "4XX": REFUSED}
 PATHS: Final = {
     "/state": {"get": {"responses": {"200": answers(_STATE), "4XX": REFUSED}}},
-    "/velocity": {
-        "put": {
-            "requestBody": {"required": True, "content": {"application/json": {"schema": _VELOCITY}}},
-            "responses": _ANSWER,
-        }
-    },
+    "/velocity": {"put": {"requestBody": body_of(_VELOCITY), "responses": _ANSWER}},
     "/stop": {"post": {"responses": _ANSWER}},
 }
 MAP: Final = """

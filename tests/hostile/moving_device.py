@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from aiohttp import web
-from small_device import REFUSED, answers, described, error, reading
+from small_device import REFUSED, answers, body_of, described, error, object_of, reading
 
 LIMIT, FASTEST = 50.0, 0.5
 MAP = f"""
@@ -27,18 +27,14 @@ settle_s = 0.1
 [motion.velocity.axes]
 ahead = {{ limits = [-{FASTEST}, {FASTEST}], of = "x" }}
 """
-_STATE = {"type": "object", "properties": {"x": {"type": "number"}}, "required": ["x"]}
-_VELOCITY = {
-    "type": "object",
-    "properties": {"ahead": {"type": "number", "minimum": -FASTEST, "maximum": FASTEST}},
-    "required": ["ahead"],
-}
+_STATE = object_of("x", x={"type": "number"})
+_VELOCITY = object_of("ahead", ahead={"type": "number", "minimum": -FASTEST, "maximum": FASTEST})
 DESCRIPTION = described(
     {
         "/state": reading(_STATE),
         "/velocity": {
             "put": {
-                "requestBody": {"required": True, "content": {"application/json": {"schema": _VELOCITY}}},
+                "requestBody": body_of(_VELOCITY),
                 "responses": {"200": answers({"type": "object"}), "4XX": REFUSED},
             }
         },

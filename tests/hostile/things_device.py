@@ -6,7 +6,7 @@ import time
 
 from aiohttp import web
 from driven_device import driven
-from small_device import REFUSED, answers, described
+from small_device import REFUSED, answers, body_of, described
 
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.values import Values
@@ -65,11 +65,8 @@ class Things:
             "type": "object",
             "properties": {"id": {"readOnly": True}, "state": {"readOnly": True}, **WRITTEN, **more},
         }
-        body = {"required": True, "content": {"application/json": {"schema": schema}}}
-        part = {
-            "required": True,
-            "content": {"application/json": {"schema": {k: v for k, v in schema.items() if k != "required"}}},
-        }
+        body = body_of(schema)
+        part = body_of({k: v for k, v in schema.items() if k != "required"})
         bad, key = {"4XX": REFUSED}, {"type": "string"} if named else {"type": "integer"}
         every = {"type": "array", "items": thing}
         shown, listed = (

@@ -16,7 +16,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
-from small_device import answers, described
+from small_device import answers, body_of, described, object_of
 
 _ERROR = {
     "type": "object",
@@ -69,7 +69,7 @@ def _op(ok: str, schema: Any = None, *, body: Any = None, headers: Any = None, *
         success["headers"] = {name: {"required": True, "schema": {"type": "string"}} for name in headers}
     errors = {code: answers(_ERROR) for code in ("400", "404", "405", "409", "411", "412", "413", "415", "422")}
     if body:
-        more["requestBody"] = {"required": True, "content": {"application/json": {"schema": body}}}
+        more["requestBody"] = body_of(body)
     return {"responses": {ok: success, **errors}, **more}
 
 
@@ -90,8 +90,7 @@ def document() -> dict[str, Any]:
     limit = _query("limit", {"type": "integer", "minimum": 1, "maximum": 50})
     tubes = {"type": "array", "items": _TUBE}
     state = _query("sealed", {"type": "boolean"})
-    job = {"type": "object", "required": ["id", "label"], "properties": {"id": {"type": "integer"},
-           "label": {"type": "string"}}}  # fmt: skip
+    job = object_of("id", "label", id={"type": "integer"}, label={"type": "string"})  # fmt: skip
     new_job = {
         **job,
         "additionalProperties": False,
@@ -103,8 +102,7 @@ def document() -> dict[str, Any]:
     return described(
         {
             "/health": {"get": _op("200", _ANY)},
-            "/info": {"get": _op("200", {"type": "object", "required": ["model"],
-                                         "properties": {"model": {"type": "string"}}})},
+            "/info": {"get": _op("200", object_of("model", model={"type": "string"}))},
             "/status": {"get": _op("200", _LEVEL, parameters=[_query("unit", {"enum": ["C", "F"], "type": "string"})])},
             "/config": {
                 "get": _op("200", _CONFIG, headers=["ETag"]),

@@ -7,24 +7,14 @@ import re
 
 import pytest
 from aiohttp import web
-from small_device import REFUSED, answers, certified, described, error, reading, small_device
+from small_device import REFUSED, answers, body_of, certified, described, error, object_of, reading, small_device
 
-_SHELF = {
-    "type": "object",
-    "required": ["id", "name"],
-    "properties": {"id": {"type": "integer"}, "name": {"type": "string"}},
-}
-_NEW = {"type": "object", "required": ["name"], "properties": {"name": {"type": "string", "minLength": 1}}}
-_NOTE = {
-    "type": "object",
-    "required": ["id", "text", "at"],
-    "properties": {
-        "id": {"type": "integer"},
-        "text": {"type": "string"},
-        "at": {"type": "string", "format": "date-time"},
-    },
-}
-_TEXT = {"type": "object", "required": ["text"], "properties": {"text": {"type": "string", "minLength": 1}}}
+_SHELF = object_of("id", "name", id={"type": "integer"}, name={"type": "string"})
+_NEW = object_of("name", name={"type": "string", "minLength": 1})
+_NOTE = object_of(
+    "id", "text", "at", id={"type": "integer"}, text={"type": "string"}, at={"type": "string", "format": "date-time"}
+)
+_TEXT = object_of("text", text={"type": "string", "minLength": 1})
 _ID = {"parameters": [{"in": "path", "name": "shelfId", "required": True, "schema": {"type": "integer"}}]}
 _PARTS = [
     {"in": "query", "name": name, "schema": {"type": "integer", "minimum": least, "maximum": 99}}
@@ -152,7 +142,7 @@ def test_what_nobody_can_create_is_written_as_well(fault, tmp_path):
     }
     free = {**schema["properties"], "serviced_on": {"type": ["string", "null"], "format": "date"}}
     taken = {**schema, "properties": free, "required": []}
-    patch = {"content": {"application/merge-patch+json": {"schema": taken}}, "required": True}
+    patch = body_of(taken, "application/merge-patch+json")
 
     async def read(request):
         return web.json_response(tray) if request.match_info["trayId"] == "1" else error(404, "no such tray")

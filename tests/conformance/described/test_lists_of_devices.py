@@ -6,22 +6,16 @@ import time
 from urllib.parse import urlencode
 
 from aiohttp import web
-from small_device import REFUSED, answers, certified, described, error, small_device
+from small_device import REFUSED, answers, body_of, certified, described, error, object_of, small_device
 
 LIMIT, FILTER, ORDER, TOTAL, PAGES = (
     f"description/list-{name}" for name in ("limit", "filter", "order", "total", "pages")
 )
 _STATES, _SORTED = ["open", "closed", "moving"], ["label", "-label", "flow", "-flow"]
-_NEW = {"type": "object", "required": ["label"], "properties": {"label": {"type": "string", "maxLength": 20}}}
-_VALVE = {
-    "type": "object",
-    "properties": {
-        "id": {"type": "integer"},
-        "label": {"type": "string"},
-        "state": {"type": "string", "enum": _STATES},
-        "flow": {"type": "number"},
-    },
-}
+_NEW = object_of("label", label={"type": "string", "maxLength": 20})
+_VALVE = object_of(
+    id={"type": "integer"}, label={"type": "string"}, state={"type": "string", "enum": _STATES}, flow={"type": "number"}
+)
 _SEARCH = {"in": "query", "name": "q", "description": "A text that the label contains, whatever the case."}
 _SEARCH["schema"] = {"type": "string", "minLength": 1}
 _BOUND = {"in": "query", "name": "minFlow", "description": "At least this flow.", "schema": {"type": "number"}}
@@ -101,7 +95,7 @@ class _Collection:
             {"type": "object", "properties": {self.style["in"]: _VALVES, **_TOTALS}} if "in" in self.style else _VALVES
         )
         key = {"in": "path", "name": "id", "required": True, "schema": {"type": "integer"}}
-        bad, body = {"4XX": REFUSED}, {"required": True, "content": {"application/json": {"schema": _NEW}}}
+        bad, body = {"4XX": REFUSED}, body_of(_NEW)
         return {
             self.path: {
                 "get": {

@@ -6,24 +6,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from aiohttp import web
-from small_device import REFUSED, Handle, answers, described, error
+from small_device import REFUSED, Handle, answers, body_of, described, error, object_of
 
 _TEXT = {"type": "string"}
-_MODE = {"type": "object", "required": ["mode"], "properties": {"mode": {"enum": ["idle", "running", "done", "home"]}}}
-_JOB = {"type": "object", "required": ["id"], "properties": {"id": {"type": "integer"}, "name": _TEXT}}
-_NAMED = {"type": "object", "required": ["name"], "properties": {"name": {"type": "string", "maxLength": 40}}}
-_COUNT = {"type": "object", "required": ["count"], "properties": {"count": {"type": "integer"}}}
-_LEASE = {"type": "object", "required": ["lease"], "properties": {"lease": {"type": "string"}}}
-_LIMITS = {
-    "type": "object",
-    "required": ["speed"],
-    "properties": {"speed": {"type": "number", "minimum": 0, "maximum": 2}},
-}
+_MODE = object_of("mode", mode={"enum": ["idle", "running", "done", "home"]})
+_JOB = object_of("id", id={"type": "integer"}, name=_TEXT)
+_NAMED = object_of("name", name={"type": "string", "maxLength": 40})
+_COUNT = object_of("count", count={"type": "integer"})
+_LEASE = object_of("lease", lease={"type": "string"})
+_LIMITS = object_of("speed", speed={"type": "number", "minimum": 0, "maximum": 2})
 
 
 def _operation(statuses: Mapping[int, Any], *, body: Any = None, parameters: list[Any] | None = None) -> dict[str, Any]:
     responses = {str(code): answers(schema) if schema else {"description": "none"} for code, schema in statuses.items()}
-    content = {"requestBody": {"required": True, "content": {"application/json": {"schema": body}}}} if body else {}
+    content = {"requestBody": body_of(body)} if body else {}
     return {"responses": {**responses, "4XX": REFUSED}, "parameters": parameters or [], **content}
 
 

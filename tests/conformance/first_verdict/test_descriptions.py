@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from small_device import certified, constant, described, reading, small_device
+from small_device import certified, constant, described, object_of, reading, small_device
 
 
 def _with(name, schema):
@@ -11,16 +11,8 @@ def _with(name, schema):
     return {"type": "object", "required": [name], "properties": {name: schema}}
 
 
-_CAT = {
-    "type": "object",
-    "required": ["kind", "lives"],
-    "properties": {"kind": {"const": "cat"}, "lives": {"type": "integer"}},
-}
-_DOG = {
-    "type": "object",
-    "required": ["kind", "bark"],
-    "properties": {"kind": {"const": "dog"}, "bark": {"type": "boolean"}},
-}
+_CAT = object_of("kind", "lives", kind={"const": "cat"}, lives={"type": "integer"})
+_DOG = object_of("kind", "bark", kind={"const": "dog"}, bark={"type": "boolean"})
 _X = _with("x", {"type": "number"})
 _SCHEMAS = {
     "Cat": _CAT,
@@ -102,7 +94,7 @@ _MODERN = {
         {"kind": "cat", "lives": 9, "age": 1},
         {"kind": "cat", "lives": 9},
     ),
-    "/not-false": ({"type": "object", "properties": {"a": {"not": False}, "b": False}}, {"a": 1}, {"b": 1}),
+    "/not-false": (object_of(a={"not": False}, b=False), {"a": 1}, {"b": 1}),
     "/any": ({"type": "array", "items": True}, [1, None], {}),
     "/encoded": (
         _with("png", {"type": "string", "contentEncoding": "base64", "contentMediaType": "image/png"}),

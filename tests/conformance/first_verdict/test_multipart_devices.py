@@ -1,20 +1,17 @@
 """Parts of multipart bodies are written by RFC 7578, and each text in one is a valid string."""
 
 from aiohttp import BodyPartReader, web
-from small_device import REFUSED, certified, constant, described, error, reading, small_device
+from small_device import REFUSED, body_of, certified, constant, described, error, object_of, reading, small_device
 
 _BINARY = {"type": "string", "format": "binary"}
-_SCHEMA = {
-    "type": "object",
-    "required": ["map"],
-    "properties": {
-        "map": _BINARY,
-        "name": {"type": "string"},
-        "level": {"type": "integer", "minimum": 0, "maximum": 9},
-        "layers": {"type": "array", "items": _BINARY, "maxItems": 3},
-    },
-}
-_BODY = {"required": True, "content": {"multipart/form-data": {"schema": _SCHEMA}}}
+_SCHEMA = object_of(
+    "map",
+    map=_BINARY,
+    name={"type": "string"},
+    level={"type": "integer", "minimum": 0, "maximum": 9},
+    layers={"type": "array", "items": _BINARY, "maxItems": 3},
+)
+_BODY = body_of(_SCHEMA, "multipart/form-data")
 _PATHS = {
     "/maps": {"post": {"requestBody": _BODY, "responses": {"204": {"description": "stored"}, "4XX": REFUSED}}},
     "/state": reading({"type": "object"}),

@@ -5,34 +5,20 @@ import re
 
 import jsonschema
 from aiohttp import web
-from small_device import REFUSED, answers, certified, described, error, small_device
+from small_device import REFUSED, answers, body_of, certified, described, error, object_of, small_device
 
 from conformance.history.events import Sent, read_history
 from conformance.history.writing import HISTORY_NAME
 
 _RESPONSES = {"200": answers({"type": "object"}), "4XX": REFUSED}
 _WHOLE = {"type": "integer"}
-_ITEM = {
-    "type": "object",
-    "required": ["id", "n", "secret"],
-    "properties": {
-        "id": {"type": "string", "readOnly": True},
-        "n": _WHOLE,
-        "secret": {"type": "string", "writeOnly": True},
-    },
-}
+_ITEM = object_of(
+    "id", "n", "secret", id={"type": "string", "readOnly": True}, n=_WHOLE, secret={"type": "string", "writeOnly": True}
+)
 _SENT_ITEM = {**_ITEM, "required": ["n", "secret"]}
-_STEP = {
-    "type": "object",
-    "required": ["op", "path"],
-    "properties": {"op": {"enum": ["add", "remove"]}, "path": {"type": "string"}},
-}
-_CAT = {"type": "object", "required": ["kind", "m"], "properties": {"kind": {"type": "string"}, "m": _WHOLE}}
-_DOG = {
-    "type": "object",
-    "required": ["kind", "b"],
-    "properties": {"kind": {"type": "string"}, "b": {"type": "boolean"}},
-}
+_STEP = object_of("op", "path", op={"enum": ["add", "remove"]}, path={"type": "string"})
+_CAT = object_of("kind", "m", kind={"type": "string"}, m=_WHOLE)
+_DOG = object_of("kind", "b", kind={"type": "string"}, b={"type": "boolean"})
 _ANIMAL = {
     "oneOf": [{"$ref": "#/components/schemas/Cat"}, {"$ref": "#/components/schemas/Dog"}],
     "discriminator": {
@@ -48,16 +34,11 @@ _BODIES = {
         "application/json",
         *[{"type": "array", "uniqueItems": True, "minItems": 2, "items": {"type": "string"}}] * 2,
     ),
-    "/merge": ("patch", "application/merge-patch+json", *[{"type": "object", "properties": {"a": _WHOLE}}] * 2),
+    "/merge": ("patch", "application/merge-patch+json", *[object_of(a=_WHOLE)] * 2),
     "/patch": ("patch", "application/json-patch+json", *[{"type": "array", "minItems": 1, "items": _STEP}] * 2),
     "/animal": ("post", "application/json", _ANIMAL, {"oneOf": [_CAT, _DOG]}),
     "/text": ("put", "text/plain", {"type": "string", "maxLength": 10}, {"type": "string", "maxLength": 10}),
-    "/lines": (
-        "post",
-        "application/x-ndjson",
-        {"type": "object", "required": ["a"], "properties": {"a": _WHOLE}},
-        None,
-    ),
+    "/lines": ("post", "application/x-ndjson", object_of("a", a=_WHOLE), None),
     "/blob": ("put", "application/octet-stream", {"type": "string", "format": "binary"}, None),
 }
 _QUERY = [
@@ -88,8 +69,8 @@ def _paths():
     paths["/own"] = {"parameters": [_SHARED], "get": {"parameters": [_OWN], "responses": _RESPONSES}}
     match = {"name": "If-Match", "in": "header", "schema": {"type": "string"}}
     paths["/locked"] = {"get": {"parameters": [match], "responses": _RESPONSES}}
-    job = {"type": "object", "required": ["kind"], "properties": {"kind": {"type": "string", "default": "scan"}}}
-    body = {"required": True, "content": {"application/json": {"schema": job}}}
+    job = object_of("kind", kind={"type": "string", "default": "scan"})
+    body = body_of(job)
     made = {**answers({"type": "object"}), "headers": {"Location": {"schema": {"type": "string"}}}}
     paths["/jobs"] = {"post": {"parameters": [_KEY], "requestBody": body, "responses": {"201": made, "4XX": REFUSED}}}
     paths["/jobs/{id}"] = {"get": {"parameters": [_ID], "responses": _RESPONSES}}

@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 
 import pytest
-from small_device import contract_of
+from small_device import contract_of, object_of
 
 from conformance.api.rest.conversions import is_converted
 from conformance.api.rest.variations import Kind
@@ -17,11 +17,7 @@ from conformance.scenarios.survey import Probe, Survey
 from conformance.transport.exchange import Exchange, NoAnswer, Request, Response, Unanswered
 from conformance.verdict.run import Run
 
-_SCHEMA = {
-    "type": "object",
-    "required": ["n"],
-    "properties": {"n": {"type": "integer"}, "at": {"type": ["string", "null"], "format": "date-time"}},
-}
+_SCHEMA = object_of("n", n={"type": "integer"}, at={"type": ["string", "null"], "format": "date-time"})
 _ERROR = {"description": "", "content": {"application/problem+json": {"schema": {"required": ["detail"]}}}}
 _LABEL, _OTHER, _PLAIN = "GET /a/{id}", "POST /b", "GET /c"
 
@@ -264,7 +260,7 @@ _LENIENT = {
         "text": {"type": "string"},
         "set": {"type": "array", "uniqueItems": True, "items": {"type": "integer"}},
         "at": {"type": "string", "format": "date-time"},
-        "in": {"type": "object", "properties": {"x": {"type": "number"}}},
+        "in": object_of(x={"type": "number"}),
     },
 }
 

@@ -1,6 +1,6 @@
 """Merge patches that the suite sends, and what each of them shows."""
 
-from small_device import answers, described
+from small_device import answers, body_of, described, object_of
 
 from conformance.api.rest.patches import merged
 from conformance.api.rest.samples import fits
@@ -17,11 +17,8 @@ _FREE = {**_LIGHTS, "scene": {"enum": ["flat", "bloom", None]}}
 
 def test_null_removes_a_member_of_an_object_beside_a_change(tmp_path):
     name = {"type": "string"}
-    shown, taken = (
-        {"type": "object", "properties": {"name": name, "lights": {"type": "object", "properties": parts}}}
-        for parts in (_LIGHTS, _FREE)
-    )
-    body = {"required": True, "content": {"application/merge-patch+json": {"schema": taken}}}
+    shown, taken = (object_of(name=name, lights={"type": "object", "properties": parts}) for parts in (_LIGHTS, _FREE))
+    body = body_of(taken, "application/merge-patch+json")
     responses = {"200": answers(shown)}
     paths = {"/settings": {"get": {"responses": responses}, "patch": {"requestBody": body, "responses": responses}}}
     contract = Contract.load(write_described_pack(tmp_path, document := described(paths, "3.1.0"), document))

@@ -5,7 +5,7 @@ from pathlib import Path
 from urllib.parse import parse_qsl
 
 import pytest
-from small_device import contract_of
+from small_device import contract_of, object_of
 
 from proof.mutation.messages import Request, Response
 from proof.selftest.comparison import Comparison, ToolResult
@@ -14,17 +14,15 @@ from proof.selftest.generated.judging import KILLED, SURVIVED, GeneratedResult
 from proof.selftest.generated.mutant import GeneratedMutant, Tally
 from proof.selftest.generated.report import only_theirs, page
 
-_LAMP = {
-    "type": "object",
-    "required": ["id", "state"],
-    "properties": {
-        "id": {"type": "integer", "minimum": 1},
-        "state": {"type": "string", "enum": ["on", "off"]},
-        "note": {"type": ["string", "null"]},
-    },
-}
+_LAMP = object_of(
+    "id",
+    "state",
+    id={"type": "integer", "minimum": 1},
+    state={"type": "string", "enum": ["on", "off"]},
+    note={"type": ["string", "null"]},
+)
 _JSON = {"application/json": {"schema": _LAMP}}
-_LIST = {"type": "object", "properties": {"items": {"type": "array", "items": _LAMP}, "total": {"type": "integer"}}}
+_LIST = object_of(items={"type": "array", "items": _LAMP}, total={"type": "integer"})
 _LISTED = {"200": {"description": "all", "content": {"application/json": {"schema": _LIST}}}}
 _WHOLE, _STATE = {"type": "integer"}, {"type": "string", "enum": ["on", "off"]}
 _NAMES = {"limit": _WHOLE, "offset": _WHOLE, "state": _STATE, "sort": {"type": "string", "enum": ["-id"]}}
