@@ -287,6 +287,8 @@ class Memory:
         before = self._things.pop(target.casefold(), None)
         self._ends |= {item.template} if before is not None and not before.gone else set()
         self._last.pop(target, None)
+        if response.status == HTTPStatus.ACCEPTED:
+            yield from self._defaults(occasion, operation)
         if response.status == HTTPStatus.CREATED:
             yield from self._judge_location(occasion, path, target)
             yield from self._defaults(occasion, operation)

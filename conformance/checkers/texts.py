@@ -22,6 +22,8 @@ from conformance.verdict.evidence import Case
 _MOST: Final = 1000
 # Shorter texts are compared with later reads only.
 _LONG: Final = 100
+# What stands for a character that could not be read (Unicode 5.22).
+_LOST: Final = "\ufffd"
 _SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
 
@@ -91,7 +93,7 @@ class Texts:
 
 
 def whole(occasion: Occasion) -> Iterator[Case]:
-    """Judge whether the response to a write shows long texts whole, if its schema allows their length."""
+    """Judge whether the response to a write shows texts with all their characters, if its schema allows the length."""
     answer, operation = occasion.response, occasion.operation
     is_told = answer.status in {HTTPStatus.OK, HTTPStatus.CREATED} and is_json(answer.media_type)
     if operation is None or occasion.request.method in SAFE_METHODS or not is_told or not occasion.is_valid:
@@ -99,12 +101,14 @@ def whole(occasion: Occasion) -> Iterator[Case]:
     sent, parts = _members(occasion.request.body, occasion.request.media_type), parts_of(operation.shape)
     told = object_in(read_json(answer.body).value, {plain_name(name) for name in sent})
     for name, value in sent.items():
-        now, most = told.get(name), flat(parts.get(name) or {}).get("maxLength")
-        if isinstance(value, str) and isinstance(now, str) and isinstance(most, int) and _LONG < len(value) <= most:
-            is_cut = len(now) < len(value) and value.startswith(now.rstrip(".… "))
-            expected, found = f"{len(value)} characters as {name}, as sent", f"the first {len(now)} of them"
-            cause = f"{operation.label} {name} cut"
-            yield occasion.case("description/written-is-read", not is_cut, expected, found * is_cut, cause=cause)
+        now, most = told.get(name), flat(parts.get(name) or {}).get("maxLength", 0)
+        if isinstance(value, str) and isinstance(now, str):
+            is_cut = _LONG < len(value) <= most and len(now) < len(value) and value.startswith(now.rstrip(".… "))
+            is_lost = _LOST in now and _LOST not in value
+            expected, found = f"{len(value)} characters as {name}, as sent", f"the first {len(now)} of them" * is_cut
+            found = found or "U+FFFD in place of some of them" * is_lost
+            cause = f"{operation.label} {name} characters"
+            yield occasion.case("description/written-is-read", not found, expected, found, cause=cause)
 
 
 def _members(body: bytes, media_type: str) -> dict[str, Any]:

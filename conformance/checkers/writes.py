@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
@@ -22,12 +22,13 @@ from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, 
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
+    Leaf,
     differences,
-    entry_of,
     is_devices,
     is_moved,
     is_shared,
-    members_in,
+    leaves_of,
+    left_out_of,
     object_in,
     parts_of,
 )
@@ -89,21 +90,6 @@ class _Sandwich(NamedTuple):
     is_old: bool
 
 
-class _Leaf(NamedTuple):
-    """A member that was sent and is there: its path, its schema, the value, what was there before, and what is now."""
-
-    name: str
-    part: Schema
-    value: Any
-    was: Any
-    now: Any
-
-    @property
-    def top(self) -> str:
-        """The member of the body that it is in."""
-        return self.name.partition(".")[0].rpartition(" ")[2]
-
-
 class _Change(NamedTuple):
     """A write between two reads, judged at the second one."""
 
@@ -128,6 +114,17 @@ class _Change(NamedTuple):
     def label(self) -> str:
         """The request in words."""
         return f"{self.operation.label} with status {self.write.response.status}"
+
+    @property
+    def is_merge(self) -> bool:
+        """Whether it is a merge patch, by its media type or by the description."""
+        is_said = self.write.request.method == "PATCH" and "7396" in self.operation.text
+        return MERGE in self.write.request.media_type or is_said
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the description says that members keep their values which it leaves out."""
+        return bool(_STAYS.search(self.operation.text))
 
     @property
     def shown_members(self) -> dict[str, Any]:
@@ -263,7 +260,7 @@ class Writes:
         elif isinstance(change.sent_value, dict):
             yield from self._judge_own(occasion, item, change)
             # The schema of a merge patch need not say that null removes a member.
-            if MERGE in request.media_type:
+            if change.is_merge:
                 yield from self._judge_merge(occasion, item, change)
             if not write.is_valid:
                 return
@@ -370,7 +367,7 @@ class Writes:
         """Judge values that were taken, but not as they were sent: without fraction, rounded, in another order."""
         shape = parts_of(item.shape)
         there = {name: one for name, one in change.now.items() if name not in change.moving}
-        for leaf in _leaves(parts_of(change.schema), change.sent_value, change.before, there):
+        for leaf in leaves_of(parts_of(change.schema), change.sent_value, change.before, there):
             name, part, value, was, now = leaf
             if is_devices(name.rpartition(".")[2], part, self._collections):
                 continue
@@ -406,7 +403,7 @@ class Writes:
             cause = f"{change.operation.label} {name} value"
             yield occasion.case(_READ, not wrong, expected, wrong, cause=cause, doubt=doubt)
 
-    def _judge_same(self, occasion: Occasion, item: Operation, change: _Change, leaf: _Leaf) -> Iterator[Case]:
+    def _judge_same(self, occasion: Occasion, item: Operation, change: _Change, leaf: Leaf) -> Iterator[Case]:
         """Judge a value that a write left as it was: an empty one by PUT, or two by PATCH that PUT alone changes."""
         key, last = (item.template, leaf.name), leaf.name.rpartition(".")[2]
         is_same, method = same(leaf.now, leaf.was), change.write.request.method
@@ -448,7 +445,7 @@ class Writes:
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether members that a PUT leaves out get their default, or disappear if the description says so."""
         is_said, bodies = GONE.search(change.operation.text), (change.sent_value, change.before, change.now)
-        for leaf, is_needed in _missing(parts_of(change.schema), flat(item.shape or {}), bodies):
+        for leaf, is_needed in left_out_of(parts_of(change.schema), flat(item.shape or {}), bodies):
             name, given, default, was, now = leaf
             is_open = "default" not in given and (not is_said or is_needed)
             if is_open or given.get("readOnly") or same(was, default):
@@ -483,7 +480,6 @@ class Writes:
                 kept = [one for one in value if value[one] is None and one in was and same(now.get(one), was[one])]
                 kept = kept if any(not same(now.get(one), was.get(one)) for one in value) else []
                 wrong = f"no {lost[0]} in {name}" if lost else f"{kept[0]} in {name}" if kept else ""
-                wrong = wrong or self._reset_within(change, name)
             elif isinstance(value, list) and isinstance(was, list) and isinstance(now, list) and was:
                 is_added = len(now) > len(value) and len(now) >= len(was) and all(one in now for one in (*was, *value))
                 wrong = f"{clip(now)} as {name}" if is_added and not same(was, now) else ""
@@ -499,6 +495,9 @@ class Writes:
         value, was, now = change.sent_value[name], change.before[name], change.now[name]
         others = [item for item in was if item in now and item not in value and not same(now[item], was[item])]
         doubts = self._doubts[change.operation.label, f"{name} within"]
+        if others and change.is_kept:
+            doubts.add(f"{clip(was)} {clip(value)}".encode())
+            return f"{clip(now[others[0]])} as {others[0]} in {name}" if len(doubts) >= _SEEN else ""
         if all(same(value[item], was.get(item)) for item in value):
             doubts |= {f"{item} resets {other}".encode() for item in value for other in others}
         both = [one for one in others if any(f"{one} resets {other}".encode() in doubts for other in value)]
@@ -507,17 +506,23 @@ class Writes:
     def _others(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:
         """Judge whether a patch keeps the members that it does not name; it takes two bodies to rule out chance."""
         parts, label = parts_of(change.schema), change.operation.label
-        is_said = bool(_STAYS.search(change.operation.text))
+        is_said = change.is_kept
+        bodies = (change.sent_value, change.before, change.now)
+        for name in set.intersection(*map(set, bodies)) if change.is_merge else ():
+            if all(isinstance(body[name], dict) for body in bodies) and name not in change.moving:
+                wrong = self._reset_within(change, name)
+                expected, cause = f"{name} with the members that {change.label} left out", f"{item.label} {name} merge"
+                yield occasion.case(_PATCH, not wrong, expected, wrong, cause=cause)
         for name in change.before.keys() & parts.keys() - change.sent_value.keys() - change.moving:
             was, now, given = change.before[name], change.now.get(name), flat(parts[name])
             if was is None or same(was, now) or is_devices(name, given, self._collections) or is_shared(name):
                 continue
             default = flat(parts_of(item.shape).get(name) or {}).get("default", given.get("default"))
             is_empty = now is None or same(now, default) or now in ("", [], {}, 0, False)
-            bodies = self._doubts[label, f"{name} to {clip(now)}"]
-            bodies.add(change.write.request.body)
-            named = set.intersection(*(set(read_json(body).value) for body in bodies))
-            if len(bodies) >= _SEEN and (is_empty or is_said or not named):
+            wrote = self._doubts[label, f"{name} to {clip(now)}"]
+            wrote.add(change.write.request.body)
+            named = set.intersection(*(set(read_json(body).value) for body in wrote))
+            if len(wrote) >= _SEEN and (is_empty or is_said or not named):
                 expected = f"{clip(was)} as {name}, which {change.label} does not name"
                 found, cause = f"{clip(now)} as {name}", f"{label} {name} kept"
                 follows = f"{name} may follow {min(named, default='other members')}"
@@ -556,44 +561,3 @@ def _is_rounded(value: Any, now: Any) -> bool:
 def _is_altered(value: str, now: str) -> bool:
     """Return whether a text reads without its leading zeros, or with other ends of lines."""
     return value != now and (_ZEROS.sub("", value) == _ZEROS.sub("", now) or value.splitlines() == now.splitlines())
-
-
-def _leaves(
-    parts: Mapping[str, Any],
-    sent: dict[str, Any],
-    before: dict[str, Any],
-    now: dict[str, Any],
-    above: str = "",
-    of: str = "",
-) -> Iterator[_Leaf]:
-    """Yield what was sent and is there now, in objects and maps too; of: what all are called, as entries of a map."""
-    for name in sent.keys() & now.keys():
-        part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
-        if value and isinstance(value, dict) and isinstance(seen, dict):
-            inner = was if isinstance(was, dict) else {}
-            entries = "" if entry_of(part) is None else f"an entry of {name}"
-            yield from _leaves(members_in(part, value), value, inner, seen, f"{of or above + name}.", entries)
-        else:
-            yield _Leaf(of or f"{above}{name}", part, value, was, seen)
-
-
-def _missing(
-    parts: Mapping[str, Any], shape: Schema, bodies: tuple[Any, ...], above: str = ""
-) -> Iterator[tuple[_Leaf, bool]]:
-    """Yield what was there and is not in a body, in its objects too, and whether each response has it.
-
-    Args:
-        parts: schemas of the members of the body.
-        shape: that of the response.
-        bodies: what was sent, what was there before, and what is there now.
-        above: path of what is read, with a dot.
-    """
-    needed = shape.get("required", ())
-    for name, part in parts.items():
-        given = flat(part) if isinstance(part, dict) else {}
-        _, was, now = inner = tuple(body.get(name) for body in bodies)
-        if name not in bodies[0] and name in bodies[1]:
-            yield _Leaf(f"{above}{name}", given, given.get("default"), was, now), name in needed
-        elif all(isinstance(item, dict) for item in inner):
-            within = flat(shape.get("properties", {}).get(name, {}))
-            yield from _missing(given.get("properties", {}), within, inner, f"{above}{name}.")

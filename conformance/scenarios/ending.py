@@ -23,7 +23,7 @@ from conformance.api.rest.things import collection_of, creator_of, id_member, ob
 from conformance.api.rest.values import Values
 from conformance.checkers.changes import ANOTHER, ENDING, FINAL, leads_to, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
-from conformance.documents.json_schema import kinds_of
+from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -38,6 +38,25 @@ from conformance.transport.exchange import Exchange, NoAnswerError
 
 # _BEGINNING: operations that start an activity. _KINDS: kinds of things that are tried.
 _BEGINNING, _KINDS = 2, 3
+# Words in names of numbers that tell how long an activity lasts; how much longer it is to last; new things for it.
+_LASTING: Final = frozenset(
+    {
+        "ms",
+        "s",
+        "sec",
+        "second",
+        "seconds",
+        "minutes",
+        "duration",
+        "time",
+        "interval",
+        "step",
+        "steps",
+        "delay",
+        "dwell",
+    }
+)
+_LONGER, _NEW = 20, 2
 # How long after it was cancelled an activity is read again, s.
 _GOES_ON_S: Final = 2.5
 # Phrases in a description which say that 409 means a thing in use.
@@ -107,12 +126,43 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                     break
                 if is_single:
                     _end_active(writer, kind, ends)
-                made = writer.send(create)
+                made = _begin(writer, kind, create, operations)
                 if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
                     _walk(writer, kind, path, steps)
         found.append(replace(kind, paths=tuple(paths), at_s=time.monotonic()))
     return found
+
+
+def _begin(writer: Writer, kind: Ended, create: Operation, operations: _Operations) -> Exchange:
+    """Create an activity; if it has ended at once, create another one that has more to do."""
+    made = writer.send(create)
+    state, base = members(made, (kind.state,)).get(kind.state), _body_of(writer, create)
+    if not made.response.ok or str(state).casefold() not in FINAL or base is None:
+        return made
+    schema, body = next(iter(create.bodies.values())).schema, dict(base)
+    for name, part in flat(schema).get("properties", {}).items():
+        given: Any = flat(part)
+        value: Any = body.get(name, given.get("default"))
+        if is_number(value) and words_of(name) & _LASTING:
+            body[name] = min(given.get("maximum", value * _LONGER), value * _LONGER)
+        elif "array" in kinds_of(given) and (ids := _fresh(writer, operations, name)):
+            body[name] = ids
+    return writer.send(create, "", body) if body != base and fits(schema, body) else made
+
+
+def _fresh(writer: Writer, operations: _Operations, name: str) -> list[Any]:
+    """Return the identifiers of new things to which a member refers."""
+    for (method, path), read in operations.items():
+        create = operations.get(("POST", collection_of(path)))
+        if (
+            method == "GET"
+            and create is not None
+            and singular(collection_of(path).rpartition("/")[2]) == thing_of(name)
+        ):
+            made = [read_json(writer.send(create).response.body).value for _ in range(_NEW)]
+            return [id_ for value in made if (id_ := id_member(value, read)[1]) is not None]
+    return []
 
 
 def _is_single(create: Operation) -> bool:
@@ -258,7 +308,9 @@ def _delete_used(writer: Writer, operations: _Operations, path: str, delete: Ope
     if at and members(writer.send(reader, at), (name,)).get(name) == body[name]:
         deleted = writer.conditional(delete, read, place)
         user, there = writer.send(reader, at), writer.send(read, place)
-        refers = user.response.ok and members(user, (name,)).get(name) == body[name]
+        # What has ended uses nothing any more.
+        is_over = str(members(user, ("state",)).get(state_of(reader))).casefold() in FINAL
+        refers = not is_over and user.response.ok and members(user, (name,)).get(name) == body[name]
         is_lost = deleted.response.ok and refers and there.response.status in ABSENT
         wrong = f"{name} of {at} leads to {place}, which does not exist any more" if is_lost else ""
         yield Deletion(delete.label, deleted, user, wrong)
@@ -278,13 +330,18 @@ def _references(create: Operation, thing: str) -> list[str]:
 
 def _referring(writer: Writer, create: Operation, name: str, id_: Any) -> dict[str, Any] | None:
     """Return the usual body of a creation with a reference; None if the schema does not allow it."""
-    schema = next(iter(create.bodies.values())).schema
-    usual, whole = usual_inputs(create, writer.values)[0].body, whole_body(create, writer.values)[1]
-    base = usual if isinstance(usual, dict) else whole
+    schema, base = next(iter(create.bodies.values())).schema, _body_of(writer, create)
     is_list = "array" in kinds_of(flat(schema).get("properties", {}).get(name, {}))
-    body = {**base, name: [id_] if is_list else id_} if isinstance(base, dict) else None
+    body = {**base, name: [id_] if is_list else id_} if base is not None else None
     body = writer.values.unique.with_new_values(create, body, schema) if body is not None else None
     return {**body, name: [id_] if is_list else id_} if body is not None and fits(schema, body) else None
+
+
+def _body_of(writer: Writer, create: Operation) -> dict[str, Any] | None:
+    """Return the usual JSON object of a creation; None if it has none."""
+    usual = usual_inputs(create, writer.values)[0].body if create.bodies else None
+    whole = whole_body(create, writer.values)[1] if create.bodies else None
+    return usual if isinstance(usual, dict) else whole if isinstance(whole, dict) else None
 
 
 def _said_of(api: RestInterface, operation: Operation) -> str:

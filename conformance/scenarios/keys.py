@@ -118,38 +118,40 @@ class _Rounds:
         if len(keys) < _KEYS or not bodies:
             return
         before = self._list_paths()
-        first = self._send(request := self._request(keys[0], rich := self._rich(bodies[0])))
-        if is_refused(first) and rich is not bodies[0]:
+        # A device may refuse a body by a rule that no schema says.
+        for inputs in (self._rich(bodies[0]), *bodies):
             keys[0] = self._keys()[0]
-            first = self._send(request := self._request(keys[0], bodies[0]))
-        made = [first]
+            first = self._send(request := self._request(keys[0], inputs))
+            if not is_refused(first):
+                break
+        made, others = [first], [one for one in bodies[1:] if one is not inputs]
         if not first.response.ok or not (name := self._name(first)):
             return
         try:
             again = self._send(request)
             made.append(again)
             yield self._judge_repeat(first, again, name, before)
-            if len(bodies) > 1 and self.operation.responses.keys() & _REFUSALS:
-                other = self._send(self._request(keys[0], bodies[1]))
+            if others and self.operation.responses.keys() & _REFUSALS:
+                other = self._send(self._request(keys[0], others[0]))
                 made.append(other)
                 expected = "a refusal with 422 of a key that came before with another body"
                 fault = other.came if other.response.ok else ""
                 yield Keyed(self.operation.label, "other body", other, expected, fault)
-            if len(bodies) > 1 and self._item is not None and first.response.status in _MADE:
-                new = self._send(self._request(keys[1], bodies[-1]))
+            if others and self._item is not None and first.response.status in _MADE:
+                new = self._send(self._request(keys[1], others[-1]))
                 made.append(new)
                 is_old = new.response.status in _MADE and self._name(new) == name
                 expected = f"something else than {name}, which was made for another key and another body"
                 yield Keyed(self.operation.label, "new key", new, expected, name if is_old else "")
                 # A retry may come after other keys; without a promise, a device may remember few keys.
                 more = keys[_KEYS : _KEYS + 1] if _FIRST.search(self._promise()) else []
-                made += [self._send(self._request(text, bodies[-1])) for text in more]
+                made += [self._send(self._request(text, others[-1])) for text in more]
                 again = self._send(request)
                 made.append(again)
                 yield self._judge_repeat(first, again, name, before)
             said = f"{self.operation.text} {self.key.says}"
             if len(keys) > _KEYS + 1 and UNSPENT.search(said):
-                yield from self._unspent(keys[_KEYS + 1 :], bodies[0], made)
+                yield from self._unspent(keys[_KEYS + 1 :], inputs, made)
             if _FIRST.search(said) and self._item is not None and name.startswith("/"):
                 yield from self._later(request, first, self._item, name)
         finally:

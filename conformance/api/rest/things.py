@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
-from typing import Any, Final, TypeGuard
+from typing import Any, Final, NamedTuple, TypeGuard
 
 from conformance.api.rest.references import refers, singular
 from conformance.api.rest.samples import FORMATS, alike_and_apart, fits, sample
@@ -407,3 +407,59 @@ def is_moved(value: Any, now: Any) -> bool:
         is_swapped = sent != read and (sent.year, sent.month, sent.day) == (read.year, read.day, read.month)
         return len(value) == len(now) == len("2026-11-29") and (is_swapped or abs((sent - read).days) == 1)
     return sent != read and sent.replace(tzinfo=None, microsecond=0) == read.replace(tzinfo=None, microsecond=0)
+
+
+class Leaf(NamedTuple):
+    """A member that was sent and is there: its path, its schema, the value, what was there before, and what is now."""
+
+    name: str
+    part: Schema
+    value: Any
+    was: Any
+    now: Any
+
+    @property
+    def top(self) -> str:
+        """The member of the body that it is in."""
+        return self.name.partition(".")[0].rpartition(" ")[2]
+
+
+def leaves_of(
+    parts: Mapping[str, Any],
+    sent: dict[str, Any],
+    before: dict[str, Any],
+    now: dict[str, Any],
+    above: str = "",
+    of: str = "",
+) -> Iterator[Leaf]:
+    """Yield what was sent and is there now, in objects and maps too; of: what all are called, as entries of a map."""
+    for name in sent.keys() & now.keys():
+        part, value, was, seen = flat(parts.get(name, {})), sent[name], before.get(name), now[name]
+        if value and isinstance(value, dict) and isinstance(seen, dict):
+            inner = was if isinstance(was, dict) else {}
+            entries = "" if entry_of(part) is None else f"an entry of {name}"
+            yield from leaves_of(members_in(part, value), value, inner, seen, f"{of or above + name}.", entries)
+        else:
+            yield Leaf(of or f"{above}{name}", part, value, was, seen)
+
+
+def left_out_of(
+    parts: Mapping[str, Any], shape: Schema, bodies: tuple[Any, ...], above: str = ""
+) -> Iterator[tuple[Leaf, bool]]:
+    """Yield what was there and is not in a body, in its objects too, and whether each response has it.
+
+    Args:
+        parts: schemas of the members of the body.
+        shape: that of the response.
+        bodies: what was sent, what was there before, and what is there now.
+        above: path of what is read, with a dot.
+    """
+    needed = shape.get("required", ())
+    for name, part in parts.items():
+        given = flat(part) if isinstance(part, dict) else {}
+        _, was, now = inner = tuple(body.get(name) for body in bodies)
+        if name not in bodies[0] and name in bodies[1]:
+            yield Leaf(f"{above}{name}", given, given.get("default"), was, now), name in needed
+        elif all(isinstance(item, dict) for item in inner):
+            within = flat(shape.get("properties", {}).get(name, {}))
+            yield from left_out_of(given.get("properties", {}), within, inner, f"{above}{name}.")
