@@ -292,6 +292,7 @@ class Lists:
         path, count = occasion.context.target.partition("?")[0], len(items)
         if _is_cut(listing, page, sent):
             return
+        sent = {one: text for one, text in sent.items() if listing.limit is None or one != listing.limit.name}
         if not sent:
             waiting = self._missed.pop(path, ())
             yield from (case for one, is_asked, case in waiting if one in items and is_asked(items[one]))
@@ -399,7 +400,8 @@ def _asking(listing: Listing, parameter: str, text: str) -> Callable[[Mapping[st
         if given.name == parameter and not given.media_type:
             asked = text.split(",") if "array" in kinds_of(given.schema) else [text]
             return lambda item: isinstance(item.get(name), str | int) and _text(item[name]) in asked
-    return None
+    bound = next((one for one in listing.bounds if one.is_said and one.parameter.name == parameter), None)
+    return None if bound is None else lambda item: bound.includes(text, item.get(bound.member))
 
 
 def _contains(listing: Listing, item: Mapping[str, Any] | None, term: str, fold: Callable[[str], str] = str) -> bool:

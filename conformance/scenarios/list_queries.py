@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
 from itertools import combinations, islice
 from typing import Any, Final
 
-from conformance.api.rest.listing import Listing, Page, fitting, members_of, searches
+from conformance.api.rest.listing import CASED, CASELESS, Listing, Page, fitting, members_of
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
@@ -20,6 +21,12 @@ _TOGETHER: Final = 3
 _WITH_PART: Final = 6
 # A total is taken to be exceeded by this limit.
 _MORE: Final = 2
+# Phrases in a description which say that a search text has no wildcards.
+_PLAIN: Final = re.compile(r"\b(?:without|no|not) (?:any )?wildcards?\b", re.IGNORECASE)
+# A search text that no item contains.
+_NOWHERE: Final = "roaas7nowhere"
+# Texts that mean something in a regular expression, and in SQL's LIKE.
+_SPECIAL: Final = ("(", "%")
 # _LATER: between the last item and an instant after it. _FAR: difference from UTC of a distant time zone.
 _LATER: Final = timedelta(hours=1)
 _FAR: Final = timedelta(hours=11)
@@ -31,9 +38,7 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
     for name, parameter in listing.filters.items():
         rows += [{parameter.name: value} for value in choices_of(parameter, name, page)[:most]]
     rows += _together(listing, page)
-    total = max(page.totals.values(), default=0) + _MORE
-    is_cut = listing.limit is not None and len(page.items) + _MORE < total and fitting(listing.limit, total)
-    whole = {listing.limit.name: total} if listing.limit is not None and is_cut else {}
+    whole = whole_query(listing, page)
     for bound in listing.bounds:
         there = {
             members_of(item).get(bound.member) for item in page.items if members_of(item).get(bound.member) is not None
@@ -45,8 +50,8 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
         beyond = [_beyond(ordered[-1 if bound.is_least else 0], is_least=bound.is_least)] if ordered else []
         rows += [
             {bound.parameter.name: text, **whole}
-            for text in (*middle, *beyond)
-            if len(ordered) > 1 and text is not None and fitting(bound.parameter, text)
+            for text in (*middle[: len(ordered) - 1], *beyond)
+            if text is not None and fitting(bound.parameter, text)
         ]
     if listing.sort is not None:
         directions = flat(listing.direction.schema).get("enum", ()) if listing.direction is not None else ()
@@ -71,6 +76,13 @@ def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, An
             yield {**sorts, **row, **part, **later}
 
 
+def whole_query(listing: Listing, page: Page) -> dict[str, Any]:
+    """Return a limit with which the whole list comes, by its total; nothing where it is not known or not needed."""
+    total, limit = max(page.totals.values(), default=0) + _MORE, listing.limit
+    is_cut = len(page.items) + _MORE < total or 0 < listing.most({}) <= len(page.items)
+    return {limit.name: total} if limit is not None and is_cut and fitting(limit, total) else {}
+
+
 def _beyond(value: Any, *, is_least: bool) -> str | None:
     """Return an instant that excludes all items, as clocks far away show it; without its offset it excludes none."""
     sign = 1 if is_least else -1
@@ -80,6 +92,26 @@ def _beyond(value: Any, *, is_least: bool) -> str | None:
     except (TypeError, ValueError, OverflowError):
         return None
     return far.isoformat(timespec="milliseconds") if far is not None else None
+
+
+def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
+    """Yield texts: one that no item has, special ones, and ends of words in what a search looks at, in any case."""
+    search = listing.search
+    if search is None:
+        return
+    yield from [{search.name: _NOWHERE}] if listing.searched and fitting(search, _NOWHERE) else []
+    yield from ({search.name: text} for text in _SPECIAL if fitting(search, text))
+    for name in listing.searched:
+        texts = [value for item in page.items if isinstance(value := members_of(item).get(name), str)]
+        words = [word[1:] for text in reversed(texts) for word in text.split() if word.isascii() and word.isalnum()]
+        # A word that begins no text, and that some items do not have, shows more.
+        words.sort(key=lambda word: (any(text.startswith(word) for text in texts), all(word in text for text in texts)))
+        for word in [one for one in words if len(one) > 1][:1]:
+            turned = [word.swapcase()] if CASELESS.search(search.says) or CASED.search(search.says) else []
+            terms = turned if CASELESS.search(search.says) else [word, *turned]
+            yield from ({search.name: term} for term in terms if fitting(search, term))
+    if _PLAIN.search(search.says) and fitting(search, "%"):
+        yield {search.name: "%"}
 
 
 def _together(listing: Listing, page: Page) -> list[dict[str, Any]]:

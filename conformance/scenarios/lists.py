@@ -35,7 +35,7 @@ from conformance.documents.openapi import operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.writing import text_of
-from conformance.scenarios.list_queries import choices_of, queries_of
+from conformance.scenarios.list_queries import choices_of, queries_of, whole_query
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Exchange, NoAnswerError
@@ -169,12 +169,18 @@ def vary_lists(api: RestInterface, values: Values) -> None:
         with suppress(NoAnswerError):
             reader = Reader(api, values, listing)
             page, until = reader.page(), reader.until
+            whole = whole_query(listing, page) if page is not None else {}
+            # The whole list has more values to choose by, and shows what a filter loses.
+            part = reader.part(whole) if whole else None
+            page = part[1] if part is not None else page
             if page is not None and page.items:
                 reader.send_invalid()
                 doubted = list[dict[str, Any]]()
                 for query in queries_of(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
                     if time.monotonic() < until and _is_doubted(listing, reader.part(query), query):
                         doubted.append(query)
+                if whole:
+                    reader.read(whole)
                 _reread_totals(reader, doubted)
 
 

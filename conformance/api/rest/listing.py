@@ -68,15 +68,10 @@ CASELESS: Final = re.compile(
     r"|\bcase (?:is|does) (?:ignored|not)",
     re.IGNORECASE,
 )
-#: Phrases in a description which say that upper and lower case differ. Below: that a search text has no wildcards.
+#: Phrases in a description which say that upper and lower case differ.
 CASED: Final = re.compile(
     r"\bcase.?sensitive|\bupper(?:case)? and lower(?:case)? (?:case )?(?:differ|are (?:not|diff))", re.IGNORECASE
 )
-_PLAIN: Final = re.compile(r"\b(?:without|no|not) (?:any )?wildcards?\b", re.IGNORECASE)
-# A search text that no item contains.
-_NOWHERE: Final = "roaas7nowhere"
-# Texts that mean something in a regular expression, and in SQL's LIKE.
-_SPECIAL: Final = ("(", "%")
 # Phrases in a description for the member of the last item that is the cursor of the next page.
 _OF_LAST: Final = re.compile(r"\b(\w+)`? of the (?:last|latest|newest|previous)\b", re.IGNORECASE)
 _SIGN: Final = re.compile(r"([+-]?)(.*)", re.DOTALL)
@@ -247,26 +242,6 @@ class Page:
     def identities(self) -> tuple[str, ...]:
         """Return for each item its identifier, or its whole content if it has none."""
         return tuple(json.dumps(members_of(item).get(self.by)) if self.by else identity_of(item) for item in self.items)
-
-
-def searches(listing: Listing, page: Page) -> Iterator[dict[str, Any]]:
-    """Yield texts: one that no item has, special ones, and ends of words in what a search looks at, in any case."""
-    search = listing.search
-    if search is None:
-        return
-    yield from [{search.name: _NOWHERE}] if listing.searched and fitting(search, _NOWHERE) else []
-    yield from ({search.name: text} for text in _SPECIAL if fitting(search, text))
-    for name in listing.searched:
-        texts = [value for item in page.items if isinstance(value := members_of(item).get(name), str)]
-        words = [word[1:] for text in reversed(texts) for word in text.split() if word.isascii() and word.isalnum()]
-        # A word that begins no text, and that some items do not have, shows more.
-        words.sort(key=lambda word: (any(text.startswith(word) for text in texts), all(word in text for text in texts)))
-        for word in [one for one in words if len(one) > 1][:1]:
-            turned = [word.swapcase()] if CASELESS.search(search.says) or CASED.search(search.says) else []
-            terms = turned if CASELESS.search(search.says) else [word, *turned]
-            yield from ({search.name: term} for term in terms if fitting(search, term))
-    if _PLAIN.search(search.says) and fitting(search, "%"):
-        yield {search.name: "%"}
 
 
 def number_of(text: str) -> int:
@@ -459,16 +434,21 @@ _MOST: Final = frozenset(
 )
 # Phrases in a parameter's description which say that it is a lower bound.
 _SAYS_LEAST: Final = re.compile(
-    r"at least|or more|or (?:later|after|newer|above|greater|higher)|not (?:before|below|less)|minimum|lower bound"
+    r"at least|or (?:more|later|after|newer|above|greater|higher|heavier|longer|larger|warmer|faster)"
+    r"|not (?:before|below|less)|minimum|lower bound"
     r"|greater than|more than|later than|newer than|higher than|since|\bfrom\b|>=?",
     re.IGNORECASE,
 )
 _SAYS_MOST: Final = re.compile(
-    r"at most|or less|or (?:earlier|before|older|below|fewer|lower)|not (?:after|above|more)|maximum|upper bound"
+    r"at most|or (?:less|earlier|before|older|below|fewer|lower|lighter|shorter|smaller|cooler|slower)"
+    r"|not (?:after|above|more)|maximum|upper bound"
     r"|less than|fewer than|earlier than|older than|lower than|\bbefore\b|until|up to|<=?",
     re.IGNORECASE,
 )
+# Phrases in it which say that the bound belongs to the values.
+_SAYS_EQUAL: Final = re.compile(r"\bat (?:least|most)\b|\bor \w+(?:er|re|ess|ve|ow)\b|inclusive|[<>]=", re.IGNORECASE)
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+_STEM: Final = re.compile(r"(?:at|on|date|time)$")
 _FREE: Final = frozenset({"", "date", "time", "datetime", "timestamp"})
 _DATES: Final = ("date-time", "date")
 _DAY: Final = re.compile(r"\d{4}-\d\d-\d\d")
@@ -502,6 +482,14 @@ class Bound(NamedTuple):
             return False
         return own[1] < bound[1] - bound[2] if self.is_least else own[1] > bound[1] + bound[2]
 
+    def includes(self, text: str, value: Any) -> bool:
+        """Return whether a value of the member lies on the right side of the parameter's text, or on it if said."""
+        bound, own = _rank(text), _rank(value)
+        if bound is None or own is None or bound[0] != own[0]:
+            return False
+        is_beyond = own[1] > bound[1] + bound[2] if self.is_least else own[1] < bound[1] - bound[2]
+        return is_beyond or (own == bound and str(value) == text and bool(_SAYS_EQUAL.search(self.parameter.says)))
+
 
 def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | None:
     """Return the member that a parameter bounds, by its name, type and description; None if it is no bound."""
@@ -515,6 +503,9 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
         ends = ("", "at", "on", "date", "time") if rest and kind in _DATES else ("",)
         named = [name for name in members if name in {f"{rest}{end}" for end in ends}]
         dated = [name for name, one in members.items() if _kind(one) == "date-time"]
+        if len(dated) > 1:
+            # "raised at this time or later" means `raisedAt`.
+            dated = [name for name in dated if _STEM.sub("", name) in re.findall(r"[a-z]+", parameter.says.lower())]
         said = {name for text in re.findall(r"`([\w.-]+)`", parameter.says) if (name := plain_name(text)) in members}
         found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [*said] * (len(said) == 1))
         own, is_level = _kind(members[found[0]]) if found else "", words[index].startswith(("min", "max"))
