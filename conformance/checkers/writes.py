@@ -60,6 +60,9 @@ GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
 )
+_DEFAULTED: Final = re.compile(
+    r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\bdefault", re.IGNORECASE
+)
 _STAYS: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:keep|kept|stay|remain|unchanged)",
     re.IGNORECASE,
@@ -157,6 +160,7 @@ class Writes:
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
         written = {operation.template for operation in operations if operation.method in {"PUT", "PATCH"}}
+        written |= {template.rpartition("/")[0] for template in written}
         self._reads = {
             operation.template: operation
             for operation in operations
@@ -200,8 +204,10 @@ class Writes:
                 yield from self._read(occasion, item, path)
             return
         if refuses(status, operation):
-            if item is not None and path in self._states:
-                self._writes[path].append(occasion)
+            # A refused write below a thing may have changed that.
+            at = path if item is not None else path.partition("?")[0].rpartition("/")[0]
+            if at in self._states:
+                self._writes[at].append(occasion)
             return
         state = self._states.get(path) if item is not None else None
         writes, last = self._writes.get(path, []), self._last.get(path, {})
@@ -232,6 +238,11 @@ class Writes:
             names = {*now, *state.members}
             changed = [name for name in names if not same(now.get(name), state.members.get(name))]
             self._moving |= {(item.template, name) for name in changed if not writes}
+            refused = [one for one in writes if refuses(one.response.status, one.operation)]
+            for one in refused if len(writes) > 1 and len(refused) == len(writes) else ():
+                yield from self._judge_write(
+                    occasion, item, one, _Sandwich(state.members, now, frozenset(), is_old=True)
+                )
             write = writes[0] if len(writes) == 1 else late if not writes and not changed else None
             if write is not None and (state.at_s <= write.sent_s or write is late):
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
@@ -456,7 +467,7 @@ class Writes:
             of = "the default of what" if "default" in given else "which"
             expected = f"{clip(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
             found, cause = f"{clip(now)} as {name}, as before", f"{item.label} {name}"
-            doubt = "PUT may keep what it leaves out"
+            doubt = "" if _DEFAULTED.search(change.operation.text) else "PUT may keep what it leaves out"
             yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=cause, doubt=doubt)
 
     def _judge_merge(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:

@@ -10,15 +10,12 @@ from urllib.parse import quote, urlsplit
 
 from conformance.api.rest.inputs import usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.references import is_free_text
-from conformance.api.rest.samples import fits
+from conformance.api.rest.samples import fits, other_texts
 from conformance.api.rest.things import collection_of, id_member
 from conformance.api.rest.variations import Kind, Variation
-from conformance.documents.json_schema import Schema
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
-from conformance.documents.representation import flat
-from conformance.scenarios.special_bodies import TEXTS, with_owned
+from conformance.scenarios.special_bodies import with_owned
 from conformance.scenarios.survey import Probe, Surveyor
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.reach import is_same, joined, path_of
@@ -78,11 +75,3 @@ def with_texts(create: Operation, body: Any) -> Any:
     schema = create.bodies[media_type].schema
     changed = {**body, **other_texts(schema, body)}
     return changed if changed != body and fits(schema, changed) else None
-
-
-def other_texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
-    """Return another text, beyond ASCII, for each free text of an object."""
-    parts = flat(schema).get("properties", {})
-    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
-    found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
-    return {name: texts[0] for name, texts in found.items() if texts}

@@ -126,7 +126,7 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                     break
                 if is_single:
                     _end_active(writer, kind, ends)
-                made = _begin(writer, kind, create, operations)
+                made = _begin(writer, kind.state, create, operations)
                 if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
                     _walk(writer, kind, path, steps)
@@ -134,20 +134,22 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
     return found
 
 
-def _begin(writer: Writer, kind: Ended, create: Operation, operations: _Operations) -> Exchange:
-    """Create an activity; if it has ended at once, create another one that has more to do."""
-    made = writer.send(create)
-    state, base = members(made, (kind.state,)).get(kind.state), _body_of(writer, create)
+def _begin(
+    writer: Writer, name: str, create: Operation, operations: _Operations, base: dict[str, Any] | None = None
+) -> Exchange:
+    """Create an activity; if it has ended at once, by the member ``name``, create another one that has more to do."""
+    made = writer.send(create, "", base)
+    state, base = members(made, (name,)).get(name), base or _body_of(writer, create)
     if not made.response.ok or str(state).casefold() not in FINAL or base is None:
         return made
     schema, body = next(iter(create.bodies.values())).schema, dict(base)
-    for name, part in flat(schema).get("properties", {}).items():
+    for member, part in flat(schema).get("properties", {}).items():
         given: Any = flat(part)
-        value: Any = body.get(name, given.get("default"))
-        if is_number(value) and words_of(name) & _LASTING:
-            body[name] = min(given.get("maximum", value * _LONGER), value * _LONGER)
-        elif "array" in kinds_of(given) and (ids := _fresh(writer, operations, name)):
-            body[name] = ids
+        value: Any = body.get(member, given.get("default"))
+        if is_number(value) and words_of(member) & _LASTING:
+            body[member] = min(given.get("maximum", value * _LONGER), value * _LONGER)
+        elif "array" in kinds_of(given) and (ids := _fresh(writer, operations, member)):
+            body[member] = ids
     return writer.send(create, "", body) if body != base and fits(schema, body) else made
 
 
@@ -303,7 +305,7 @@ def _delete_used(writer: Writer, operations: _Operations, path: str, delete: Ope
     body = _referring(writer, maker, name, place.rpartition("/")[2] if id_ is None else id_) if place else None
     if body is None:
         return
-    using = writer.send(maker, "", body)
+    using = _begin(writer, state_of(reader), maker, operations, body)
     at = location_of(writer.api, reader, using) if using.response.ok else ""
     if at and members(writer.send(reader, at), (name,)).get(name) == body[name]:
         deleted = writer.conditional(delete, read, place)

@@ -67,6 +67,7 @@ _FEWEST: Final = 2
 _BEYOND: Final = (1000, 100, 10, 1)
 # How pages are read whose links the device gives.
 _LINK: Final = "the link to the next page"
+_REFUSED: Final = range(400, 500)
 # Phrases in a description which say that the last page has no link to a next one.
 _ENDS: Final = re.compile(
     r"\b(?:null|absent|missing|omitted|empty|none)\b[^.]*\b(?:last|no (?:more|further|other|item)|follows?|end)\b",
@@ -241,16 +242,16 @@ class Reader:
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response, or None."""
-        exchange = self.read(query)
+        return self.shown(self.read(query))
+
+    def shown(self, exchange: Exchange) -> tuple[Exchange, Page] | None:
+        """Return a request and the list in its response, or None."""
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
 
-    def follow(self, target: str) -> tuple[Exchange, Page] | None:
-        """Return a GET of a link's target and the list in its response, or None."""
-        usual = request_of(self.listing.operation, self.usual)
-        exchange = self.api.send(replace(usual, target=target))
-        page = page_of(exchange.response, self.listing.operation)
-        return None if page is None else (exchange, replace(page, by=self.by))
+    def follow(self, target: str) -> Exchange:
+        """Send a GET of a link's target."""
+        return self.api.send(replace(request_of(self.listing.operation, self.usual), target=target))
 
     def page(self) -> Page | None:
         """Return the list without optional parameters; None if the device does not return it."""
@@ -501,7 +502,11 @@ class _Parts:
                 # Only a device that named a next page before says by its absence that this is the last.
                 ends = f"no further page after {len(ids)} items" if number > 1 and not whole.goes_on else ""
                 break
-            part = self.reader.follow(link) if link else self.reader.part({**query, limit.name: size})
+            sent = self.reader.follow(link) if link else self.reader.read({**query, limit.name: size})
+            part = self.reader.shown(sent)
+            if part is None and link and sent.response.status in _REFUSED:
+                found = f"status {sent.response.status} for {_LINK}"
+                return self._page_case(way, sent, f"each item of the list once, page after page by {way}", found)
             if part is None:
                 return None
             last = part
@@ -527,7 +532,8 @@ class _Parts:
     def _after(self, last: tuple[Exchange, Page], way: str, size: dict[str, Any]) -> tuple[str, ...]:
         """Return the items of the page that the last page names as the next one; a loop begins again."""
         reader, cursor = self.reader, self.reader.listing.cursor
-        part = next(map(reader.follow, self._links(*last)), None) if way == _LINK else None
+        links = [reader.follow(link) for link in self._links(*last)][:1] if way == _LINK else []
+        part = reader.shown(links[0]) if links else None
         if cursor is not None and way == cursor.name:
             following = next(cursors(reader.listing, *last), "")
             part = reader.part({way: following, **size}) if following else None

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice, pairwise
 from typing import Any, Final
 from urllib.parse import quote
@@ -17,7 +18,7 @@ from conformance.api.rest.listing import Listing, listing_of, page_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.references import singular
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import another, collection_of, creator_of, identifier_of, path_chosen
+from conformance.api.rest.things import collection_of, creator_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
 from conformance.checkers.memory import ending_with
@@ -27,7 +28,7 @@ from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
-from conformance.scenarios.creating import created_path, other_texts, with_texts
+from conformance.scenarios.creating import created_path, with_texts
 from conformance.scenarios.list_queries import choosing
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
@@ -45,8 +46,6 @@ from conformance.transport.parallel import send_together
 #: Way by which a list below another thing is read.
 ANOTHER: Final = "another thing"
 _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
-# Members of a resource that are written singly.
-_MEMBERS: Final = 6
 # _SETTLES_S: how long a deleted thing may still be listed, s. _PAUSE_S: pause between reads, s.
 _SETTLES_S, _PAUSE_S = 3.2, 0.4
 # _NEITHER: a list of entity tags that no content has.
@@ -177,24 +176,19 @@ class _Thing:
         first = self.get()
         if not first.ok or first.exchange is None:
             return
-        is_behind = False
         for change in changes:
-            bodies = self._bodies(change, members(first.exchange, ()))
+            bodies = self._bodies(change)
             # A JSON patch has no members, so use the first patch that changes something.
             if refusable := bodies or list(islice(self._special(change), 1 if self.tag else 0)):
                 self._send_refusable(change, refusable)
             self._at_once(change, bodies)
             alone = self._singly(change, bodies, whole_last=bool(self.tag and change is changes[0]))
-            for turn, body in enumerate(
-                alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
-            ):
-                old = self.tag
-                is_done = self.send(change, body, *self._current(None if turn else change)).ok
-                if is_done or not turn:
-                    self.get()
-                    if is_done and old not in {"", self.tag} and change is changes[0] and not is_behind:
-                        is_behind = True
-                        self._behind(change, bodies[-1], old)
+            refused = self._write_each(change, bodies, alone, is_first=change is changes[0])
+            taken = [body for body in bodies[:-1] if body not in refused]
+            if change.method == "PATCH" and refused and taken:
+                # A device may store the part of a body that it would take alone.
+                self.send(change, {**taken[0], **refused[0]}, *self._current())
+                self.get()
             waits = True
             # Special bodies show what is written in other formats.
             formats = _by_format(change)
@@ -209,6 +203,23 @@ class _Thing:
                     waits = time.monotonic() < until
                     time.sleep(_PAUSE_S if waits else 0)
                     self.get()
+
+    def _write_each(self, change: Operation, bodies: list[Any], alone: list[Any], *, is_first: bool) -> list[Any]:
+        """Write bodies one after another, and read after each; return those of one member that are refused."""
+        refused, is_behind = list[Any](), False
+        for turn, body in enumerate(
+            alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
+        ):
+            old = self.tag
+            is_done = self.send(change, body, *self._current(None if turn else change)).ok
+            if is_done or not turn:
+                self.get()
+            elif body in bodies[:-1]:
+                refused.append(body)
+            if is_done and old not in {"", self.tag} and is_first and not is_behind:
+                is_behind = True
+                self._behind(change, bodies[-1], old)
+        return refused
 
     def _singly(self, change: Operation, bodies: list[Any], *, whole_last: bool) -> list[Any]:
         """Return bodies of several writes: each member alone, and all together, which restores them.
@@ -375,7 +386,7 @@ class _Thing:
             found = self.surveyor.send(read, Variation(Kind.AGAIN, "", "", inputs), outgoing).exchange
             read_numbers(Writer(self.api, values), read, outgoing.target.partition("?")[0])
             for change in changes:
-                bodies = self._bodies(change, self._members()) if is_left(change, template) and self.get().ok else []
+                bodies = self._bodies(change) if is_left(change, template) and self.get().ok else []
                 if bodies and self.send(change, bodies[-1], *self._current()).ok:
                     self.api.send(replace(outgoing, target=outgoing.target.partition("?")[0]))
             page = page_of(found.response, read) if found is not None else None
@@ -456,6 +467,11 @@ class _Thing:
             if time.monotonic() - began > _SETTLES_S:
                 return
             time.sleep(_PAUSE_S)
+
+    def _bodies(self, change: Operation) -> list[Any]:
+        is_there = not self.is_own and bool(self.read.parameter("path"))
+        may = partial(is_changeable, collections=self.surveyor.values.collections) if is_there else lambda *_: True
+        return Writer(self.api, self.surveyor.values).singly(change, self._members(), may)
 
     def _members(self) -> dict[str, Any]:
         return members(self.last, ()) if self.last is not None else {}
@@ -557,28 +573,6 @@ class _Thing:
             if is_last or page is None or id_ not in {identifier_of(item, self.read) for item in page.items}:
                 return
             time.sleep(_PAUSE_S)
-
-    def _bodies(self, change: Operation, now: dict[str, Any]) -> list[Any]:
-        """Return bodies that change one member each, and a last one that restores them."""
-        writer = Writer(self.api, self.surveyor.values)
-        made = writer.bodies(change, 1, now)
-        media_type = next(iter(change.bodies), "")
-        if len(made) < 2 or not is_json(media_type):  # noqa: PLR2004 - see bodies()
-            return []
-        schema, base = change.bodies[media_type].schema, made[1]
-        whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
-        values = another(schema, whole, 1, self.surveyor.values.collections)
-        chosen = {name: value for name, value in values.items() if value != whole.get(name)}
-        chosen |= {name: one for name, one in other_texts(schema, whole).items() if name in chosen}
-        found = []
-        is_there = not self.is_own and bool(self.read.parameter("path"))
-        parts, collections = flat(schema).get("properties", {}), self.surveyor.values.collections
-        for name, value in chosen.items():
-            if is_there and not is_changeable(name, parts[name], collections):
-                continue
-            body = {name: value} if change.method == "PATCH" else {**whole, name: value}
-            found += [body] if fits(schema, body) else []
-        return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
 
 
 def _by_format(change: Operation) -> list[Operation]:

@@ -12,7 +12,7 @@ from conformance.api.rest.inputs import Inputs, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
-from conformance.api.rest.samples import alike_and_apart, fits, sample
+from conformance.api.rest.samples import TEXTS, alike_and_apart, fits, sample
 from conformance.api.rest.things import another, entry_of, is_devices, parts_of
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
@@ -23,9 +23,6 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.singletons import is_harmless
 
-#: Texts with leading zeros, an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and
-#: characters that formats escape.
-TEXTS: Final = ('007 Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "007 Zo\u00eb e\u0301 \U0001f916")
 # Lines with two kinds of ends. Below: names of members that have several lines.
 _LINES: Final = "roaas\r\n\r\n two\nend"
 _LONG: Final = re.compile(r"note|description|comment|text|remark|message|memo|instruction|detail|body|content|reason")

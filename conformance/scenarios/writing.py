@@ -9,7 +9,7 @@ from typing import Any, Final, TypeVar
 
 from conformance.api.rest.inputs import request_of, usual_inputs, whole_body, with_new_values
 from conformance.api.rest.interface import RestInterface
-from conformance.api.rest.samples import fits
+from conformance.api.rest.samples import fits, other_texts
 from conformance.api.rest.things import another, as_answered, differences, doubt_of_write, object_in, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
@@ -25,6 +25,8 @@ _PAUSE_S: Final = 0.2
 # _LAST: a value that differs in this many last reads is still changing, as a moving valve does.
 _LAST: Final = 5
 _ACCEPTED: Final = 202
+# Members of a resource that are written singly.
+_MEMBERS: Final = 6
 # Statuses by which a device demands a condition, or says that the request's condition does not hold.
 _WANTS_CONDITION: Final = frozenset({412, 428})
 _Read = TypeVar("_Read")
@@ -136,6 +138,31 @@ class Writer:
         full = {**base, **{name: one for name, one in present.items() if fits(parts[name], one)}}
         first = full if fits(schema, full) else base
         return [another(schema, first, turn, self.values.collections), first, usual.body]
+
+    def singly(
+        self, change: Operation, now: dict[str, Any], may: Callable[[str, dict[str, Any]], bool]
+    ) -> list[dict[str, Any]]:
+        """Return bodies that change one member of a thing each, and a last one that restores them.
+
+        Args:
+            change: a PUT or PATCH.
+            now: what the thing reads now.
+            may: returns whether a member, by its name and schema, may be changed.
+        """
+        made = self.bodies(change, 1, now)
+        media_type = next(iter(change.bodies), "")
+        if len(made) < 2 or not is_json(media_type):  # noqa: PLR2004 - see bodies()
+            return []
+        schema, base = change.bodies[media_type].schema, made[1]
+        whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
+        values = another(schema, whole, 1, self.values.collections)
+        chosen = {name: value for name, value in values.items() if value != whole.get(name)}
+        chosen |= {name: one for name, one in other_texts(schema, whole).items() if name in chosen}
+        parts, found = flat(schema).get("properties", {}), list[dict[str, Any]]()
+        for name, value in chosen.items():
+            body = {name: value} if change.method == "PATCH" else {**whole, name: value}
+            found += [body] if may(name, parts[name]) and fits(schema, body) else []
+        return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
 
     def with_items(
         self, operation: Operation, bodies: list[dict[str, Any]], turn: int, *, whole: bool = False

@@ -164,9 +164,9 @@ class Listing:
 
     @cached_property
     def selecting(self) -> frozenset[str]:
-        """The names of the parameters that select items by a member."""
-        chosen = (*self.filters.values(), *(bound.parameter for bound in self.bounds))
-        return frozenset(parameter.name for parameter in chosen)
+        """The names of the parameters that select items."""
+        chosen = (*self.filters.values(), *(bound.parameter for bound in self.bounds), self.search)
+        return frozenset(parameter.name for parameter in chosen if parameter is not None)
 
     @cached_property
     def sortings(self) -> dict[str, Sorting]:

@@ -6,12 +6,17 @@ import json
 import re
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, Final
 
+from conformance.api.rest.references import is_free_text
 from conformance.documents.json_schema import Schema, kinds_of
 from conformance.documents.json_shape import shape_of
 from conformance.documents.patterns import for_python
 from conformance.documents.representation import discriminator_of, flat
+
+#: Texts with leading zeros, an umlaut, a combining mark, a character beyond the Basic Multilingual Plane, and
+#: characters that formats escape.
+TEXTS: Final = ('007 Zo\u00eb e\u0301 \U0001f916 a+b, & %41 \\ "', "007 Zo\u00eb e\u0301 \U0001f916")
 
 _DEPTH = 6
 # _OPTIONAL: optional members of a value, in all; _REQUIRED: required members and items, in all. Each member gets an
@@ -202,3 +207,11 @@ def _matching(encoded: str) -> str:
         return find(from_regex(pattern), lambda text: fits(schema, text) and text.isprintable(), settings=quiet)
     except (HypothesisException, re.error, ValueError):
         return ""
+
+
+def other_texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
+    """Return another text, beyond ASCII, for each free text of an object."""
+    parts = flat(schema).get("properties", {})
+    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
+    found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
+    return {name: texts[0] for name, texts in found.items() if texts}
