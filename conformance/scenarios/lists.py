@@ -242,9 +242,9 @@ class Reader:
 
     def part(self, query: dict[str, Any] | None = None) -> tuple[Exchange, Page] | None:
         """Return a request as `read` sends it and the list in its response, or None."""
-        return self.shown(self.read(query))
+        return self.page_in(self.read(query))
 
-    def shown(self, exchange: Exchange) -> tuple[Exchange, Page] | None:
+    def page_in(self, exchange: Exchange) -> tuple[Exchange, Page] | None:
         """Return a request and the list in its response, or None."""
         page = page_of(exchange.response, self.listing.operation)
         return None if page is None else (exchange, replace(page, by=self.by))
@@ -503,7 +503,7 @@ class _Parts:
                 ends = f"no further page after {len(ids)} items" if number > 1 and not whole.goes_on else ""
                 break
             sent = self.reader.follow(link) if link else self.reader.read({**query, limit.name: size})
-            part = self.reader.shown(sent)
+            part = self.reader.page_in(sent)
             if part is None and link and sent.response.status in _REFUSED:
                 found = f"status {sent.response.status} for {_LINK}"
                 return self._page_case(way, sent, f"each item of the list once, page after page by {way}", found)
@@ -533,7 +533,7 @@ class _Parts:
         """Return the items of the page that the last page names as the next one; a loop begins again."""
         reader, cursor = self.reader, self.reader.listing.cursor
         links = [reader.follow(link) for link in self._links(*last)][:1] if way == _LINK else []
-        part = reader.shown(links[0]) if links else None
+        part = reader.page_in(links[0]) if links else None
         if cursor is not None and way == cursor.name:
             following = next(cursors(reader.listing, *last), "")
             part = reader.part({way: following, **size}) if following else None
