@@ -16,9 +16,10 @@ from conformance.commandline.help_pages import Group, inert, options_of
 from conformance.commandline.out_folder import write_atomically
 from conformance.contract.described import MOTION
 from conformance.contract.toml_file import basic_string
-from conformance.documents.openapi import operations_of
+from conformance.documents.openapi import operations_of, read_operations
 from conformance.statement.motion_calls import named_by
 from conformance.statement.statement import Calls, StatementError, motion_map_of
+from conformance.target.describing import is_wsdl
 from conformance.target.naming import Judged
 
 if TYPE_CHECKING:
@@ -110,6 +111,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     # Modules that talk to a device are imported late, so that --help stays quick.
     from conformance.api.permission import Permission  # noqa: PLC0415
     from conformance.api.rest.interface import RestInterface  # noqa: PLC0415
+    from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415
     from conformance.engine.finding import plan_of  # noqa: PLC0415
     from conformance.engine.found_positions import PositionFinder  # noqa: PLC0415
     from conformance.engine.found_velocities import VelocityFinder  # noqa: PLC0415
@@ -126,7 +128,10 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         raise StatementError("the statement has a motion map: leave --drive out, or take [motion] out")
     drive = options.drive or ""
     try:
-        operations = operations_of(judged.contract)
+        services = services_of(judged.contract)
+        operations = (
+            read_operations(with_messages(services, statement.values)) if services else operations_of(judged.contract)
+        )
         plan = plan_of(operations, drive, options.read, options.calls, options.before)
         for line in plan.lines():
             click.echo(inert(line), err=True)
@@ -136,8 +141,10 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         calls = Calls((*statement.calls.allow, (plan.named or plan.drive).label, *sorted(sent)), statement.calls.never)
         run.statement = msgspec.structs.replace(statement, calls=calls)
         connection = connection_of(statement.endpoints)
-        connection.permit = Permission(run).refusal
-        api = RestInterface(run, HttpClient(statement.endpoints.rest or "", connection))
+        permission, base_url = Permission(run), statement.endpoints.rest or ""
+        permission.may_call_ports(base_url)
+        connection.permit = permission.refusal
+        api = RestInterface(run, HttpClient(base_url, connection))
     except NotPossibleError as reason:
         raise StatementError(f"--drive: {reason}") from reason
     try:
@@ -151,7 +158,8 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         click.echo(inert(line), err=True)
     motion = motion_map_of(text, f"the map of {drive}")
     if options.save_map:
-        where = f"[api]\nopenapi = {basic_string(source)}\n\n" if source else ""
+        kind = "wsdl" if is_wsdl(source or "") or source == options.wsdl else "openapi"
+        where = f"[api]\n{kind} = {basic_string(source)}\n\n" if source else ""
         write_atomically(options.save_map, f"{where}{text}\n")
         click.echo(f"wrote {options.save_map}", err=True)
     notes = tuple(f"Found by driving: {note}" for note in found.notes)

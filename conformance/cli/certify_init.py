@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -12,11 +13,12 @@ from conformance.commandline.extras import lacking_ros
 from conformance.commandline.help_pages import inert
 from conformance.commandline.result_command import CommandResult
 from conformance.contract.pack import Contract
+from conformance.documents.description import Description
 from conformance.statement.endpoints import Endpoints
 from conformance.statement.ros_map import RosMap
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 from conformance.target.connecting import connection_of
-from conformance.target.describing import fetch_description, is_wsdl, trusting
+from conformance.target.describing import fetch_description, is_wsdl, soap_contract, trusting
 from conformance.target.naming import DeviceOptions
 from conformance.transport.client import HttpClient
 from ros_probe.process import ProbeError
@@ -63,16 +65,19 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
     from conformance.engine.first_described import write_described_statement  # noqa: PLC0415 - only --init needs it
     from conformance.engine.first_ros import ros_proposals  # noqa: PLC0415 - as above
 
-    if is_wsdl(source) or source == options.wsdl:
-        raise click.UsageError(f'--init reads OpenAPI descriptions: for {source}, write [api] and wsdl = "{source}"')
     path = _new_file(path, force=force)
     where = options.apply(Endpoints())
     if options.ros and (problem := lacking_ros("proposing a ROS map")):
         raise click.UsageError(problem)
-    api = Api(overlays=options.overlays, base_url=options.base_url or where.rest)
+    wsdl = source if is_wsdl(source) or source == options.wsdl else None
+    api = Api(overlays=options.overlays, base_url=options.base_url or where.rest, wsdl=wsdl)
     try:
-        found = fetch_description(
-            source, api.overlays, connection_of(where), api.base_url, allow_files=options.allow_files
+        found = (
+            _read_wsdl(source, options, where)
+            if wsdl
+            else fetch_description(
+                source, api.overlays, connection_of(where), api.base_url, allow_files=options.allow_files
+            )
         )
         base_url = api.base_url or found.base_url
         if options.ros and not base_url:
@@ -89,3 +94,22 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
         click.echo(inert(remark), err=True)
     click.echo(f"wrote {path}: look it over, then run `roaas certify {path}`")
     return CommandResult(ExitCode.PASSED)
+
+
+def _read_wsdl(source: str, options: DeviceOptions, where: Endpoints) -> Description:
+    """Return what a WSDL describes in the form of other descriptions, with its messages as if they were JSON."""
+    from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
+
+    with TemporaryDirectory() as folder:
+        contract, there, remarks = soap_contract(
+            source,
+            options.base_url,
+            where,
+            connection_of(where),
+            Path(folder),
+            schemas=options.schemas,
+            allow_files=options.allow_files,
+        )
+        services = services_of(contract)
+        document = with_messages(services, {}) if services else contract.openapi
+    return Description(source, document, document, there.rest or "", unread=remarks)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +17,7 @@ from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.documents.wsdl import SoapOperation, SoapPort, Wsdl, read_services
 from conformance.documents.xml import local
+from conformance.documents.xsd_json import schema_of
 from conformance.documents.xsd_shapes import Element
 
 #: File with the documents of a WSDL by location, and the first of them.
@@ -90,6 +91,27 @@ def _operations(found: Wsdl) -> dict[str, Any]:
             }
         }
     return {"openapi": "3.1.0", "info": {"title": found.name, "version": ""}, "paths": paths}
+
+
+def with_messages(found: Wsdl, values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+    """Return the operations with the schemas of their messages, as if they were JSON.
+
+    Args:
+        found: what the WSDL describes.
+        values: what members of requests may have, by name.
+    """
+    document = _operations(found)
+    for port, operation in each(found.ports):
+        item = document["paths"][label_of(port, operation).partition(" ")[2]]["post"]
+        # A fault that is declared says that the operation may refuse a message.
+        item |= {"description": operation.documentation, "responses": {"400": {}} if operation.faults else {}}
+        sent, told = (found.types.shape(tag) if tag else None for tag in (operation.request, operation.response))
+        if sent is not None:
+            item["requestBody"] = {"content": {"application/json": {"schema": schema_of(sent, given=values)}}}
+        if told is not None:
+            content = {"application/json": {"schema": schema_of(told, given={})}}
+            item["responses"]["200"] = {"description": "", "content": content}
+    return document
 
 
 def _statuses(port: SoapPort, operation: SoapOperation) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from conformance.documents.representation import scalar
 from conformance.documents.xml import XSI, clark, elements, local, text_of
-from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Element, Group, Simple
+from conformance.documents.xsd_shapes import INTEGERS, NUMBERS, STRINGS, Element, Group, Simple, plain
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -64,27 +64,43 @@ def _kind(simple: Simple) -> str:
     return "integer" if simple.builtin in INTEGERS else "number" if simple.builtin in NUMBERS else "string"
 
 
-def schema_of(declared: Element, depth: int = 0) -> dict[str, Any]:
-    """Return the JSON Schema of an element's content."""
-    kind = declared.type
+def schema_of(declared: Element, depth: int = 0, given: Mapping[str, Sequence[Any]] | None = None) -> dict[str, Any]:
+    """Return the JSON Schema of an element's content.
+
+    Args:
+        declared: the element.
+        depth: how deep it is.
+        given: values of members by name; then texts have a default, and attributes are called ``@name``, as in a map.
+    """
+    kind, at, text = declared.type, "" if given is None else "@", "value" if given is None else "#text"
     own: dict[str, Any] = {"description": declared.documentation} if declared.documentation else {}
     if isinstance(kind, Simple) or (kind.text is not None and not kind.attributes):
-        own |= _simple_schema(kind if isinstance(kind, Simple) else kind.text or Simple("string"))
+        simple = kind if isinstance(kind, Simple) else kind.text or Simple("string")
+        own |= _simple_schema(simple) | _default_of(declared.tag, simple, given)
     elif depth < _DEEPEST:
-        parts = {local(name): _simple_schema(simple) for name, simple, _ in kind.attributes}
-        parts |= {"value": _simple_schema(kind.text)} if kind.text is not None else {}
+        parts = {
+            f"{at}{local(name)}": _simple_schema(simple) | _default_of(name, simple, given)
+            for name, simple, _ in kind.attributes
+        }
+        parts |= {text: _simple_schema(kind.text)} if kind.text is not None else {}
         children = list(_first_branches(kind.content))
         for child in children:
-            part = schema_of(child, depth + 1)
+            part = schema_of(child, depth + 1, given)
             many = {"type": "array", "items": part, "minItems": child.minimum}
             many |= {} if child.maximum is None else {"maxItems": child.maximum}
             parts[local(child.tag)] = part if child.maximum == 1 else many
-        needed = [local(name) for name, _, needs in kind.attributes if needs]
+        needed = [f"{at}{local(name)}" for name, _, needs in kind.attributes if needs]
         needed += [local(child.tag) for child in children if child.minimum]
         own |= {"type": "object", "properties": parts, "required": needed}
     if declared.nillable and "type" in own:
         own["type"] = [own["type"], "null"]
     return own
+
+
+def _default_of(tag: str, simple: Simple, given: Mapping[str, Sequence[Any]] | None) -> dict[str, Any]:
+    if given is None or _kind(simple) != "string":
+        return {}
+    return {"default": next(iter(given.get(local(tag), ())), plain(simple))}
 
 
 def _first_branches(group: Group | None) -> Iterator[Element]:

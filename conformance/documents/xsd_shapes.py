@@ -148,8 +148,8 @@ class _Reader:
             return Element(tag, unknown, declared.min_occurs, declared.max_occurs, nillable=nillable)
         own = self._type(declared.type)
         own = _with_fixed(own, declared) if isinstance(own, Simple) else own
-        said = declared.elem.findtext(_DOCUMENTATION, "") if declared.elem is not None else ""
-        documentation = " ".join(said.split())
+        texts = (part.elem.findtext(_DOCUMENTATION, "") for part in (declared, declared.type) if part.elem is not None)
+        documentation = " ".join(next(filter(None, texts), "").split())
         return Element(
             tag, own, declared.min_occurs, declared.max_occurs, nillable=nillable, documentation=documentation
         )

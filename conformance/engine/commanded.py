@@ -145,7 +145,7 @@ def bounds_of(schema: Schema) -> tuple[float, float] | None:
 def unit_of(place: str, schema: Schema) -> str:
     """Return the unit of a number that its name or its description says; empty: neither does."""
     said = (place, str(schema.get("description", "")))
-    return next((unit for text in said for unit, words in _UNITS.items() if re.search(words, text)), "")
+    return next((unit for text in said for unit, words in _UNITS.items() if re.search(words, text, re.IGNORECASE)), "")
 
 
 def is_velocity(operation: Operation, numbers: Sequence[Commanded]) -> bool:
@@ -246,7 +246,7 @@ def unique_names(places: Sequence[str], titles: Mapping[str, str] = MappingProxy
     """Return a name for each place, as short as possible and unique; ``titles``: the names of items of lists."""
     called = {at: f"{at.rpartition('/')[0]}/{titles[at]}" if at in titles else at for at in places}
     parts = {
-        at: [part for part in re.split(r"[/#]", text.strip("{}")) if part] or ["value"] for at, text in called.items()
+        at: [part for part in re.split(r"[/#@]", text.strip("{}")) if part] or ["value"] for at, text in called.items()
     }
     parts = {at: ["axis", *own] if all(map(str.isdecimal, own)) else own for at, own in parts.items()}
     for length in range(1, DEPTH + 2):

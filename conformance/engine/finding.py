@@ -140,6 +140,9 @@ def plan_of(
         raise NotPossibleError(
             f"--drive {drive!r}: its path, query and body (declared: {bodies}) have no numbers to command"
         )
+    # A second vector of attributes may be of a part that the device lacks: most cameras of ONVIF have no zoom.
+    vector = posixpath.dirname(numbers[0].place)
+    numbers = [one for one in numbers if "@" not in one.place or posixpath.dirname(one.place) == vector]
     commanded = {number.place for number in numbers}
     if missing := [
         item.name
@@ -227,7 +230,7 @@ def _reads(operations: Sequence[Operation], rules: CallRules, drive: str, names:
     found = [
         operation
         for operation in operations
-        if operation.method == "GET"
+        if (operation.method == "GET" or operation.reads)
         and rules.decide(operation).may
         and not harmful_words(operation)
         and any(map(is_json, operation.formats))
@@ -407,7 +410,8 @@ class Finder(ABC):
         self._turn += 1
         sent = self._clock.now()
         exchange = self._send(operation.label, None)
-        numbers = numbers_of(self._binding.content(exchange.response.body)) if exchange.response.ok else {}
+        response = exchange.response
+        numbers = numbers_of(self._binding.content(response.body), self._binding.syntax) if response.ok else {}
         moment = (sent + self._clock.now()) / 2
         if numbers:
             self._looks.add(operation.label, moment, numbers)

@@ -131,7 +131,7 @@ def _motion(operations: Sequence[Operation]) -> list[str]:
 
 
 def _api(folder: Path, found: Description, api: Api) -> Iterator[str]:
-    yield f"openapi = {basic_string(_beside(folder, found.source))}"
+    yield f"{'wsdl' if api.wsdl else 'openapi'} = {basic_string(_beside(folder, found.source))}"
     overlays = ", ".join(basic_string(_beside(folder, overlay)) for overlay in api.overlays)
     yield f"overlays = [{overlays}]" if overlays else '# overlays = ["overlay.yaml"]  # OpenAPI Overlays to apply to it'
     if api.base_url:

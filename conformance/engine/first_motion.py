@@ -44,7 +44,7 @@ def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
 
     What is sent and what is read are taken for one axis if they have the same name.
     """
-    reading = [item for item in operations if item.method == "GET" and item.shape]
+    reading = [item for item in operations if item.safe and item.shape]
     acting = [with_query(item) for item in operations if not (item.safe or item.never)]
     sending = [(item, numbers) for item in acting if (numbers := commanded_by(item))]
     goes = _best(reading, [one for one in sending if not is_velocity(*one) and _GOES.search(one[0].label)], _position)
@@ -158,10 +158,14 @@ def _best(
     for state in reading:
         told = [at for at, _ in numbers_in(state.shape or {})]
         for sent, numbers in ((sent, numbers) for sent, numbers in sending if _belongs(state, sent)):
-            places = {at: command for command in numbers if (at := place_of(command, told)) is not None}
+            # The first of several numbers of one name: in an ONVIF vector, pan comes before zoom.
+            places = {at: command for command in reversed(numbers) if (at := place_of(command, told)) is not None}
             found.append(_Pair(state, sent, places))
-    best = max(found, key=lambda pair: len(pair.places), default=None)
-    return best if best and best.places else None
+    return max(
+        (pair for pair in found if pair.places),
+        key=lambda pair: (len(pair.places), not any(one.is_relative for one in pair.places.values())),
+        default=None,
+    )
 
 
 def _position(number: Commanded, told: Sequence[str]) -> str | None:

@@ -382,7 +382,8 @@ class PositionFinder(Finder):
         stop = self._plan.stop
         if stop is None:
             return
-        schema = body_schema(stop)
+        # A message of SOAP has its usual values.
+        schema = body_schema(stop) if self._binding.syntax == "JSON" else None
         wanted = [name for part in parts_of(schema) for name in part.get("required", ())]
         told = self._answer if isinstance(self._answer, dict) else {}
         ids = {name: name if name in told else "id" for name in NAME.findall(stop.template)}

@@ -477,14 +477,17 @@ class VelocityFinder(Finder):
         turns = is_heading or (number is not None and number.turns)
         pointer, _, angle = place.partition(ANGLE)
         schema = self._schema_at(place)
-        unit = "rad" if angle else unit_of(pointer, schema) or (turn if turns else way)
+        told = unit_of(pointer, schema) or (unit_of(number.place, number.schema) if number and scale == 1 else "")
+        unit = "rad" if angle else told or (turn if turns else way)
         if is_heading and not angle:
             unit = "deg" if self._looks.is_in_degrees(self._reads[0].label, place) else unit or "rad"
         # One that was seen to turn in degrees is known by the same factor of a radian.
         scale = next((factor for factor, units in _UNITS.items() if unit and unit in units), scale)
         if turns and unit in {"rad", "deg"} and not angle and self._looks.is_heading(place):
             angle = "yaw"
-        room = _ROOM_RAD * scale if turns else max(ROOM_M * scale, ROOM_S * fastest)
+        room = _ROOM_RAD * scale if turns else ROOM_M * scale
+        # What turns in a unit that nobody tells may do so in degrees.
+        room = room if turns and (told or is_heading) else max(room, ROOM_S * fastest)
         all_around = [round(end * scale, 1) for end in (-3.0, 3.0)]
         limits = all_around if angle else [round(here - room, 4), round(here + room, 4)]
         if declared := bounds_of(schema):

@@ -106,8 +106,8 @@ class Leg:
     def was_under_way(self, axis: str, tolerance: float, until: float | None = None) -> bool:
         """Return whether the second command met the device between start and target of the first, along an axis.
 
-        Over a slow link it reaches a fast device after that has arrived. ``until``: when it met the device at the
-        latest, if not when it was answered.
+        Over a slow link it reaches a fast device after that has arrived; and a device may need as much way to brake as
+        it needed to speed up. ``until``: when it met the device at the latest, if not when it was answered.
         """
         goal, order = self.commands[:2]
         before = [reading for reading in self.readings if reading.values and reading.received <= order.sent]
@@ -117,7 +117,7 @@ class Leg:
         left, done = abs(goal.targets[axis] - last.values[axis]), abs(last.values[axis] - self.start[axis])
         since_s = last.sent - goal.answered
         comes = done / since_s * ((until or order.answered) - last.sent) if since_s > 0 else left
-        return left >= comes + 4 * tolerance and done >= tolerance
+        return left >= comes + max(4 * tolerance, done + comes + tolerance) and done >= tolerance
 
 
 @dataclass(frozen=True)

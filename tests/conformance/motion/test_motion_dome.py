@@ -1,10 +1,26 @@
 """A camera that is moved by ONVIF, over HTTP: a right one is not blamed, and a wrong map is refused."""
 
+import sys
+import tomllib
+
 import dome
+import pytest
 from body import Body
 from dome import Dome
+from driven_device import SimulatedClock
 from judged_devices import judged_by_map, passed_but
+from processes import ended
+from simulated import Api, map_of
 from soap_devices import PASSWORD, USER, serving
+
+from conformance.api.call_rules import CallRules
+from conformance.documents.openapi import read_operations
+from conformance.documents.wsdl_pack import with_messages
+from conformance.engine.finding import plan_of
+from conformance.engine.found_positions import PositionFinder
+from conformance.engine.found_velocities import VelocityFinder
+from conformance.scenarios.motion.binding import SoapBinding
+from conformance.statement.statement import motion_map_of
 
 _NOT_DECLARED = {"agrees", "action-runs", "action-succeeds", "action-canceled", "switches"}
 
@@ -29,3 +45,40 @@ def test_an_element_that_the_message_has_not_is_named(tmp_path):
     done, _ = _judged(None, tmp_path, dome.MAP.replace('ProfileToken = "main", Position', 'Profile = "main", Position'))
     assert done.returncode == 2
     assert "POST /PTZPort/AbsoluteMove: AbsoluteMove has no Profile, but Position, ProfileToken, Speed" in done.stderr
+
+
+_VELOCITY = {"ProfileToken": "main", "Velocity": {"PanTilt": {"@x": "{PanTilt_x}", "@y": "{PanTilt_y}"}}}
+_POSITION = {"ProfileToken": "main", "Position": {"PanTilt": {"@x": "{PanTilt_x}", "@y": "{PanTilt_y}"}}}
+
+
+@pytest.mark.parametrize(
+    ("drive", "finder", "body"),
+    [("ContinuousMove", VelocityFinder, _VELOCITY), ("AbsoluteMove", PositionFinder, _POSITION)],
+)
+def test_the_axes_of_a_camera_are_found_by_driving_it(drive, finder, body):
+    clock = SimulatedClock()
+    api, messages = Api(Dome(Body(dome.LIMITS, clock.now, clock.sleep)), clock, lambda: 0.002), dome.messages_of()
+    operations = read_operations(with_messages(messages.found, messages.values))
+    plan = plan_of(operations, f"POST /PTZPort/{drive}", None, CallRules(motion=True))
+    motion = map_of("\n".join(finder(api, SoapBinding(api, messages), plan, clock).find().lines))
+    assert motion.state.read == "POST /PTZPort/GetStatus"
+    assert {axis.at for axis in motion.state.axes.values()} == {f"/PTZStatus/Position/PanTilt/@{one}" for one in "xy"}
+    # A zoom, which not every camera has, is left out.
+    assert (motion.velocity or motion.goto).body == body
+    if motion.velocity is not None:
+        assert motion.velocity.hold_s == pytest.approx(dome.HOLD_S, abs=0.1)
+        assert motion.velocity.axes["PanTilt_x"].scale == pytest.approx(dome.FULL_SPEED, rel=0.15)
+
+
+def test_init_proposes_the_map_of_a_camera(tmp_path):
+    statement = tmp_path / "camera.toml"
+    with serving(Dome(Body(dome.LIMITS))) as url:
+        done = ended(sys.executable, "-m", "roaas", "certify", "--init", str(statement), f"{url}/onvif.wsdl")
+    assert done.returncode == 0, done.stderr
+    text = statement.read_text(encoding="utf-8")
+    assert tomllib.loads(text)["api"] == {"wsdl": f"{url}/onvif.wsdl"}
+    lines = [line.removeprefix("# ") for line in text.splitlines()]
+    motion = motion_map_of("\n".join(lines[lines.index("[motion.state]") : lines.index("[values]")]), "it")
+    assert [motion.state.read, motion.goto.send, motion.velocity.send, motion.stop.send] == [
+        f"POST /PTZPort/{name}" for name in ("GetStatus", "AbsoluteMove", "ContinuousMove", "Stop")
+    ]
