@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +16,7 @@ from conformance.commandline.help_pages import Group, inert, options_of
 from conformance.commandline.out_folder import write_atomically
 from conformance.contract.described import MOTION
 from conformance.contract.toml_file import basic_string
-from conformance.documents.openapi import operations_of, read_operations
+from conformance.documents.openapi import Operation, operations_of, read_operations
 from conformance.statement.motion_calls import named_by
 from conformance.statement.statement import Calls, StatementError, motion_map_of
 from conformance.target.describing import is_wsdl
@@ -100,6 +100,17 @@ def options_for(options: CertifyOptions, *, named: bool) -> CertifyOptions:
     return replace(options, classes=classes, effort="quick" if default else options.effort)
 
 
+def _described(judged: Judged) -> tuple[Sequence[Operation], str]:
+    """Return the operations of the device's description, and what it says of all of them."""
+    from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
+
+    services = services_of(judged.contract)
+    if services is not None:
+        return read_operations(with_messages(services, judged.statement.values)), services.documentation
+    info = judged.contract.openapi.get("info")
+    return operations_of(judged.contract), str(info.get("description", "")) if isinstance(info, dict) else ""
+
+
 def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | None) -> Judged:
     """Show the planned drive, ask for consent, drive the robot a little, and return the target with the found map.
 
@@ -111,7 +122,6 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
     # Modules that talk to a device are imported late, so that --help stays quick.
     from conformance.api.permission import Permission  # noqa: PLC0415
     from conformance.api.rest.interface import RestInterface  # noqa: PLC0415
-    from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415
     from conformance.engine.finding import plan_of  # noqa: PLC0415
     from conformance.engine.found_positions import PositionFinder  # noqa: PLC0415
     from conformance.engine.found_velocities import VelocityFinder  # noqa: PLC0415
@@ -128,11 +138,8 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         raise StatementError("the statement has a motion map: leave --drive out, or take [motion] out")
     drive = options.drive or ""
     try:
-        services = services_of(judged.contract)
-        operations = (
-            read_operations(with_messages(services, statement.values)) if services else operations_of(judged.contract)
-        )
-        plan = plan_of(operations, drive, options.read, options.calls, options.before)
+        operations, text = _described(judged)
+        plan = plan_of(operations, drive, options.read, options.calls, options.before, text)
         for line in plan.lines():
             click.echo(inert(line), err=True)
         if not options.yes and not click.confirm("May the robot move?", err=True):

@@ -72,6 +72,15 @@ _STOPS: Final = re.compile(
     r"(?:stop|halt|cancel|abort)(?:[-_]?(?:slew|goto|go|mov(?:e|es|ing|ement)|motion|all|ax[ie]s|drives?|robot|now))?",
     re.IGNORECASE,
 )
+# _HELD: what a description says of the end of a velocity, and of the time that it holds. _REPLACES: of a second target.
+_HELD: Final = re.compile(
+    r"(?=.*\b(?:stop|h[eo]ld|halt|rest|brak|watchdog))(?=.*\b(?:last|no|without)\b.*\b(?:command|twist|velocit|message|rates?\b))",
+    re.IGNORECASE | re.DOTALL,
+)
+_TIME: Final = re.compile(r"(\d+(?:\.\d+)?|\bone|\ba) ?(m?)s(?:ec(?:ond)?s?)?\b|(\d+) milliseconds?\b", re.IGNORECASE)
+_REPLACES: Final = re.compile(
+    r"\bnew (?:target|goal|move|position)\b[^.;]*\b(?:replace|supersede|preempt|displace|override)s\b", re.IGNORECASE
+)
 #: The robot is kept within ROOM_M of its start, m; a fast robot as near as it can get in ROOM_S, s.
 ROOM_M, ROOM_S = 0.5, 2.5
 #: How fast a device may seem to move at rest, as a share of its fastest. _REST_S: how long it is watched at first, s.
@@ -91,6 +100,7 @@ class Plan:
         named: the operation that commands as the description has it, without values in its path; None: the same.
         preparing: what the device may want before it moves.
         is_prepared: whether the user says that it wants that.
+        text: what the description says of all operations and of this one.
     """
 
     drive: Operation
@@ -101,6 +111,22 @@ class Plan:
     named: Operation | None = None
     preparing: Preparing = NOTHING
     is_prepared: bool = False
+    text: str = ""
+
+    @property
+    def holds_s(self) -> float | None:
+        """How long a velocity holds after the last command, as the description says in words, s; None: it does not."""
+        sentences = filter(_HELD.search, re.split(r"[.;!?](?:\s|$)", self.text))
+        times = [one for sentence in sentences for one in _TIME.findall(sentence)]
+        found = [
+            int(ms) / 1000 if ms else (float(n) if n[0].isdigit() else 1.0) / (1000 if m else 1) for n, m, ms in times
+        ]
+        return max(found, default=None)
+
+    @property
+    def replaces(self) -> bool:
+        """Whether the description says in words that a new target replaces that under way."""
+        return bool(_REPLACES.search(self.text))
 
     def lines(self) -> Iterator[str]:
         """Yield the planned steps as lines for the user."""
@@ -119,9 +145,22 @@ class Plan:
 
 
 def plan_of(
-    operations: Sequence[Operation], drive: str, read: str | None, rules: CallRules, before: Sequence[str] = ()
+    operations: Sequence[Operation],
+    drive: str,
+    read: str | None,
+    rules: CallRules,
+    before: Sequence[str] = (),
+    text: str = "",
 ) -> Plan:
-    """Return the operations to command and to read, from a description; ``before``: what the user sends before.
+    """Return the operations to command and to read, from a description.
+
+    Args:
+        operations: of the description.
+        drive: names the operation that commands.
+        read: names the one that shows where the device is; None: it is chosen.
+        rules: what may be called.
+        before: what the user sends before.
+        text: what the description says of all operations.
 
     Raises:
         NotPossibleError: it says too little; the message says what.
@@ -164,9 +203,8 @@ def plan_of(
     reads = reads or list(_reads(known, rules, chosen.template, names))[:_MOST_READS]
     if not reads:
         raise NotPossibleError("the description has no GET with JSON that could show where the device is: give --read")
-    return Plan(
-        chosen, tuple(numbers), tuple(reads), drives, stop_beside(known, chosen), named, preparing, bool(before)
-    )
+    stop, said = stop_beside(known, chosen), f"{text}. {named.text}"
+    return Plan(chosen, tuple(numbers), tuple(reads), drives, stop, named, preparing, bool(before), said)
 
 
 def _values_in(operation: Operation, call: str) -> dict[str, str]:

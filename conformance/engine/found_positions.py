@@ -347,6 +347,8 @@ class PositionFinder(Finder):
             yield "relative = true"
         if self._relative or self._refuses:
             yield 'while_moving = "refused"  # no second move is sent before the first one has ended'
+        elif self._plan.replaces:
+            yield 'while_moving = "displaces"  # as the description says'
         slowest = max(move.took_s for move in moved.values())
         if self._lasts:
             settle_s = max(0.5, slowest - self.seconds + 0.3)

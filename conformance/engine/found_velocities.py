@@ -32,8 +32,8 @@ from conformance.scenarios.scenario import NotPossibleError
 _DRIVEN_S, _KEPT_S, _BEFORE_S, _AFTER_S = 0.7, 0.1, 0.25, 0.6
 # _LET_GO_S: how long at most no command is sent. _SURE_S: how long the device must rest to count as stopped, s.
 _LET_GO_S, _SURE_S = 10.0, 0.5
-# The hold time that a device must have for which none was seen or declared, s.
-_DEMANDED_S: Final = 2.0
+# The hold time that a device must have for which none was seen or declared, s; by how much a declared one may be off.
+_DEMANDED_S, _LONGER = 2.0, 1.5
 # _UNITS: by units in one m or one rad, their names.
 _UNITS: Final = {1.0: ("m", "rad"), 100.0: ("cm", ""), 1000.0: ("mm", ""), math.degrees(1): ("", "deg")}
 _NEAR: Final = 2.0
@@ -428,7 +428,10 @@ class VelocityFinder(Finder):
         least = max(off[name] * widest[name] for name in shown)
         yield f"tolerance = {least:.3g}  # the suite's: {max(off.values()):.0%} of the fastest"
         yield f"settle_s = {min(settle_s, 2.0):.2f}  # seen: so long it took to rest, and half as long again"
-        if hold_s is not None:
+        declared_s = self._plan.holds_s
+        if declared_s is not None and (hold_s is None or hold_s > _LONGER * declared_s + _LATE_S):
+            yield f"hold_s = {declared_s:g}  # as the description says"
+        elif hold_s is not None:
             yield f"hold_s = {hold_s:.2f}  # seen: let go, it stopped by itself"
         else:
             yield f"hold_s = {_DEMANDED_S:g}  # the suite's: let go, it drove on"

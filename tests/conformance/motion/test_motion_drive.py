@@ -17,7 +17,7 @@ from judged_devices import MOVES, RUNS
 from processes import ended
 from rover import Rover, serving_rover
 from serving_apps import serving_app
-from simulated import Api, Binding, cases_of, map_of
+from simulated import Api, Binding, Unread, cases_of, map_of
 from starlette.responses import JSONResponse
 from winch import Winch
 
@@ -31,11 +31,12 @@ from conformance.engine.found_velocities import VelocityFinder
 from conformance.engine.map_text import template_of
 from conformance.rules.motion.test_motion import stop_rests
 from conformance.rules.motion.test_motion_attempts import unauthorised_still
-from conformance.rules.motion.test_velocities import stopped, velocity
+from conformance.rules.motion.test_velocities import stopped, velocity, watchdog
 from conformance.scenarios.motion import attempts
+from conformance.scenarios.motion import velocities as driving_velocities
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.motion.moves import stops
-from conformance.scenarios.motion.velocities import velocities
+from conformance.scenarios.motion.velocities import let_go, velocities
 from conformance.statement.statement import motion_map_of
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.effort import Effort
@@ -253,16 +254,17 @@ class Accelerating(Body):
         return dict(self.rates)
 
 
-def _simulated(body_type, noise=0.0, rule=stopped):
+def _simulated(body_type, noise=0.0, rule=stopped, scenario=velocities, text=""):
     """Return the map that is found of a simulated rover, and the failures of a rule, first that on its stops."""
     clock = SimulatedClock()
     body = body_type(rover.LIMITS, clock.now, clock.sleep, noise)
     api = Api(Rover(body), clock, lambda: 0.002)
-    plan = plan_of(read_operations(rover.DESCRIPTION), "PUT /velocity", None, CallRules())
+    plan = plan_of(read_operations(rover.DESCRIPTION), "PUT /velocity", None, CallRules(), text=text)
     motion = map_of("\n".join(VelocityFinder(api, Binding(api), plan, clock).find().lines))
     mapped = MappedDevice(api, motion, clock, Binding(api))
     given = {"mapped": mapped, "effort": Effort("quick"), "run": Run(), "motion": motion}
-    trace = velocities.play(**{name: given[name] for name in velocities.fixtures})
+    with patch.object(driving_velocities, "PartialRequest", Unread):
+        trace = scenario.play(**{name: given[name] for name in scenario.fixtures})
     return motion, [case.observed for case in cases_of(rule, trace, given) if not case.holds]
 
 
@@ -402,6 +404,36 @@ def test_the_stop_is_the_nearest_one_and_else_the_end_of_a_move():
     stop["post"]["summary"] = "Emergency stop, latched until it is reset"
     operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": {**paths, "/stop": stop}})
     assert plan_of(operations, "POST /arm/moves", None, CallRules()).stop.method == "DELETE"
+
+
+@pytest.mark.parametrize(
+    ("text", "holds_s", "replaces"),
+    [
+        ("If no drive command arrives for 0.5 s, it stops. Brakes rest it 0.2 s later.", 0.5, False),
+        ("It stops by itself 300 ms after the last twist, so send one every 100 ms.", 0.3, False),
+        ("Rates are held for one second after the last command; a new goal replaces the old one.", 1.0, True),
+        ("Stops within 2 s. No command is lost. The new target is shown.", None, False),
+    ],
+)
+def test_words_of_a_description_say_how_long_a_velocity_holds_and_what_a_second_target_does(text, holds_s, replaces):
+    operations = read_operations(rover.DESCRIPTION)
+    plan = plan_of(operations, "PUT /velocity", None, CallRules(), text=text)
+    assert (plan.holds_s, plan.replaces) == (holds_s, replaces)
+
+
+class LateWatchdog(Body):
+    """A rover whose hold time is three times as long."""
+
+    def drive(self, speeds, hold_s, now):
+        super().drive(speeds, 3 * hold_s, now)
+
+
+@pytest.mark.parametrize(("body_type", "is_blamed"), [(Body, False), (LateWatchdog, True)])
+def test_a_hold_time_that_the_description_names_in_words_is_judged(body_type, is_blamed):
+    said = f"It stops {rover.HOLD_S:g} s after the last command."
+    motion, failures = _simulated(body_type, rule=watchdog, scenario=let_go, text=said)
+    assert bool(failures) == is_blamed
+    assert motion.velocity.hold_s <= 1.5 * rover.HOLD_S
 
 
 def test_what_commands_in_the_query_is_found():
