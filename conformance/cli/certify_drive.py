@@ -100,7 +100,7 @@ def options_for(options: CertifyOptions, *, named: bool) -> CertifyOptions:
     return replace(options, classes=classes, effort="quick" if default else options.effort)
 
 
-def _described(judged: Judged) -> tuple[Sequence[Operation], str]:
+def _read_description(judged: Judged) -> tuple[Sequence[Operation], str]:
     """Return the operations of the device's description, and what it says of all of them."""
     from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
 
@@ -138,7 +138,7 @@ def with_map(judged: Judged, options: CertifyOptions, run: Run, source: str | No
         raise StatementError("the statement has a motion map: leave --drive out, or take [motion] out")
     drive = options.drive or ""
     try:
-        operations, text = _described(judged)
+        operations, text = _read_description(judged)
         plan = plan_of(operations, drive, options.read, options.calls, options.before, text)
         for line in plan.lines():
             click.echo(inert(line), err=True)
