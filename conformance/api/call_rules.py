@@ -27,6 +27,12 @@ HARMFUL: Final = frozenset(
     }
 )  # fmt: skip
 _SEVERAL: Final = frozenset(f"{word}s" for word in HARMFUL - {"format"})
+# Things whose upload changes nothing else.
+_RECORDS: Final = frozenset(
+    f"{word}{end}"
+    for word in ("media", "photo", "picture", "image", "video", "recording", "attachment", "document", "note")
+    for end in ("", "s")
+)
 # An operationId often names what the operation does, as in `deleteMap`: such words count as the method's own.
 _OF_METHODS: Final = {method: frozenset(words) for method, words in {
     "DELETE": ("delete", "deletes"), "PUT": ("update", "updates"), "PATCH": ("update", "updates")
@@ -121,6 +127,7 @@ def harmful_words(operation: Operation) -> tuple[str, ...]:
     # A tag names a group of operations: its words are no warning for an operation that only reads.
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
+    words -= {"upload", "uploads"} if words & _RECORDS else set()
     return tuple(sorted(words & (HARMFUL | _SEVERAL)))
 
 

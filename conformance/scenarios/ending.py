@@ -57,6 +57,9 @@ _LASTING: Final = frozenset(
     }
 )
 _LONGER, _NEW = 20, 2
+# _READY_S: how long a thing is waited for that has to get ready, s. _PAUSE_S: pause between reads, s.
+_READY_S, _PAUSE_S = 1.2, 0.1
+_CONFLICT: Final = 409
 # How long after it was cancelled an activity is read again, s.
 _GOES_ON_S: Final = 2.5
 # Phrases in a description which say that 409 means a thing in use.
@@ -137,33 +140,46 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
 def _begin(
     writer: Writer, name: str, create: Operation, operations: _Operations, base: dict[str, Any] | None = None
 ) -> Exchange:
-    """Create an activity; if it has ended at once, by the member ``name``, create another one that has more to do."""
+    """Create an activity; if it is refused, or has ended at once by its member ``name``, for new things.
+
+    The second one also has more to do: numbers that tell how long it lasts are greater.
+    """
     made = writer.send(create, "", base)
-    state, base = members(made, (name,)).get(name), base or _body_of(writer, create)
-    if not made.response.ok or str(state).casefold() not in FINAL or base is None:
+    is_over = str(members(made, (name,)).get(name)).casefold() in FINAL
+    base = base or _body_of(writer, create)
+    if base is None or (made.response.ok and not is_over):
         return made
     schema, body = next(iter(create.bodies.values())).schema, dict(base)
     for member, part in flat(schema).get("properties", {}).items():
         given: Any = flat(part)
         value: Any = body.get(member, given.get("default"))
-        if is_number(value) and words_of(member) & _LASTING:
+        is_list = "array" in kinds_of(given)
+        if is_number(value) and is_over and words_of(member) & _LASTING:
             body[member] = min(given.get("maximum", value * _LONGER), value * _LONGER)
-        elif "array" in kinds_of(given) and (ids := _fresh(writer, operations, member)):
-            body[member] = ids
+        elif (is_list or member in base) and (ids := _fresh(writer, operations, member, _NEW if is_list else 1)):
+            body[member] = ids if is_list else ids[0]
     return writer.send(create, "", body) if body != base and fits(schema, body) else made
 
 
-def _fresh(writer: Writer, operations: _Operations, name: str) -> list[Any]:
-    """Return the identifiers of new things to which a member refers."""
+def _fresh(writer: Writer, operations: _Operations, name: str, count: int) -> list[Any]:
+    """Return the identifiers of new things to which a member refers; each has what can be created below it."""
     for (method, path), read in operations.items():
-        create = operations.get(("POST", collection_of(path)))
-        if (
-            method == "GET"
-            and create is not None
-            and singular(collection_of(path).rpartition("/")[2]) == thing_of(name)
-        ):
-            made = [read_json(writer.send(create).response.body).value for _ in range(_NEW)]
-            return [id_ for value in made if (id_ := id_member(value, read)[1]) is not None]
+        create, thing = operations.get(("POST", collection_of(path))), singular(collection_of(path).rpartition("/")[2])
+        if method != "GET" or create is None or thing != thing_of(name):
+            continue
+        below = [
+            one
+            for (other, at), one in operations.items()
+            if other == "POST" and at.rpartition("/")[0] == path and "201" in one.responses
+        ]
+        found = list[Any]()
+        for _ in range(count):
+            made = writer.send(create)
+            found += [id_ for id_ in [id_member(read_json(made.response.body).value, read)[1]] if id_ is not None]
+            place = location_of(writer.api, read, made) if made.response.ok else ""
+            for one in below if place else ():
+                writer.send(one, f"{place}/{one.template.rpartition('/')[2]}")
+        return found
     return []
 
 
@@ -209,8 +225,14 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
     """Call operations of a thing, and read it before and after each, until it has the expected state."""
     if not writer.send(kind.read, path).response.ok:
         return
+    waits = True
     for step in steps:
-        sent = writer.send(step, path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :])
+        at = path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :]
+        sent = writer.send(step, at)
+        if sent.response.status == _CONFLICT and waits and words_of(at.rpartition("/")[2]) & _PAUSING:
+            # What has just begun may have to get ready before it can be paused.
+            waits = False
+            sent = writer.send(step, at) if _is_ready(writer, kind, path) else sent
         told = members(sent, (kind.state,)).get(kind.state) if sent.response.ok else None
         told = told and (leads_to(step, kind.read, kind.state) or told)
 
@@ -222,6 +244,15 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
         if KEEPS.search(step.text):
             # Members that change by themselves have changed now too.
             writer.send(kind.read, path)
+
+
+def _is_ready(writer: Writer, kind: Ended, path: str) -> bool:
+    """Return whether the state of a thing changes soon, and not to a final one."""
+    until, states = time.monotonic() + _READY_S, list[Any]()
+    while len(set(states)) < len(("before", "after")) and time.monotonic() < until:
+        time.sleep(_PAUSE_S if states else 0)
+        states.append(members(writer.send(kind.read, path), (kind.state,)).get(kind.state))
+    return states[-1] != states[0] and str(states[-1]).casefold() not in FINAL
 
 
 def _again_and_again(actions: tuple[Operation, ...]) -> list[Operation]:

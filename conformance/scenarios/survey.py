@@ -54,6 +54,7 @@ _GRACE: Final = 1.25
 _CYCLES: Final = 24
 # Statuses of an operation that does not exist.
 _NOT_FOUND: Final = 404
+_SUCCESS: Final = range(200, 300)
 _NOT_THERE: Final = frozenset({_NOT_FOUND, 405, 501})
 # A charset means nothing for JSON (RFC 8259 11), so no device should refuse it (RFC 2045 5).
 _CHARSET: Final = "header Content-Type"
@@ -345,18 +346,18 @@ class Surveyor:
     def explore(self, operation: Operation, *, again: bool = False) -> Iterator[None]:
         """Send the usual request of an operation, and others group by group; yield after each group.
 
-        With ``again``, the others only if nothing was there before, and something is now.
+        With ``again``, the others only if the usual request was refused before, and is not now.
         """
         run, label = self.api.run, operation.label
-        if again and label in self.given_up:
+        was_taken = self._is_taken(operation)
+        if again and (label in self.given_up or (was_taken and not operation.safe)):
             return
-        was_absent = self.api.usual_status.get(label) == _NOT_FOUND
         try:
             self.begin(operation)
             if run.limit.has_limit:
                 self.look_elsewhere(operation)
             yield
-            is_new = was_absent and self.api.usual_status.get(label) != _NOT_FOUND
+            is_new = not was_taken and self._is_taken(operation)
             if label not in self.given_up and (is_new or not again):
                 yield from self.vary(operation, run.effort, run.seed)
         except (NoAnswerError, NotPossibleError, NotPermittedError, PartialTraceError):
@@ -364,6 +365,9 @@ class Surveyor:
         except Exception as error:  # noqa: BLE001 - one schema that cannot be read leaves the others to be judged
             run.judge.fault(label, error)
             self.given_up.add(label)
+
+    def _is_taken(self, operation: Operation) -> bool:
+        return self.api.usual_status.get(operation.label, 0) in _SUCCESS
 
     def vary(self, operation: Operation, effort: Effort, seed: int) -> Iterator[None]:
         """Send requests that differ from the usual one in one thing, and then the usual one again."""
@@ -498,8 +502,8 @@ def survey(api: RestInterface, values: Values) -> Survey:
     first = sorted((item for item in operations if item.method != "DELETE"), key=order_of)
     steps = {operation.label: surveyor.explore(operation) for operation in first}
     # Things were created and files stored meanwhile. Other operations still need what DELETE removes.
-    reads = [item for item in first if item.method == "GET" and item.parameter("path")]
-    later = {f"{item.label} again": surveyor.explore(item, again=True) for item in reads}
+    needing = [item for item in first if item.parameter("path") or not item.safe]
+    later = {f"{item.label} again": surveyor.explore(item, again=True) for item in needing}
     deletes = sorted((item for item in operations if item.method == "DELETE"), key=lambda item: -len(item.template))
     behind = later | {operation.label: surveyor.explore(operation) for operation in deletes}
     steps |= behind

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+from conformance.api.rest.listing import listing_of, page_of
 from conformance.api.rest.references import in_link, refers, singular, thing_of, values_in
 from conformance.api.rest.samples import backwards, fits, sample
 from conformance.api.rest.unique import Unique
@@ -64,7 +65,8 @@ class Values:
             return
         value = read_json(response.body).value
         self._learn(value, 0)
-        items = value if isinstance(value, list) else [value]
+        page = page_of(response, operation) if listing_of(operation) is not None else None
+        items = page.items if page is not None else value if isinstance(value, list) else [value]
         for item in items[:_REMEMBERED]:
             if isinstance(item, dict):
                 for name in IDS:
