@@ -106,7 +106,7 @@ def _read_description(judged: Judged) -> tuple[Sequence[Operation], str]:
 
     services = services_of(judged.contract)
     if services is not None:
-        return read_operations(with_messages(services, judged.statement.values)), services.documentation
+        return read_operations(with_messages(services, judged.statement.values), closed=True), services.documentation
     info = judged.contract.openapi.get("info")
     return operations_of(judged.contract), str(info.get("description", "")) if isinstance(info, dict) else ""
 

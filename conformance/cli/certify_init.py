@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,8 +19,8 @@ from conformance.statement.endpoints import Endpoints
 from conformance.statement.ros_map import RosMap
 from conformance.statement.statement import Api, Calls, Statement, StatementError
 from conformance.target.connecting import connection_of
-from conformance.target.describing import fetch_description, is_wsdl, soap_contract, trusting
-from conformance.target.naming import DeviceOptions
+from conformance.target.describing import fetch_description, is_wsdl, trusting
+from conformance.target.naming import DeviceOptions, what_is_judged
 from conformance.transport.client import HttpClient
 from ros_probe.process import ProbeError
 
@@ -73,7 +74,7 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
     api = Api(overlays=options.overlays, base_url=options.base_url or where.rest, wsdl=wsdl)
     try:
         found = (
-            _read_wsdl(source, options, where)
+            _read_wsdl(source, options)
             if wsdl
             else fetch_description(
                 source, api.overlays, connection_of(where), api.base_url, allow_files=options.allow_files
@@ -96,20 +97,12 @@ def init_described(path: Path | None, source: str, options: DeviceOptions, *, fo
     return CommandResult(ExitCode.PASSED)
 
 
-def _read_wsdl(source: str, options: DeviceOptions, where: Endpoints) -> Description:
+def _read_wsdl(source: str, options: DeviceOptions) -> Description:
     """Return what a WSDL describes in the form of other descriptions, with its messages as if they were JSON."""
     from conformance.documents.wsdl_pack import services_of, with_messages  # noqa: PLC0415 - lxml takes a while
 
     with TemporaryDirectory() as folder:
-        contract, there, remarks = soap_contract(
-            source,
-            options.base_url,
-            where,
-            connection_of(where),
-            Path(folder),
-            schemas=options.schemas,
-            allow_files=options.allow_files,
-        )
-        services = services_of(contract)
-        document = with_messages(services, {}) if services else contract.openapi
-    return Description(source, document, document, there.rest or "", unread=remarks)
+        judged = what_is_judged(source, None, replace(options, out=Path(folder)))
+        services = services_of(judged.contract)
+        document = with_messages(services, {}) if services else judged.contract.openapi
+    return Description(source, document, document, judged.statement.endpoints.rest or "", unread=judged.remarks)

@@ -448,8 +448,7 @@ class Finder(ABC):
         self._turn += 1
         sent = self._clock.now()
         exchange = self._send(operation.label, None)
-        response = exchange.response
-        numbers = numbers_of(self._binding.content(response.body), self._binding.syntax) if response.ok else {}
+        numbers = numbers_of(self._binding.content(exchange.response.body)) if exchange.response.ok else {}
         moment = (sent + self._clock.now()) / 2
         if numbers:
             self._looks.add(operation.label, moment, numbers)

@@ -234,9 +234,9 @@ def _at_rest(leg: Leg, motion: MotionMap, *, excused: bool) -> tuple[tuple[Readi
     readings = leg.after(began + rests_s)
     is_under_way = leg.was_under_way(axis, motion.tolerance(axis), order.answered if excused else began)
     if not is_under_way and len(readings) > 2 * SEVERAL and readings[-1].sent >= leg.due - motion.state.fresh_s:
-        # For as long as it would have needed without the stop, it rests short of its target.
+        # For as long as it would have needed, it rests short of its target; one that refuses a stop never set out.
         first, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
-        is_under_way = bool(off(last, goal.targets, motion, _SHORT)) and not off(last, first, motion)
+        is_under_way = order.is_ok and bool(off(last, goal.targets, motion, _SHORT)) and not off(last, first, motion)
     if not is_under_way:
         way = abs(goal.targets[axis] - leg.start[axis])
         return (), NotTested(

@@ -1,11 +1,18 @@
 """Run ``roaas certify`` with a motion map on a simulated device, over HTTP."""
 
+import gzip
 import json
 import sys
+import tomllib
 
+import msgspec
 from arm import MAP
 from processes import ended
 from serving_apps import serving_app
+
+from conformance.scenarios.stored import TRACES_NAME
+from conformance.statement.motion_calls import written_out
+from conformance.statement.motion_map import MotionMap
 
 QUICK = MAP.replace("seconds = 0.5", "seconds = 0.25").replace("speed = 4", "speed = 8")
 #: So often a right device is judged at most.
@@ -34,7 +41,36 @@ def judged_by_map(serving, motion, tmp_path, api='openapi = "{url}/openapi.json"
     if not (out / "result.json").exists():
         return done, {}
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    return done, {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
+    judged = {one["id"]: one["verdict"] for one in result["requirements"] if one["id"].startswith("motion/")}
+    if "fail" not in judged.values() and (out / TRACES_NAME).exists():
+        given = tomllib.loads(motion)
+        written = written_out(given["motion"], given.get("values", {}))
+        assert places_beyond(out / TRACES_NAME, msgspec.convert(written, MotionMap)) == []
+    return done, judged
+
+
+def places_beyond(traces, motion):
+    """Return what the readings of a run have beyond the limits of the map, by axis."""
+    whole = json.loads(gzip.decompress(traces.read_bytes()))
+    seen = [(name, value) for reading in _readings(whole) for name, value in reading["values"].items()]
+    assert seen, "a run whose telemetry shows nothing"
+    limits = {name: (axis.limits, motion.tolerance(name)) for name, axis in motion.state.axes.items() if not axis.angle}
+    return [
+        (name, value)
+        for name, value in seen
+        for (least, most), room in [limits.get(name, ((value, value), 0.0))]
+        if not least - room <= value <= most + room
+    ]
+
+
+def _readings(value):
+    """Yield the readings within traces, which are what has positions and a stamp."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    if isinstance(value, dict) and {"values", "stamp"} <= value.keys():
+        yield value
+    else:
+        for part in parts:
+            yield from _readings(part)
 
 
 def passed_but(missing, judge):

@@ -58,8 +58,8 @@ _POSITION = {"ProfileToken": "main", "Position": {"PanTilt": {"@x": "{PanTilt_x}
 def test_the_axes_of_a_camera_are_found_by_driving_it(drive, finder, body):
     clock = SimulatedClock()
     api, messages = Api(Dome(Body(dome.LIMITS, clock.now, clock.sleep)), clock, lambda: 0.002), dome.messages_of()
-    operations = read_operations(with_messages(messages.found, messages.values))
-    plan = plan_of(operations, f"POST /PTZPort/{drive}", None, CallRules(motion=True))
+    operations = read_operations(with_messages(messages.found, messages.values), closed=True)
+    plan = plan_of(operations, f"POST /PTZPort/{drive}", None, CallRules())
     motion = map_of("\n".join(finder(api, SoapBinding(api, messages), plan, clock).find().lines))
     assert motion.state.read == "POST /PTZPort/GetStatus"
     assert {axis.at for axis in motion.state.axes.values()} == {f"/PTZStatus/Position/PanTilt/@{one}" for one in "xy"}
@@ -82,3 +82,14 @@ def test_init_proposes_the_map_of_a_camera(tmp_path):
     assert [motion.state.read, motion.goto.send, motion.velocity.send, motion.stop.send] == [
         f"POST /PTZPort/{name}" for name in ("GetStatus", "AbsoluteMove", "ContinuousMove", "Stop")
     ]
+
+
+def test_a_camera_that_refuses_to_be_read_is_driven_no_farther(tmp_path):
+    with serving(Dome(Body(dome.LIMITS))) as url:
+        drive = ["--wsdl", f"{url}/onvif.wsdl", "--drive", "POST /PTZPort/ContinuousMove", "--allow-motion", "--yes"]
+        done = ended(sys.executable, "-m", "roaas", "certify", *drive, "--out", str(tmp_path / "out"))
+    assert "PanTilt_x        no limits declared; tried at 0.1" in done.stderr
+    assert "Read meanwhile: POST /PTZPort/GetStatus." in done.stderr
+    # Without a token, it answers each message with a fault.
+    assert done.returncode == 4, done.stderr
+    assert "POST /PTZPort/GetStatus got status 400" in done.stderr
