@@ -64,8 +64,8 @@ def _probe(
     return Probe(operation, kind, exchange=Exchange(request, Response(status, fields, content, 1.0)), **more)
 
 
-def _conditional(probe):
-    request = replace(probe.exchange.request, headers=(("If-None-Match", '"a"'),))
+def _conditional(probe, name="If-None-Match", value='"a"'):
+    request = replace(probe.exchange.request, headers=((name, value),))
     return replace(probe, exchange=replace(probe.exchange, request=request))
 
 
@@ -96,6 +96,7 @@ _RIGHT = [
     _probe(body={"n": 1, "at": "2026-01-31T12:00:00Z", "more": 1}),
     _probe(body={"n": 1, "at": None}),
     _conditional(_probe(304, b"")),
+    _conditional(_probe(206), "Range", "bytes=0-"),
     _probe(401, b"", x_n=""),
     _probe(429, b"", x_n=""),
     _page(400, kind=Kind.ODD),
@@ -133,6 +134,8 @@ def test_a_right_device_is_not_blamed(rule, run):
     ("rule", "probes"),
     [
         (answers.status_declared, [_probe(409)]),
+        (answers.status_declared, [_probe(206)]),
+        (answers.status_declared, [_probe(304, b"")]),
         (answers.status_declared, [_probe(403)]),
         (answers.status_declared, [_probe(403, kind=Kind.GENERATED)]),
         (answers.errors_declared, [_multipart(b"--b\r\nContent-Disposition: form-data; name=a\r\n\r\nx\r\n--b--")]),

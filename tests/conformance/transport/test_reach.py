@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conformance.transport.reach import ElsewhereError, Folder, Origin, Trust, at_server, is_same
+from conformance.documents.wsdl import is_http
+from conformance.transport.reach import ElsewhereError, Folder, Origin, Trust, at_server, is_same, split
 
 NAMED = "http://robot.example:8000/v1/openapi.json"
 
@@ -154,3 +155,12 @@ def test_what_a_description_may_read(folder):
         Folder("http://robot/openapi.json", anywhere=True).read(f"{folder}/part.json")
     with pytest.raises(ValueError, match="no file"):
         Folder(source, anywhere=True).read("/dev/zero")
+
+
+@pytest.mark.parametrize("url", ["ftp://a/b", "http:///x", "http://a:0/", "http://[/", "http://a:99999/", "a", ""])
+def test_what_is_no_http_url(url):
+    assert not is_http(url)
+
+
+def test_credentials_are_no_part_of_the_authority():
+    assert split("http://me:secret@robot:1/a?b") == ("http://robot:1", "/a?b")

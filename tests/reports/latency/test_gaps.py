@@ -5,7 +5,7 @@ import re
 import pytest
 from lxml import html
 
-from reports.latency.findings import verdict
+from reports.latency.findings import verdict as verdict_of
 from reports.latency.page import latency_html, latency_markdown
 from reports.reading import LATENCY_FORMAT, validator
 
@@ -94,7 +94,7 @@ def test_run_without_an_answer(latency):
     assert not list(document.iter("figure"))
     assert "The run was interrupted" in document.text_content()
     assert "0 samples" in document.text_content()
-    assert verdict(latency, {}).tone == "warning"
+    assert verdict_of(latency, {}).tone == "warning"
 
 
 def test_figures_come_before_tables_and_tables_fold(latency):
@@ -109,3 +109,21 @@ def test_figures_come_before_tables_and_tables_fold(latency):
         if not table.xpath("ancestor::details[not(@open)]")
     ]
     assert unfolded == ["slo", "errors"], "what decides and what failed is seen at once"
+
+
+@pytest.mark.parametrize(("verdict", "sign"), [("slower", "✗"), ("not slower", "✓"), ("unclear", "?")])
+def test_the_headline_of_two_robots_leads_with_the_sign_of_its_verdict(latency, verdict, sign):
+    against_another(latency)
+    latency["against"]["verdict"] = verdict
+    latency |= {"valid": True, "invalid_because": [], "slo": [], "knee_search": []}
+    latency |= {"time_series": {"width_s": 1.0, "series": []}}  # few figures: drawing takes seconds
+    latency["headline"] = {"words": f"So it is {verdict}", "sentence": "This robot takes 1.21 times as long."}
+    validator(LATENCY_FORMAT).validate(latency)
+    text = latency_markdown(latency)
+    assert f"{sign} So it is {verdict}" in text
+    assert "This robot takes 1.21 times as long." in text
+    if verdict == "slower":  # drawing takes its time: one page for all three
+        page = latency_html(latency)
+        assert f"{sign} So it is {verdict}" in page
+        assert "http://old:7003" in page
+        assert 'id="against-0"' in page, "the ratios are drawn"

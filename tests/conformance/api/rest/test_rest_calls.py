@@ -9,6 +9,7 @@ from conformance.api.rest import calls
 from conformance.api.rest.calls import Call
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.questions import Question, mismatch_of, questions
+from conformance.api.rest.statuses import usual_status
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import operations_of
 from conformance.transport.client import Connection, HttpClient
@@ -128,3 +129,13 @@ def test_what_is_answered_by_a_crash_is_no_question(status, asked):
         found = {one.path for one in questions(api, [goal])}
         api.client.close()
     assert (goal.path in found) is asked
+
+
+@pytest.mark.parametrize(
+    ("statuses", "usual"), [((200,), 200), ((404,), 404), ((500, 200), 200), ((503, 500, 404), 404), ((503,) * 3, 503)]
+)
+def test_a_server_error_now_and_then_is_not_the_usual_status(statuses, usual):
+    left = list(statuses)
+    request = Request("GET", "http://h/a", (), b"")
+    assert usual_status(lambda: Exchange(request, Response(left.pop(0), (), b"", 1.0))) == usual
+    assert left == []
