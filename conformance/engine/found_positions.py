@@ -331,10 +331,7 @@ class PositionFinder(Finder):
             )
             declared = self._limits(numbers[name])
             given |= ({"angle": angle} if angle else {}) | ({} if declared else {"bound": False})
-            speeds = [Commanded("", *one, turns=False) for one in numbers_in(body_schema(self._plan.drive) or {})]
-            for one in speeds:
-                if FAST.search(one.place) and one.bounds and one.has_unit and unit_of("", one.schema) == given["unit"]:
-                    given |= {"speed": one.bounds[1]} if given["unit"] else {}
+            given |= {"speed": speed} if (speed := self._fastest(numbers[name])) else {}
             source = "as declared" if declared else "none are declared; so far it was seen to go"
             if declared and limits[name] != declared:
                 given["accepts"], source = list(declared), "nearby, as the declared ones are far away"
@@ -361,6 +358,15 @@ class PositionFinder(Finder):
         yield from self._refusal_lines(declared=all(map(self._limits, numbers.values())))
         yield from self._stop_lines()
 
+    def _fastest(self, number: Commanded) -> float:
+        """Return the greatest speed of a move that is declared in the unit of its axis; 0: none is."""
+        unit = self._unit(number)
+        speeds = (Commanded("", *one, turns=False) for one in numbers_in(body_schema(self._plan.drive) or {}))
+        known = (one for one in speeds if FAST.search(one.place) and one.bounds and one.has_unit)
+        return max(
+            (one.bounds[1] for one in known if one.bounds and unit_of("", one.schema) == unit != ""), default=0.0
+        )
+
     def _tried_limits(self, number: Commanded, here: float, found: Moved) -> tuple[float, float]:
         """Return the limits that are declared, or those so far seen, if there are none or they are far away."""
         declared = self._limits(number)
@@ -368,7 +374,9 @@ class PositionFinder(Finder):
         if declared and (self._lasts or found.took_s * (declared[1] - declared[0]) <= _FULL_WAY_S * found.way):
             return declared
         if declared:
-            return max(declared[0], round(here - found.way, 4)), min(declared[1], round(here + found.way, 4))
+            # A device that is too fast shows that on a way of a second.
+            way = max(found.way, self._fastest(number) / 2)
+            return max(declared[0], round(here - way, 4)), min(declared[1], round(here + way, 4))
         # Together, axes without limits may not go as far as they were seen to go.
         share = 1.0 if len(self._numbers) == 1 else _TOGETHER
         return round(here + share * min(0.0, *found.ways), 4), round(here + share * max(0.0, *found.ways), 4)

@@ -335,6 +335,13 @@ def test_a_declared_greatest_speed_of_a_move_is_that_of_its_axis(said, most, spe
     assert _slide(200.0, {"x": {**_NUMBER, "description": "mm"}, "speed": number})[0].state.axes["x"].speed == speed
 
 
+def test_an_axis_is_sent_so_far_that_a_greatest_speed_can_be_exceeded():
+    speed = {**_NUMBER, "minimum": 1, "maximum": 90, "description": "mm/s"}
+    place = {**_NUMBER, "minimum": -200, "maximum": 200, "description": "mm"}
+    axis = _slide(20.0, {"x": place, "speed": speed})[0].state.axes["x"]
+    assert (axis.speed, axis.limits) == (90, (-45, 45)), "at its greatest speed, the way takes a second"
+
+
 def test_what_is_there_at_once_cannot_be_stopped_and_the_user_is_told_what_to_change():
     motion, outcomes = _slide(1000.0)
     assert max(motion.state.axes["x"].limits) == 0.5, "ten times a small move, and no farther"
