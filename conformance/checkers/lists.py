@@ -254,7 +254,7 @@ class Lists:
         name, label = bound.parameter.name, listing.operation.label
         text, shown = sent[name], self._shown[label, name]
         limit = {listing.limit.name} if listing.limit is not None else set()
-        if sent.keys() - limit != {name} or _is_cut(listing, page, sent):
+        if sent.keys() - limit != {name} or is_cut(listing, page, sent):
             return
         shown[text] = {text_of(members_of(item).get(bound.member)) for item in page.items}
         for other, values in shown.items():
@@ -290,7 +290,7 @@ class Lists:
         """Judge that a filter or search keeps each item with what it asks for, in the whole list before and after."""
         items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         path, count = occasion.context.target.partition("?")[0], len(items)
-        if _is_cut(listing, page, sent):
+        if is_cut(listing, page, sent):
             return
         sent = {one: text for one, text in sent.items() if listing.limit is None or one != listing.limit.name}
         if not sent:
@@ -367,7 +367,7 @@ class Lists:
         )
 
 
-def _is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
+def is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
     """Return whether a list may have more items than the response shows."""
     count = len(page.items)
     is_said = page.goes_on or max(page.totals.values(), default=0) > count or 0 < listing.most(sent) <= count

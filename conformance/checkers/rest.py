@@ -12,6 +12,7 @@ from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import Conditional, EntityTags
+from conformance.checkers.entries import Entries
 from conformance.checkers.identities import Identities, Uniques
 from conformance.checkers.lists import Lists
 from conformance.checkers.memory import Memory
@@ -51,7 +52,7 @@ class Histories:
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract),
+            self._untouched, Sublists(contract), Entries(contract),
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:

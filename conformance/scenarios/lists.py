@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Final
 
-from conformance.api.rest.applicable import allows
+from conformance.api.rest.applicable import allows, callable_operations
 from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.invalid_variations import invalid_variations
@@ -28,6 +28,7 @@ from conformance.api.rest.listing import (
 )
 from conformance.api.rest.references import in_link
 from conformance.api.rest.values import Values
+from conformance.api.rest.variations import NO_FORMAT
 from conformance.checkers.lists import is_mixed
 from conformance.checkers.totals import SETTLES_S, says_filtered
 from conformance.documents.json_schema import kinds_of
@@ -38,6 +39,7 @@ from conformance.documents.writing import text_of
 from conformance.scenarios.list_queries import choices_of, queries_of, whole_query
 from conformance.scenarios.scenario import NotPossibleError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
+from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange, NoAnswerError
 from conformance.transport.reach import is_same, joined, split
 from conformance.verdict.evidence import SENTENCE
@@ -180,9 +182,21 @@ def vary_lists(api: RestInterface, values: Values) -> None:
                 for query in queries_of(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
                     if time.monotonic() < until and _is_doubted(listing, reader.part(query), query):
                         doubted.append(query)
+                _refuse_creations(api, values, listing)
                 if whole:
                     reader.read(whole)
                 _reread_totals(reader, doubted)
+
+
+def _refuse_creations(api: RestInterface, values: Values, listing: Listing) -> None:
+    """Send creations of items that their headers let the device refuse; the list afterwards has none of them."""
+    create = callable_operations(api).get(("POST", listing.operation.template))
+    if create is not None and "{" not in create.template:
+        writer = Writer(api, values)
+        if "406" in create.responses:
+            writer.send(create, headers=(("Accept", NO_FORMAT),))
+        if "415" in create.responses and create.bodies:
+            writer.send(create, media_type="text/plain")
 
 
 @dataclass(frozen=True)
