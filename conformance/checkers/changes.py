@@ -40,6 +40,10 @@ _LEADS: Final = re.compile(
 _REFUSED: Final = re.compile(
     r"\b(?:409|refuse[sd]?|conflict)\b([^.;:]*?\b(?:if|when|while|unless)\b[^.;:]*)", re.IGNORECASE
 )
+# The same with the condition first, as in "While the belt is archived, it is refused with 409".
+_WHILE: Final = re.compile(
+    r"\b((?:if|when|while|as long as)\b[^.;:]*),[^.,;:]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE
+)
 # What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
 _CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
 _ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
@@ -68,7 +72,7 @@ _GROWS: Final = re.compile(
 # Phrases in a description which say that a state is final, and phrases that limit this.
 _IS_FINAL: Final = re.compile(
     r"((?:[^.;:]*[;:,] (?=(?:both|all(?: of them)?|they|these|that|it) (?:is|are) ))?[^.;:]*?)"
-    r"\b(?:is|are) (?:final|terminal)\b",
+    r"\b(?:(?:is|are) (?:final|terminal)|for ?ever|never changes? (?:again|any more))\b",
     re.IGNORECASE,
 )
 _UNLESS: Final = re.compile(r"\b(?:not|no|if|unless|until|when|while|before|after|except|others?)\b", re.IGNORECASE)
@@ -134,8 +138,7 @@ class Changes:
             for operation in operations
             for template in self._states
             if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
-            if (found := self._alone.get(operation.label, frozenset()))
-            if not _SHARING.search(_condition_text(operation).partition(",")[0])
+            if (found := _alone_states(operation, _states_of(reads[template], self._states[template])))
         }
         # By operation: the state to which it leads by its description.
         self._leads = {
@@ -144,7 +147,7 @@ class Changes:
             if (template := operation.template.rpartition("/")[0]) in self._states
             if (state := leads_to(operation, reads[template], self._states[template]))
         }
-        self._claims: dict[str, list[tuple[Occasion, str]]] = defaultdict(list)
+        self._claims: dict[str, list[tuple[Occasion, frozenset[str]]]] = defaultdict(list)
         # By path template: members that never decrease. Below, by path: their last values.
         self._growing = {
             operation.template.rstrip("/"): names for operation in reads.values() if (names := _growing(operation))
@@ -153,6 +156,8 @@ class Changes:
         # By path: the thing as it was last read, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
+        # By path: the state that a thing had at the end, where the description calls that final.
+        self._ended: dict[str, str] = {}
 
     def forget(self) -> None:
         """Forget all states that a request of unknown effect may have changed."""
@@ -192,6 +197,7 @@ class Changes:
             yield from self._judge_change(occasion, operation, above, self._states[item])
         elif operation is not None and occasion.response.ok and template in self._states:
             self._known.pop(path, None)
+            self._ended.pop(path, None)
         elif operation is None or f"{template}/" not in {f"{collection_of(state)}/" for state in self._states}:
             self._known.clear()
 
@@ -210,7 +216,7 @@ class Changes:
             expected = f"a refusal, as the thing was {was}, or the same state"
             yield self._case(occasion, now == was, expected, f"{now} as {name}", operation.label)
         if now in self._alone.get(operation.label, ()):
-            self._claim(occasion, path, now)
+            self._claim(occasion, path, frozenset({now}))
         if now:
             # A device may act later than it responds.
             now = self._leads.get(operation.label, now) if now == was else now
@@ -220,11 +226,11 @@ class Changes:
         elif is_kept and before is not None:
             self._known[path] = _State(was, before.at_s, by=operation.label)
 
-    def _claim(self, occasion: Occasion, path: str, now: str) -> None:
-        """Note for each other thing of the collection that has a state that another one has it too."""
+    def _claim(self, occasion: Occasion, path: str, states: frozenset[str]) -> None:
+        """Note for each other thing of the collection that has one of some states that another one has one too."""
         for other, state in self._known.items():
-            if state.value == now and other != path and other.rpartition("/")[0] == path.rpartition("/")[0]:
-                self._claims[other].append((occasion, now))
+            if state.value in states and other != path and other.rpartition("/")[0] == path.rpartition("/")[0]:
+                self._claims[other].append((occasion, states))
 
     def _read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         """Judge a read of a resource."""
@@ -250,8 +256,9 @@ class Changes:
         template = operation.template.rstrip("/")
         name, sent_s = self._states[template], occasion.sent_s
         yield from self._judge_claims(occasion, path, now)
-        if now in self._single.get(template, ()):
-            self._claim(occasion, path, now)
+        if now in (single := self._single.get(template, frozenset())):
+            self._claim(occasion, path, single)
+        yield from self._judge_final(occasion, operation, path, now)
         before, ends = self._known.get(path), _ends_in(occasion) if now in FINAL else {}
         if before is None or sent_s < before.at_s:
             if before is None and len(self._known) < _MOST_THINGS:
@@ -287,13 +294,24 @@ class Changes:
         yield self._case(occasion, not wrong, expected, f"{now} as {name}", operation.label, doubt=doubt)
         self._known[path] = _State(now, occasion.response.received_s, ends=ends)
 
+    def _judge_final(self, occasion: Occasion, operation: Operation, path: str, now: str) -> Iterator[Case]:
+        """Judge whether a thing that was at its end before is there still, whatever was sent since then."""
+        template = operation.template.rstrip("/")
+        final, name = self._ended.get(path, ""), self._states[template]
+        if final and path not in self._known:
+            holds, expected = now == final or now.casefold() in _AWAY, f"{final} as {name}, which is final"
+            yield self._case(occasion, holds, expected, f"{now} as {name}", operation.label, doubt="")
+        if now in self._said_final.get(template, ()) and len(self._ended) < _MOST_THINGS:
+            self._ended[path] = now
+
     def _judge_claims(self, occasion: Occasion, path: str, now: str) -> Iterator[Case]:
         """Judge whether another thing had a state while this one had it too, which one alone may have."""
-        for claim, state in self._claims.pop(path, ()):
-            if now == state and occasion.sent_s >= claim.response.received_s:
+        for claim, states in self._claims.pop(path, ()):
+            if now in states and occasion.sent_s >= claim.response.received_s:
                 label = claim.operation.label if claim.operation is not None else ""
+                state = " or ".join(sorted(states))
                 other = f"a state other than {state}" if claim.request.method == "GET" else "a refusal with 409"
-                expected = f"{other}, as {path} was {state} before and after it, and one alone may be so"
+                expected = f"{other}, as {path} was {now} before and after it, and one alone may be so"
                 yield claim.case("description/states", False, expected, cause=f"{label} another")  # noqa: FBT003
 
     def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
@@ -353,6 +371,14 @@ def _condition_text(operation: Operation) -> str:
 def _alone(operation: Operation) -> frozenset[str]:
     """Return the words in backticks for the state of another thing in which an operation is refused."""
     return frozenset(re.findall(r"`([\w -]+)`", _condition_text(operation)))
+
+
+def _alone_states(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
+    """Return the states that one thing alone may have, by what the description says of a creation."""
+    said = _condition_text(operation)
+    if "409" not in operation.responses or _SHARING.search(said.partition(",")[0]):
+        return frozenset()
+    return frozenset(state for state in states if _word(state).search(said))
 
 
 def _states_of(read: Operation, name: str) -> tuple[str, ...]:
@@ -494,7 +520,7 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     known |= {name: {state: state for state in _states_of(read, name)}} if name else {}
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
     is_own = operation.template.count("{") == read.template.count("{")
-    for said in _REFUSED.finditer(operation.text):
+    for said in (*_REFUSED.finditer(operation.text), *_WHILE.finditer(operation.text)):
         for unless, subject, no, rest in _IS.findall(said[1]):
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
                 if named := _values_in(rest, values):

@@ -19,6 +19,7 @@ from conformance.documents.files import MEDIA, keeps_octets
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, is_json
 from conformance.documents.parameters import plain_name
+from conformance.transport.reach import joined
 from conformance.verdict.evidence import Case
 
 _PART: Final = re.compile(r"bytes (\d+)-(\d+)/(\d+|\*)", re.IGNORECASE)
@@ -87,12 +88,14 @@ class Contents:
         self._parts.clear()
         is_file = keeps_octets(request.media_type) or request.media_type == _TEXT
         is_file = is_file and 0 < len(request.body) <= _LARGEST
+        is_new = request.method == "POST" and answer.status == HTTPStatus.CREATED
+        at = request.url if request.method == "PUT" else joined(request.url, answer.header("location") or "")
         # A file that is uploaded elsewhere does not change those before.
-        if not (is_file and request.method == "PUT") or len(self._sent) >= _MOST:
+        if not (is_file and (request.method == "PUT" or is_new)) or len(self._sent) >= _MOST:
             self._sent.clear()
         if is_file and answer.ok and answer.status != HTTPStatus.ACCEPTED:
-            if request.method == "PUT":
-                self._sent[request.url] = occasion
+            if at != request.url or request.method == "PUT":
+                self._sent[at] = occasion
             yield from _member(occasion)
 
     def _read(self, occasion: Occasion) -> Iterator[Case]:
@@ -127,7 +130,8 @@ class Contents:
             octets, label = sent.request.body, label_of(occasion.operation)
             is_kept = octets == body or _may_be(body, occasion, sent)
             is_old = not is_kept and hash(body) in known
-            differs = self._differs.setdefault(occasion.request.url.partition("?")[0], set())
+            is_new = sent.request.method == "POST"
+            differs = self._differs.setdefault(label if is_new else occasion.request.url.partition("?")[0], set())
             differs |= set() if is_kept else {octets}
             if is_old and occasion.sent_s - sent.response.received_s < _SETTLES_S:
                 self._sent[occasion.request.url] = sent

@@ -46,6 +46,11 @@ _MADE: Final = frozenset({HTTPStatus.CREATED, HTTPStatus.ACCEPTED})
 _FIRST: Final = re.compile(
     r"\b(?:first|original|same|earlier|previous|stored) (?:answer|response|result|reply)\b", re.IGNORECASE
 )
+_OTHER_BODY: Final = re.compile(
+    r"\bkey\b[^.]*\b(?:other|another|different)\b[^.]*\b(?:refuse[sd]?|reject(?:ed|s)?|409|422)\b", re.IGNORECASE
+)
+#: What is special about a key that comes with another body, where the description says that it is refused.
+REFUSED_BODY: Final = "other body, refused by the description"
 _KEY: Final = re.compile(r"idempoten", re.IGNORECASE)
 UNSPENT: Final = re.compile(
     r"\b(?:refus|reject|fail)\w*\b[^.]*\b(?:not|never)\b[^.]*\b(?:us|consum|spen|keep|kept|stor|remember|burn)\w*",
@@ -136,7 +141,9 @@ class _Rounds:
                 made.append(other)
                 expected = "a refusal with 422 of a key that came before with another body"
                 fault = other.came if other.response.ok else ""
-                yield Keyed(self.operation.label, "other body", other, expected, fault)
+                said = f"{self.operation.text} {self.key.says} {self._promise()}"
+                way = REFUSED_BODY if _OTHER_BODY.search(said) else "other body"
+                yield Keyed(self.operation.label, way, other, expected, fault)
             if others and self._item is not None and first.response.status in _MADE:
                 new = self._send(self._request(keys[1], others[-1]))
                 made.append(new)

@@ -33,6 +33,7 @@ from conformance.scenarios.list_queries import choosing
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
 from conformance.scenarios.neighbours import NO_TAG, read_parts
+from conformance.scenarios.posted_files import FILES, post_files
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
 from conformance.scenarios.special_bodies import is_list_of_changes, special_bodies
@@ -52,12 +53,6 @@ _SETTLES_S, _PAUSE_S = 3.2, 0.4
 _NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
 _GONE_PLACE: Final = "path of what was deleted"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
-# Files with bytes that programs take for the end of a line, text or file, each shorter than the one before.
-_FILES: Final = (
-    bytes(range(255, -1, -1)) * 18,
-    bytes(range(256)) * 17 + b"\r\n\n \0end",
-    b"roaas\r\n\0\r\xff\xfe\n\n\x1a tail \r\n" * 9,
-)
 # How a client sends content of unknown length (RFC 9112 7.1).
 _IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
 # Texts of equal length in bytes, with several kinds of line ends.
@@ -101,6 +96,8 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
                 thing.delete(delete, operations.get(("GET", collection_of(path))))
+    with api.run.limit.lift(), suppress(NoAnswerError):
+        post_files(surveyor, operations)
     return surveyor.trace
 
 
@@ -315,12 +312,12 @@ class _Thing:
                 continue
             path = self.target.rstrip("/") + below
             whole = replace(request_of(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
-            files = [(media_type, file_of(media_type, octets)) for octets in _FILES if media_type]
+            files = [(media_type, file_of(media_type, octets)) for octets in FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
             # Another media type comes first: a refused one ends the uploads.
             for other in others[:1]:
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], media_type=other)
-                for octets in _FILES[:2]:
+                for octets in FILES[:2]:
                     sent = replace(inputs, body=file_of(other, octets))
                     request = replace(request_of(put, sent), target=path)
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", sent), request)
@@ -332,14 +329,14 @@ class _Thing:
                 kind = Kind.AGAIN if kept_as == _OCTETS else Kind.ODD
                 if not self.surveyor.send(put, Variation(kind, "", "", inputs), request).ok:
                     break
-                self.in_parts(read, path, more="206" in read.responses and number == len(_FILES))
+                self.in_parts(read, path, more="206" in read.responses and number == len(FILES))
             else:
                 for _, octets in files[-2:]:
                     coded = replace(request, body=octets, headers=(*request.headers, _IN_CHUNKS))
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
                 earlier = [octets for _, octets in files[:-1]]
-                earlier += [file_of(other, octets) for other in others[:1] for octets in _FILES[:2]]
+                earlier += [file_of(other, octets) for other in others[:1] for octets in FILES[:2]]
                 self._look_again(read, whole, earlier)
                 for again in (replace(whole, method="HEAD"), whole):
                     self.surveyor.send(read, Variation(Kind.ODD, "", "", Inputs()), again, fresh=False)

@@ -14,7 +14,7 @@ from conformance.api.rest.things import is_marked_deleted
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.scenarios.ending import Deletion, Ended, begin_and_end, look_at_ended, used_things
-from conformance.scenarios.keys import Keyed, repeated_keys
+from conformance.scenarios.keys import REFUSED_BODY, Keyed, repeated_keys
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.living import Kind, Life
 from conformance.scenarios.rule import Outcome, rule
@@ -26,7 +26,7 @@ from conformance.verdict.evidence import SENTENCE, Case
 
 _DONE = frozenset({HTTPStatus.OK, HTTPStatus.NO_CONTENT})
 # Ways to repeat a key that need no sentence of the description.
-_OF_KEYS = frozenset({"same request", "new key"})
+_OF_KEYS = frozenset({"same request", "new key", REFUSED_BODY})
 
 
 def _looks(trace: tuple[Life, ...], kind: Kind) -> Iterator[Case]:
