@@ -8,9 +8,9 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.listing import Listing, Page, listing_of, members_of, page_of
-from conformance.api.rest.references import collections_of
+from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, differences, doubt_of_life
+from conformance.api.rest.things import collection_of, differences, doubt_of_life, parts_of
 from conformance.api.rest.values import IDS
 from conformance.checkers.lists import is_cut
 from conformance.checkers.occasion import Occasion
@@ -116,10 +116,13 @@ class Entries:
         self, occasion: Occasion, create: Operation, items: dict[str, dict[str, Any]], path: str
     ) -> Iterator[Case]:
         """Judge whether what is new in a list, and no creation has given, was asked for by a refused one."""
+        parts = parts_of(next(iter(create.bodies.values())).schema) if create.bodies else {}
+        free = {name for name, part in parts.items() if is_free_text(part)}
         before, refused = self._listed.get(path), self._refused.pop(path, [])
         new = [item for id_, item in items.items() if before is not None and id_ not in before | self._given[path]]
         for entry in refused if before is not None else ():
-            texts = {plain_name(name): one for name, one in entry.sent.items() if _is_telling(one)}
+            texts = {plain_name(name): entry.sent[name] for name in free & entry.sent.keys()}
+            texts = {name: one for name, one in texts.items() if isinstance(one, str) and len(one) >= _TELLING}
             there = [item for item in new if texts and all(item.get(name) == one for name, one in texts.items())]
             if texts:
                 expected, cause = f"a list without what {entry.label} asked for", f"{create.label} refused"
@@ -131,10 +134,6 @@ def _id_of(value: Any) -> str:
     """Return the identifier of an entry; empty if it has none."""
     item = members_of(value)
     return next((str(item[name]) for name in IDS if isinstance(item.get(name), str | int)), "")
-
-
-def _is_telling(value: Any) -> bool:
-    return isinstance(value, str) and len(value) >= _TELLING
 
 
 def _is_whole(occasion: Occasion, listing: Listing, page: Page) -> bool:

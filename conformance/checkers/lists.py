@@ -370,8 +370,9 @@ class Lists:
 def is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
     """Return whether a list may have more items than the response shows."""
     count = len(page.items)
-    is_said = page.goes_on or max(page.totals.values(), default=0) > count or 0 < listing.most(sent) <= count
-    return is_said or (count >= _LEAST and count % _ROUND == 0)
+    total = max(page.totals.values(), default=0)
+    is_said = page.goes_on or total > count or 0 < listing.most(sent) <= count
+    return is_said or (total != count and count >= _LEAST and count % _ROUND == 0)
 
 
 def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:

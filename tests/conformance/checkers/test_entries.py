@@ -1,0 +1,85 @@
+"""Lists whose entries have no address of their own: they show what was created, and nothing that was refused."""
+
+import json
+
+import pytest
+from small_device import REFUSED, answers, contract_of, described
+
+from conformance.checkers.rest import RestCheckers
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://device:8000"
+_NEW = {"type": "object", "properties": {"text": {"type": "string"}, "at": {"type": "string", "format": "date-time"}}}
+_NOTE = {"type": "object", "properties": {"id": {"type": "string"}, **_NEW["properties"]}}
+_LIST = {"type": "object", "properties": {"items": {"type": "array", "items": _NOTE}, "total": {"type": "integer"}}}
+_LIMIT = {"name": "limit", "in": "query", "schema": {"type": "integer", "default": 2}}
+_PATHS = {
+    "/notes": {
+        "get": {"parameters": [_LIMIT], "responses": {"200": answers(_LIST)}},
+        "post": {
+            "requestBody": {"required": True, "content": {"application/json": {"schema": _NEW}}},
+            "responses": {"201": answers(_NOTE), "406": REFUSED},
+        },
+    }
+}
+_THERE, _READ, _KEPT = (f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps"))
+
+
+@pytest.fixture(name="contract", scope="module")
+def _contract(tmp_path_factory):
+    return contract_of(tmp_path_factory.mktemp("pack"), described(_PATHS, "3.1.0"))
+
+
+def _made(id_, text, status=201):
+    return "POST", "/notes", {"text": text}, status, {"id": id_, "text": text} if status == 201 else None
+
+
+def _listed(*ids, total=None, target="/notes?limit=100", **texts):
+    items = [{"id": id_, "text": texts.get(id_, f"text of {id_}")} for id_ in ids]
+    return "GET", target, None, 200, {"items": items, "total": len(items) if total is None else total}
+
+
+def _broken(contract, steps):
+    checkers, broken = RestCheckers(contract, _BASE), {}
+    for number, (method, target, sent, status, came) in enumerate(steps):
+        kind = (("Content-Type", "application/json"),)
+        body = json.dumps(sent).encode() if sent is not None else b""
+        request = Request(method, _BASE + target, (("Host", "device:8000"), *(kind if body else ())), body)
+        answer = json.dumps(came).encode() if came is not None else b""
+        response = Response(status, kind if answer else (), answer, 1.0, received_s=float(number))
+        for case in checkers(Exchange(request, response)):
+            if not case.holds and case.requirement in {_THERE, _READ, _KEPT}:
+                broken[case.requirement] = bool(case.doubt)
+    return broken
+
+
+_NEWER = [_made("n1", "text of n1"), _made("n2", "text of n2")]
+_WRONG = {
+    "the newer one of two is lost": ([*_NEWER, _listed("n1")], {_THERE: False}),
+    "the only one is lost, as a list that keeps few may": ([_made("n1", "text of n1"), _listed()], {_THERE: True}),
+    "another text": ([_made("n1", "text of n1"), _listed("n1", n1="other text")], {_READ: True}),
+    "what was refused": (
+        [_listed("n0"), _made("n1", "refused", 406), _listed("n0", "n1", n1="refused")],
+        {_KEPT: False},
+    ),
+}
+_RIGHT = {
+    "all are there": [*_NEWER, _listed("n2", "n1")],
+    "a part of the list": [*_NEWER, _listed("n1", "n0", total=3, target="/notes")],
+    "a later creation with the text of a refused one": [
+        _listed("n0"), _made("n1", "refused", 406), _made("n1", "refused"), _listed("n0", "n1", n1="refused"),
+    ],
+    "another client's entry": [_listed("n0"), _made("n1", "refused", 406), _listed("n0", "n9", n9="another text")],
+    "a list of which nothing is known before": [_made("n1", "refused", 406), _listed("n1", n1="refused")],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _WRONG)
+def test_a_wrong_list_is_blamed(contract, name):
+    steps, broken = _WRONG[name]
+    assert _broken(contract, steps) == broken
+
+
+@pytest.mark.parametrize("name", _RIGHT)
+def test_a_right_list_is_not(contract, name):
+    assert _broken(contract, _RIGHT[name]) == {}
