@@ -75,6 +75,8 @@ class Lists:
         self._raised: dict[object, dict[int, list[Case]]] = defaultdict(dict)
         # By operation: limits to which a first page was cut.
         self._kept: dict[str, set[int]] = defaultdict(set)
+        # Operations whose lists have become shorter by themselves.
+        self._shrinking: set[str] = set()
         # Lists that had fewer items than the default page size although more exist: number of items, total, case, and
         # whether a limit has shown more since then.
         self._short: dict[object, tuple[int, int, Case, bool]] = {}
@@ -92,6 +94,7 @@ class Lists:
         """Yield the cases of one exchange."""
         if occasion.request.method not in SAFE:
             self._totals.note_change(occasion.response.received_s)
+            self._longest.clear()
             self._whole.clear()
             self._missed.clear()
             self._shown.clear()
@@ -184,7 +187,8 @@ class Lists:
         # A device that raises a limit does so on the first page too.
         is_first = sent.keys().isdisjoint(places)
         self._kept[cause] |= {most} if is_sent and is_first and is_cut and count == most else set()
-        if not case.holds and most in self._kept[cause]:
+        self._shrinking |= {cause} if is_first and count < min(most, longest) else set()
+        if not case.holds and most in self._kept[cause] and cause not in self._shrinking:
             yield case
             return
         if is_sent and not is_cut and count <= _LEAST:
