@@ -156,6 +156,8 @@ class Changes:
         # By path: the thing as it was last read, and the DELETE of it that was refused since then.
         self._there: dict[str, str] = {}
         self._known: dict[str, _State] = {}
+        # Paths of things that an operation ends, now or in a while.
+        self._ending: set[str] = set()
         # By path: the state that a thing had at the end, where the description calls that final.
         self._ended: dict[str, str] = {}
 
@@ -204,6 +206,7 @@ class Changes:
     def _judge_change(self, occasion: Occasion, operation: Operation, path: str, name: str) -> Iterator[Case]:
         """Judge the response to an operation on a thing: a finished thing cannot be ended again."""
         before = self._known.pop(path, None)
+        self._ending |= {path} if words_of(operation.template) & ENDING else set()
         now = _state_in(occasion, name) if state_of(operation) == name else ""
         was = before.value if before is not None and not before.told else ""
         template = operation.template.rstrip("/").rpartition("/")[0]
@@ -282,7 +285,7 @@ class Changes:
             expected = f"{before.value} as {name}, to which {before.told} led by its response or description"
             lost = before.value.casefold() in FINAL and now.casefold() not in _AWAY
             wrong = now if lost or (now == before.was and is_late) else ""
-        elif before.refused and now.casefold() in _CANCELLED and before.value.casefold() not in FINAL:
+        elif before.refused and now.casefold() in _CANCELLED and not is_final and path not in self._ending:
             expected += f" and as {before.refused} must leave it"
             wrong = now
         elif is_final and now != before.value and now.casefold() not in _AWAY:
