@@ -77,7 +77,7 @@ _HELD: Final = re.compile(
     r"(?=.*\b(?:stop|h[eo]ld|halt|rest|brak|watchdog))(?=.*\b(?:last|no|without)\b.*\b(?:command|twist|velocit|message|rates?\b))",
     re.IGNORECASE | re.DOTALL,
 )
-_TIME: Final = re.compile(r"(\d+(?:\.\d+)?|\bone|\ba) ?(m?)s(?:ec(?:ond)?s?)?\b|(\d+) milliseconds?\b", re.IGNORECASE)
+_TIME: Final = re.compile(r"(\d+(?:\.\d+)?|\bone|\ba) ?(m(?:illi)?)?s(?:ec(?:ond)?s?)?\b", re.IGNORECASE)
 _REPLACES: Final = re.compile(
     r"\bnew (?:target|goal|move|position)\b[^.;]*\b(?:replace|supersede|preempt|displace|override)s\b", re.IGNORECASE
 )
@@ -118,9 +118,7 @@ class Plan:
         """How long a velocity holds after the last command, as the description says in words, s; None: it does not."""
         sentences = filter(_HELD.search, re.split(r"[.;!?](?:\s|$)", self.text))
         times = [one for sentence in sentences for one in _TIME.findall(sentence)]
-        found = [
-            int(ms) / 1000 if ms else (float(n) if n[0].isdigit() else 1.0) / (1000 if m else 1) for n, m, ms in times
-        ]
+        found = ((float(number) if number[0].isdigit() else 1.0) / (1000 if milli else 1) for number, milli in times)
         return max(found, default=None)
 
     @property
