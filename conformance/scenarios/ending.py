@@ -110,13 +110,15 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
         kind, paths = Ended(read, state, actions), list[str]()
         begins = [operation for operation in actions if not _ends(operation)][:_BEGINNING]
         ends = [operation for operation in actions if _ends(operation)]
-        pauses = [operation for operation in ends if words_of(operation.template.rpartition("/")[2]) & _PAUSING][:1]
+        pauses = list(filter(_pauses, ends))[:1]
         ends = [operation for operation in ends if operation not in pauses][:1]
         first = [*pauses, *begins[:1], *begins]
         is_single = create is not None and bool(ends) and _is_single(create)
+        active = ""
         if is_single and create is not None:
             with api.run.limit.lift(), suppress(NoAnswerError):
-                _begin_together(writer, kind, create, ends)
+                _end_active(writer, kind, "")
+                active = _begin_together(writer, kind, create, operations, pauses)
         for steps in (
             [*first, *(pauses + begins) * bool(ends), *(ends or pauses), *begins, *(ends or pauses)],
             first,
@@ -128,10 +130,11 @@ def begin_and_end(api: RestInterface, values: Values) -> list[Ended]:
                     _walk(writer, kind, path_of_usual(read, values), _again_and_again(actions))
                     break
                 if is_single:
-                    _end_active(writer, kind, ends)
+                    _end_active(writer, kind, active)
                 made = _begin(writer, kind.state, create, operations)
                 if (path := location_of(api, read, made)) and made.response.ok:
                     paths.append(path)
+                    active = path
                     _walk(writer, kind, path, steps)
         found.append(replace(kind, paths=tuple(paths), at_s=time.monotonic()))
     return found
@@ -146,7 +149,7 @@ def _begin(
     """
     made = writer.send(create, "", base)
     is_over = str(members(made, (name,)).get(name)).casefold() in FINAL
-    base = base or _body_of(writer, create)
+    is_given, base = base is not None, base or _body_of(writer, create)
     if base is None or (made.response.ok and not is_over):
         return made
     schema, body = next(iter(create.bodies.values())).schema, dict(base)
@@ -154,9 +157,10 @@ def _begin(
         given: Any = flat(part)
         value: Any = body.get(member, given.get("default"))
         is_list = "array" in kinds_of(given)
+        is_renewed = is_list if is_over else member in base and not is_given
         if is_number(value) and is_over and words_of(member) & _LASTING:
             body[member] = min(given.get("maximum", value * _LONGER), value * _LONGER)
-        elif (is_list or member in base) and (ids := _fresh(writer, operations, member, _NEW if is_list else 1)):
+        elif is_renewed and (ids := _fresh(writer, operations, member, _NEW if is_list else 1)):
             body[member] = ids if is_list else ids[0]
     return writer.send(create, "", body) if body != base and fits(schema, body) else made
 
@@ -188,20 +192,40 @@ def _is_single(create: Operation) -> bool:
     return "409" in create.responses and bool(ANOTHER.search(create.text))
 
 
-def _end_active(writer: Writer, kind: Ended, ends: list[Operation]) -> None:
-    """End a listed thing that is active."""
-    if active := _path_in_list(writer, kind, is_done=False):
-        _walk(writer, kind, active, ends)
+def _end_active(writer: Writer, kind: Ended, path: str) -> None:
+    """End a thing that is active, or that its list shows as active, and wait until it has ended."""
+    active = path or _path_in_list(writer, kind, is_done=False)
+    if active:
+        ends = [operation for operation in kind.actions if _ends(operation)]
+        _walk(writer, kind, active, sorted(ends, key=_pauses)[:1])
+        writer.until(
+            lambda: writer.send(kind.read, active),
+            lambda found: str(members(found, (kind.state,)).get(kind.state)).casefold() in {*FINAL, "none"},
+        )
 
 
-def _begin_together(writer: Writer, kind: Ended, create: Operation, ends: list[Operation]) -> None:
-    """Begin two things by two clients at once, of which one has to be refused; read both."""
-    _end_active(writer, kind, ends)
-    sent = writer.api.send_together([writer.request(create)] * 2)
+def _begin_together(
+    writer: Writer, kind: Ended, create: Operation, operations: _Operations, pauses: list[Operation]
+) -> str:
+    """Begin two things by two clients at once, and one while another is paused, of which one has to be refused.
+
+    Return the path of one that is active.
+    """
+    first = _begin(writer, kind.state, create, operations)
+    body = read_json(first.request.body).value
+    _end_active(writer, kind, location_of(writer.api, kind.read, first) if first.response.ok else "")
+    sent = writer.api.send_together([writer.request(create, "", body)] * 2)
     made = [one for one in sent if isinstance(one, Exchange) and one.response.ok]
     paths = [path for one in made if (path := location_of(writer.api, kind.read, one))]
     for path in (*paths, *paths[:1]):
         writer.send(kind.read, path)
+    if len(paths) == 1 and pauses:
+        _walk(writer, kind, paths[0], pauses)
+        second = writer.send(create, "", body)
+        other = location_of(writer.api, kind.read, second) if second.response.ok else ""
+        for path in (other, *paths, other) if other else ():
+            writer.send(kind.read, path)
+    return paths[0] if paths else ""
 
 
 def look_at_ended(api: RestInterface, values: Values, begun: list[Ended]) -> None:
@@ -229,7 +253,7 @@ def _walk(writer: Writer, kind: Ended, path: str, steps: list[Operation]) -> Non
     for step in steps:
         at = path.rstrip("/") + step.template[len(kind.read.template.rstrip("/")) :]
         sent = writer.send(step, at)
-        if sent.response.status == _CONFLICT and waits and words_of(at.rpartition("/")[2]) & _PAUSING:
+        if sent.response.status == _CONFLICT and waits and _pauses(step):
             # What has just begun may have to get ready before it can be paused.
             waits = False
             sent = writer.send(step, at) if _is_ready(writer, kind, path) else sent
@@ -282,6 +306,10 @@ def _actions(read: Operation, operations: _Operations) -> tuple[Operation, ...]:
         if method == "POST" and path.rpartition("/")[0] == item and not path.endswith("}") and not one.motion
     ]
     return tuple(sorted(found, key=_ends))
+
+
+def _pauses(action: Operation) -> bool:
+    return bool(words_of(action.template.rpartition("/")[2]) & _PAUSING)
 
 
 def _ends(action: Operation) -> bool:
