@@ -47,8 +47,9 @@ _WHILE: Final = re.compile(
 # What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
 _CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
 _ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
+_AND_WHILE: Final = re.compile(r",?\s+(?:and|or)\s+(?:if|when|while|as long as)\s+", re.IGNORECASE)
 # The subject of such a condition, and its predicate; words beside a state in that.
-_IS: Final = re.compile(r"\b(unless )?(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
+_IS: Final = re.compile(r"\b(unless )?(?<!of )(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
 _BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
 _STATES: Final = frozenset({"state", "status", "phase"})
 _CANCELLED: Final = frozenset({"cancelled", "canceled", "aborted"})
@@ -523,8 +524,9 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     known |= {name: {state: state for state in _states_of(read, name)}} if name else {}
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
     is_own = operation.template.count("{") == read.template.count("{")
-    for said in (*_REFUSED.finditer(operation.text), *_WHILE.finditer(operation.text)):
-        for unless, subject, no, rest in _IS.findall(said[1]):
+    conditions = [found[1] for said in (_REFUSED, _WHILE) for found in said.finditer(operation.text)]
+    for said in (clause for condition in conditions for clause in _AND_WHILE.split(condition)):
+        for unless, subject, no, rest in _IS.findall(said):
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
                 if named := _values_in(rest, values):
                     found[member] |= set(values) - named if bool(unless) != bool(no) else named

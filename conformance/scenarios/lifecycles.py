@@ -15,6 +15,7 @@ from urllib.parse import quote, unquote, urlsplit
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import items_of
+from conformance.api.rest.samples import fits
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.things import (
     collection_of,
@@ -137,6 +138,9 @@ class _Cycle:
             self._change_all()
             Chosen(self.living, self._changes, self.operations).look()
             self._act()
+            barring = next((one for one in self.living.of(State.ALIVE) if one.is_own), None)
+            if barring is not None and not self.living.is_over:
+                self._call_barred(barring)
         with suppress(NoAnswerError):
             if delete is not None:
                 self._delete_all(delete)
@@ -241,6 +245,27 @@ class _Cycle:
             body = next(iter(self.writer.bodies(change, turn, now)), None)
             if body is not None and any(text_of(now.get(name)) in states for name, states in barred.items()):
                 look_refused(self.living, thing, change, self.writer.conditional(change, self.read, thing.path, body))
+
+    def _call_barred(self, thing: Thing) -> None:
+        """Call operations of a thing in a state in which they are refused by the description, set by a PATCH."""
+        patch = next((change for change in self._changes if change.method == "PATCH" and change.bodies), None)
+        if patch is None:
+            return
+        parts = flat(next(iter(patch.bodies.values())).schema).get("properties", {})
+        below = [one for (method, path), one in self.operations.items() if path.startswith(f"{self.item}/")]
+        for operation in [one for one in below if not one.safe and one.template.count("{") == self.item.count("{")]:
+            for name, states in barred_by(operation, self.read).items():
+                values: list[Any] = [True, *sorted(states)] if "true" in states else sorted(states)
+                value = next((one for one in values if name in parts and fits(parts[name], one)), None)
+                was = members(self.writer.send(self.read, thing.path), (name,)).get(name)
+                if value is None or was == value or was is None:
+                    continue
+                if self.writer.conditional(patch, self.read, thing.path, {name: value}).response.ok:
+                    self.writer.send(self.read, thing.path)
+                    self.writer.send(operation, thing.path + operation.template[len(self.item) :])
+                    self.writer.conditional(patch, self.read, thing.path, {name: was})
+        if below:
+            self.living.read_anew()
 
     def _delete_all(self, delete: Operation) -> None:
         """Delete each thing; after each, the others and the deleted ones are read."""

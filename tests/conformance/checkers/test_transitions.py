@@ -32,6 +32,7 @@ _SAID = {
     "stop": "409 unless the belt is running or paused. The belt is then stopped.",
     "clean": "409 if it is running, paused already, or has goods.",
     "grease": "409 if the belt is running and nobody watches it. Refused if the motor is stopped.",
+    "ship": "While a part of the belt is paused, and while the belt is archived, it is refused with 409.",
     "restore": "409 if it is not archived. If it was paused, it is then paused.",
 }
 
@@ -82,6 +83,7 @@ _BROKEN = {
     "cleaned while paused": ([("GET . 200", "paused"), ("POST /clean 200", "paused")] * 2, _STATES),
     "written while archived": ([_AWAY, ("PUT . 200", "stopped")], _STATES),
     "filled while archived": ([_AWAY, ("POST /goods 200",)], _STATES),
+    "shipped while archived": ([_AWAY, ("POST /ship 200",)], _STATES),
     "restored while not archived": ([("GET . 200", "stopped", 1, False), ("POST /restore 200",)], _STATES),
     "not stopped": (
         [("GET . 200", "running"), ("POST /stop 200", "running"), *[("GET . 200", "running")] * 4],
@@ -98,6 +100,7 @@ _RIGHT = {
     "greased while a part of a condition holds": [("GET . 200", "running"), ("POST /grease 200", "running")] * 2,
     "greased while another thing would be refused": [("GET . 200", "stopped"), ("POST /grease 200", "stopped")] * 2,
     "cleaned when stopped": [("GET . 200", "stopped"), ("POST /clean 200", "stopped")] * 2,
+    "shipped while it is paused, and not a part of it": [("GET . 200", "paused"), ("POST /ship 200", "paused")] * 2,
     "restored to what it was": [_AWAY, ("POST /restore 200", "stopped"), *[("GET . 200", "stopped")] * 4],
     "a refused change of what is archived": [_AWAY, ("PUT . 409",), _AWAY],
     "resumed from stopped once, which may have been paused just then": _RESUMED,
