@@ -128,6 +128,7 @@ def harmful_words(operation: Operation) -> tuple[str, ...]:
     text += "" if operation.safe else f" {' '.join(operation.tags)}"
     words = words_of(text) - _OF_METHODS.get(operation.method, frozenset())
     words -= {"upload", "uploads"} if words & _RECORDS else set()
+    words -= {"update"} if operation.created else set()
     return tuple(sorted(words & (HARMFUL | _SEVERAL)))
 
 

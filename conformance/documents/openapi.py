@@ -76,6 +76,7 @@ class Operation:
         never: whether the description says that a test must not send it (x-roaas-never).
         stop: whether it stops the device (x-roaas-stop).
         reads: whether it only reads, whatever its method (x-roaas-reads).
+        created: whether it updates a thing that another operation creates (x-roaas-created).
         text: what its summary and its description say.
     """
 
@@ -94,6 +95,7 @@ class Operation:
     never: bool = False
     stop: bool = False
     reads: bool = False
+    created: bool = False
     text: str = ""
 
     @cached_property
@@ -239,6 +241,7 @@ def _operation(
         never=bool(given.get("x-roaas-never", False)),
         stop=bool(given.get("x-roaas-stop", False)),
         reads=bool(given.get("x-roaas-reads", False)),
+        created=bool(given.get("x-roaas-created", False)),
         text=" ".join(one for key in ("summary", "description") if isinstance(one := given.get(key), str)),
     )
 

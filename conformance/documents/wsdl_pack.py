@@ -24,6 +24,9 @@ from conformance.documents.xsd_shapes import Element
 DOCUMENTS_NAME: Final = "wsdl.json"
 # First words of operations that only read. Others that sound so may move: FindHome, SearchReference.
 _READS: Final = re.compile(r"(?:[Gg]et|[Ll]ist|[Dd]escribe)(?![a-z])")
+# First words of operations that create a thing, and of one that updates such a thing, or the device itself.
+_CREATES: Final = re.compile(r"(?i:create|add|register|insert|new|store|put)(?=[A-Z])")
+_UPDATES: Final = re.compile(r"(?i:update)(?=[A-Z])")
 # The first child of a Body, whatever the prefixes.
 _PAYLOAD: Final = re.compile(rb"<(?:[\w.-]+:)?Body\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)")
 
@@ -79,8 +82,11 @@ def write_soap_pack(
 def _operations(found: Wsdl) -> dict[str, Any]:
     """Return the operations in the same form as those of other APIs."""
     paths: dict[str, Any] = {}
+    created = {_CREATES.sub("", one.name, 1) for _, one in each(found.ports) if _CREATES.match(one.name)}
     for port, operation in each(found.ports):
         marks = {"x-roaas-reads": True} if _READS.match(operation.name) else {}
+        verb = _UPDATES.match(operation.name)
+        marks |= {"x-roaas-created": True} if verb and operation.name[verb.end() :] in created else {}
         marks |= {"x-roaas-never": True} if found.remark(operation) else {}
         paths[label_of(port, operation).partition(" ")[2]] = {
             "post": {
@@ -124,14 +130,8 @@ def label_in(found: Wsdl, path: str, body: bytes) -> str | None:
     """Return the operation that a message to a path is for, or None."""
     payload = _PAYLOAD.search(body)
     name = payload[1].decode() if payload else ""
-    return next(
-        (
-            label_of(port, operation)
-            for port, operation in each(found.ports)
-            if urlsplit(port.url).path == path and local(operation.request) == name
-        ),
-        None,
-    )
+    own = (pair for pair in each(found.ports) if urlsplit(pair[0].url).path == path)
+    return next((label_of(port, operation) for port, operation in own if local(operation.request) == name), None)
 
 
 def each(ports: Iterable[SoapPort]) -> Iterable[tuple[SoapPort, SoapOperation]]:
@@ -158,13 +158,12 @@ def services_of(contract: Contract) -> Wsdl | None:
     if not path.is_file():
         return None
     kept = json.loads(path.read_text(encoding="utf-8"))
-    documents = {place: text.encode("latin-1") for place, text in kept["documents"].items()}
+    documents: dict[str, bytes] = {place: text.encode("latin-1") for place, text in kept["documents"].items()}
 
     def fetch(place: str) -> bytes:
         if place not in documents:
             raise ValueError("it was not there when the WSDL was read")
-        found: bytes = documents[place]
-        return found
+        return documents[place]
 
     return read_services(
         documents[kept["location"]],

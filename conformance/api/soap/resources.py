@@ -274,7 +274,7 @@ class Resources:
         if place.request is None or not place.act.operation.request:
             return None
         path, _, query = request.target.partition("?")
-        at = place.template.split("/").index("{" + self._names_in(place) + "}") if place.key else 0
+        at = next((at for at, part in enumerate(place.template.split("/")) if part.startswith("{")), 0)
         id_ = {place.key: unquote(path.split("/")[at])} if place.key else {}
         whole = self._types.shape(place.act.operation.request)
         if whole is None:
@@ -288,10 +288,6 @@ class Resources:
         for one in _wrappers(whole, place.request)[::-1]:
             made = Node(one.tag, "", (made,))
         return made
-
-    @staticmethod
-    def _names_in(place: Place) -> str:
-        return next(iter(re.findall(r"\{([^{}]*)\}", place.template)), "")
 
     @staticmethod
     def _answer(place: Place, exchange: Exchange, path: str, *, is_valid: bool) -> Response:

@@ -43,6 +43,8 @@ _READ = Operation("", "GET", "/state/{id}")
         (Operation("", "POST", "/update"), CallRules(("*",)), Reason.HARMFUL),
         (Operation("a_delete", "DELETE", "/a"), CallRules(("/a",)), Reason.ALLOWED),
         (Operation("", "POST", "/delete/{id}"), CallRules(("*",)), Reason.HARMFUL),
+        (Operation("UpdateJob", "POST", "/a/UpdateJob", created=True), CallRules(("*",)), Reason.ALLOWED),
+        (Operation("UpdateFirmware", "POST", "/a/UpdateFirmware", created=True), CallRules(("*",)), Reason.HARMFUL),
         (Operation("", "POST", "/a", motion=True), CallRules(("/a",)), Reason.MOVES),
         (Operation("", "POST", "/a", motion=True), CallRules(("/a",), motion=True), Reason.ALLOWED),
         (Operation("", "GET", "/a", motion=True), CallRules(), Reason.MOVES),
