@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 from urllib.parse import quote
 
 from conformance.contract.toml_file import basic_string
@@ -44,7 +44,13 @@ _SETTLES_S: Final = 1.0
 _COMMON: Final = re.compile(r"/(parameter_events|rosout)$|/_|/(get_type_description|\w+_parameters(_atomically)?)$")
 _PARAMETER: Final = re.compile(r"\{[^{}]*\}")
 _CANCELS: Final = re.compile(r"/[^/]*(cancel|abort|stop|preempt)[^/]*/?$")
+_STATE: Final = re.compile(r"[/_](state|status|phase)$")
 _SENDS: Final = frozenset({"POST", "PUT", "PATCH"})
+# _FAILURES: booleans beside a message, and what they are if it is too old or there is none.
+_FAILURES: Final = {r"/(is_?)?(stale|outdated|expired)$": True, r"/(success|ok)$": False}
+# What the letter before an axis means, as in qw and vx.
+_LETTERS: Final = {"": "position", "q": "orientation", "v": "linear", "w": "angular"}
+_AXIS: Final = re.compile(r"([qvw]?)([xyzw])")
 # _KINDS: ends of the graph. _HOLDS: by part of a goal or call, names of an object without declared fields for it.
 _KINDS: Final = ("topics", "services", "actions")
 _HOLDS: Final = {
@@ -113,6 +119,7 @@ class Fit:
         size: how many fields both have.
         lacks: how many fields of the message the schema lacks.
         forms: how it writes numbers and octets, by key of the map.
+        guess: why it may be another message; or empty.
     """
 
     at: str
@@ -120,6 +127,7 @@ class Fit:
     size: int
     lacks: int
     forms: dict[str, str]
+    guess: str = ""
 
     @property
     def keys(self) -> dict[str, Any]:
@@ -225,6 +233,12 @@ def _map_lines(operations: Sequence[Operation], graph: Graph, domain_id: int) ->
         if proposal:
             found[operation.label] = proposal
             written |= set() if proposal.guess else {proposal.keys.get("publishes", "")}
+    for operation in operations:
+        of = found.get(operation.label.rpartition("/")[0])
+        if of and "topic" in of.keys and any(name.startswith("text/event-stream") for name in operation.formats):
+            guess = of.guess or ("at" in of.keys and "an event may have the message elsewhere.") or ""
+            keys = {key: of.keys[key] for key in ("topic", "type", "fields") if key in of.keys}
+            found[operation.label] = _Proposal(keys | {"stream": "sse"}, guess=guess)
     sure = [one for one in found.values() if not one.guess]
     sign = "" if sure else "# "
     yield f"{sign}[ros]"
@@ -270,9 +284,23 @@ def _topic(one: Operation, graph: Graph, written: Collection[str]) -> _Proposal 
     if not name:
         return None
     read = graph.read.get(one.label)
-    absent = [read] if read in (HTTPStatus.NOT_FOUND, HTTPStatus.SERVICE_UNAVAILABLE) else []
     keys = {"topic" if reads else "publishes": name, "type": graph.topics[name]} | fits[name].keys
-    return _Proposal(keys | ({"absent": absent} if absent else {}), fits[name].forms, guess)
+    keys |= {"absent": [read]} if read in (HTTPStatus.NOT_FOUND, HTTPStatus.SERVICE_UNAVAILABLE) else {}
+    keys |= _failure(one, fits[name].at, graph.definition(graph.topics[name])) if reads else {}
+    return _Proposal(keys, fits[name].forms, guess)
+
+
+def _failure(one: Operation, at: str, definition: Definition) -> dict[str, Any]:
+    """Return the key `failure` where a successful response has a boolean for it outside of its message."""
+    contents = (content for status, content in one.responses.items() if status.startswith("2"))
+    leaves = [pair for content in contents for schema in content.values() for pair in _leaves(schema)]
+    own = dict(_own_leaves(definition))
+    for names, value in _FAILURES.items():
+        for place, leaf in leaves:
+            is_inside = place.startswith(f"{at}/") if at else place in own
+            if re.search(names, place, re.IGNORECASE) and kinds_of(leaf) == {"boolean"} and not is_inside:
+                return {"failure": {"at": place, "values": [value]}}
+    return {}
 
 
 def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -> tuple[str, str]:
@@ -290,7 +318,7 @@ def _best(one: Operation, fits: dict[str, Fit], written: Collection[str] = ()) -
     alike = any(fits[other].size == fits[name].size for other in others)
     if name and not _shared_words(one, name) and (alike or fits[name].size < _FEW):
         return name, "the fields agree, but not the name."
-    return name, ""
+    return name, fits[name].guess if name else ""
 
 
 def _call(one: Operation, graph: Graph) -> _Proposal | None:
@@ -301,8 +329,9 @@ def _call(one: Operation, graph: Graph) -> _Proposal | None:
     if not name:
         return None
     keys = {"service": name, "type": graph.services[name]} | requests[name].keys
-    result = {"result": responses[name].at} if responses[name].at else {}
-    return _Proposal(keys | result, requests[name].forms | responses[name].forms, guess)
+    keys |= {"result": responses[name].at} if responses[name].at else {}
+    keys |= _failure(one, responses[name].at, graph.definition(f"{graph.services[name]}#Response"))
+    return _Proposal(keys, requests[name].forms | responses[name].forms, guess)
 
 
 def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followers: set[str]) -> _Proposal | None:
@@ -318,6 +347,7 @@ def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followe
         return None
     is_goal = part == "Goal"
     keys = {"action" if is_goal else "service": name, "type": ends[name]} | fits[name].keys | {"id": id_}
+    keys |= _failure(one, "", graph.definition(f"{ends[name]}#{part}"))
     forms = dict(fits[name].forms)
     # All goals may be in one place, beside the operations that send them.
     for place in (one.template.rstrip("/"), one.template.rstrip("/").rpartition("/")[0]):
@@ -328,9 +358,11 @@ def _goal(one: Operation, operations: Sequence[Operation], graph: Graph, followe
             if cancels and other.method != "GET":
                 keys |= {"cancel": call} if is_goal else {}
             elif other.method == "GET" and other.shape is not None and "state" not in keys:
-                states = [(at, leaf) for at, leaf in _leaves(other.shape) if re.search("[/_](state|status|phase)$", at)]
-                at, leaf = max(states, key=lambda pair: len(_states(pair[1])), default=("", {}))
-                keys |= {"state": {"read": call, "at": at} | _states(leaf)} if at else {}
+                leaves = ((at, leaf) for at, leaf in _leaves(other.shape) if _STATE.search(at))
+                found = {at: _states(leaf) for at, leaf in leaves}
+                # A call cannot be canceled: words for that are of goals beside it.
+                at = max(found, key=lambda at: (is_goal or "canceled" not in found[at], len(found[at])), default="")
+                keys |= {"state": {"read": call, "at": at} | found[at]} if at else {}
                 for held, names in list(_HOLDS.items())[not is_goal :] if at else ():
                     part = held.capitalize() if is_goal else "Response"
                     for fit in graph.fitting(other.shape, {name: ends[name]}, f"#{part}", names).values():
@@ -407,22 +439,34 @@ def _fit(places: dict[str, dict[str, Schema]], definition: Definition, message: 
         steps = pointer.split("/")[1:]
         for first in range(len(steps)):
             by_key.setdefault(_key("".join(steps[first:])), set()).add(pointer)
-    best: Fit | None = None
+    best, best_rank = cast("Fit | None", None), (0, 0)
     for place, below in places.items():
         pairs, forms = _pairs(below, by_key), dict[str, str]()
         lacks = len(own) - len(pairs)
         # A part of a message counts only if the body has all of that part, and it is at least half of the message.
         fits = not lacks or (len(pairs) == len(below) and 2 * len(pairs) >= len(places[""]))
-        larger = len(pairs) > (best.size if best else 0)
-        if fits and larger and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items()):
-            best = Fit(place, _fields(pairs, own), len(pairs), lacks, forms)
+        # With as many fields, and fewer others beside them, it is more likely the message.
+        rank = (len(pairs), -len(below))
+        if (
+            fits
+            and pairs
+            and rank > best_rank
+            and all(_has_type(below[web], own[one], definition, forms) for web, one in pairs.items())
+        ):
+            keys = [(_key(web), _key(one)) for web, one in pairs.items()]
+            short = any(web != one and (not one.endswith(web) or _AXIS.fullmatch(web)) for web, one in keys)
+            best_rank = rank
+            best = Fit(
+                place, _fields(pairs, own), len(pairs), lacks, forms, "some of its fields have short names." * short
+            )
     return best
 
 
 def _pairs(leaves: Collection[str], by_key: dict[str, set[str]]) -> dict[str, str]:
     """Return the position in a message of each field of a schema that has one.
 
-    A field is known by its path however its words are written, or by the end of a path that no other field has.
+    A field is known by its path however its words are written, or by the end of a path that no other field has; such
+    as qw and frame by what they stand for; and the last one of many, as it is left.
 
     Args:
         leaves: the schema's fields.
@@ -430,11 +474,15 @@ def _pairs(leaves: Collection[str], by_key: dict[str, set[str]]) -> dict[str, st
     """
     found: dict[str, str] = {}
     for web in leaves:
-        key = _key(web)
-        named = by_key.get(key, set())
-        exact = {pointer for pointer in named if _key(pointer) == key} or named
-        if len(exact) == 1 and not exact <= {*found.values()}:
-            found[web] = next(iter(exact))
+        key, axis = _key(web), _AXIS.fullmatch(_key(web))
+        for name in (key, f"{_LETTERS[axis[1]]}{axis[2]}" if axis else f"{key}id"):
+            named = by_key.get(name, set())
+            exact = {pointer for pointer in named if _key(pointer) == name} or named
+            if web not in found and len(exact) == 1 and not exact <= {*found.values()}:
+                found[web] = next(iter(exact))
+    left = {pointer for pointers in by_key.values() for pointer in pointers}.difference(found.values())
+    for web in {*leaves}.difference(found) if len(left) == 1 and len(leaves) == len(found) + 1 > _FEW else ():
+        found[web] = left.pop()
     return found
 
 

@@ -201,7 +201,8 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 Operation = Reads | Publishes | Calls | Acts | Lists
-_KINDS: Final[dict[str, type[Operation]]] = {
+#: By the key that says so: what an operation is.
+KINDS: Final[dict[str, type[Operation]]] = {
     "topic": Reads, "publishes": Publishes, "service": Calls, "action": Acts, "lists": Lists,
 }  # fmt: skip
 
@@ -279,13 +280,8 @@ class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         words: dict[str, Any] = {
             "running": ("running",), "succeeded": ("4",), "canceled": ("5",), "aborted": ("6",), "rejected": ("0",)
         }  # fmt: skip
-        goal: dict[str, Any] = {
-            "id": "/id",
-            "feedback": "/feedback",
-            "result": "/result",
-            "cancel": "POST /cancel/{id}",
-        }
-        goal |= {"state": State("GET /goal/{id}", "/status", **words)}
+        goal: dict[str, Any] = {"id": "/id", "feedback": "/feedback", "result": "/result"}
+        goal |= {"cancel": "POST /cancel/{id}", "state": State("GET /goal/{id}", "/status", **words)}
         fails = {"result": "/values", "failure": Failure("/result", (False,))}
         for kind, key, call, at, said, types, more in (
             (Reads, "topic", "GET /subscribe", "/msg", {"op": "subscribe"}, self.subscribe, {"stream": "rosbridge"}),
@@ -336,11 +332,11 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
     place = f"{where}: [ros.operations] {call!r}"
     if not _CALL.match(call):
         raise error(f"{place} must be a method and a path on the device, such as 'GET /pose', and no URL")
-    kinds = [name for name in _KINDS if name in table]
+    kinds = [name for name in KINDS if name in table]
     if len(kinds) != 1:
         found = f"has {' and '.join(kinds)}" if kinds else "has none"
-        raise error(f"{place}: one key of {', '.join(_KINDS)} must say what it is; it {found}")
-    made = fit(table, _KINDS[kinds[0]], place, error)
+        raise error(f"{place}: one key of {', '.join(KINDS)} must say what it is; it {found}")
+    made = fit(table, KINDS[kinds[0]], place, error)
     if isinstance(made, Acts | Calls):
         cancel = (made.cancel, made.cancel_body) if isinstance(made, Acts) else ("", {})
         state = (made.state.read, made.state.body) if made.state else ("", {})

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from conformance.scenarios.ros.definition import Definition, put_at, value_at
-from conformance.scenarios.ros.web import differences, document_of, is_success
+from conformance.scenarios.ros.web import changes, differences, document_of, is_success
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
 
@@ -27,6 +27,12 @@ def differing(exchange: Exchange, value: str, definition: Definition, body: Body
     part = msgspec.structs.replace(body, at=at, fields={})
     found = differences(document_of(exchange.response.body), json.loads(value), definition, part, ros)
     return f"{found[0].at} is {found[0].web} in place of {found[0].ros}" if found else ""
+
+
+def change_text(content: dict[str, object], sent: str, body: Body) -> str:
+    """Return how what arrived is not the message that was sent; empty: it is."""
+    found = next(changes(fields_in(content, body), fields_in(json.loads(sent), body)), None)
+    return f"{found[0]} is {found[1]} in place of {found[2]}" if found else ""
 
 
 def fields_in(message: dict[str, object], body: Body) -> dict[str, object]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, fields_in, statuses
+from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, statuses
 from conformance.scenarios.ros.actions import Course, Goal, Goals, Look, action_goals, is_end
-from conformance.scenarios.ros.web import changes, is_success
+from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.transport.exchange import Exchange
@@ -42,10 +41,8 @@ def once(trace: Goals) -> Iterator[Outcome]:
         expected = f"{wanted} goal{'s' * (wanted > 1)} at {goal.body.action} for {wanted} accepted"
         cause = "lost" if len(goals) < wanted else "doubled"
         yield Case(len(goals) == wanted, goal.exchange, expected, f"{len(goals)} goals", cause)
-        wanted_fields = fields_in(json.loads(goal.value), goal.body)
-        wrong = next(changes(fields_in(goals[0].content, goal.body), wanted_fields), None) if goals else None
-        found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
-        yield Case(not wrong, goal.exchange, "the goal's fields at its server", observed=found, cause="changed")
+        found = change_text(goals[0].content, goal.value, goal.body) if goals else ""
+        yield Case(not found, goal.exchange, "the goal's fields at its server", found, "changed")
 
 
 @rule("ros-gateway/goal-rejected", on=(action_goals,))
@@ -55,14 +52,13 @@ def rejected(trace: Goals) -> Iterator[Outcome]:
         if goal.course is not Course.REJECTED or not any(heard.what == "rejected" for heard in goal.heard):
             continue
         body, declared = goal.body, goal.body.rejected
+        expected = f"{statuses(declared)} for a goal {goal.course}"
         if not goal.is_ok:
-            holds = fails_as(goal.exchange, body, declared)
-            yield Case(holds, goal.exchange, f"{statuses(declared)} for a goal {goal.course}", cause="status")
+            yield Case(fails_as(goal.exchange, body, declared), goal.exchange, expected, cause="status")
             continue
         last = goal.looks[-1] if goal.looks else None
         state = body.state
         if declared or last is None or state is None:
-            expected = f"{statuses(declared)} for a goal {goal.course}"
             yield Case(holds=False, exchange=goal.exchange, expected=expected, cause="accepted")
             continue
         others = {*state.running, *state.succeeded, *state.canceled}
@@ -90,9 +86,8 @@ def outcomes(trace: Goals) -> Iterator[Outcome]:
         if runs_on and end is not None and last.sent < end + goal.body.within_s:
             yield NotTested(f"the server ended a goal {goal.course} too late to see what becomes of it")
             continue
-        expected = (
-            f"the state {' or '.join(words)} within {goal.body.within_s:g} s after the end of a goal {goal.course}"
-        )
+        end_of = f"the end of a goal {goal.course}"
+        expected = f"the state {' or '.join(words)} within {goal.body.within_s:g} s after {end_of}"
         yield Case(last.word in words, last.exchange, expected, observed=f"{last.word!r}", cause=goal.course)
         yield from _steady(goal)
 
@@ -106,10 +101,8 @@ def _steady(one: Goal) -> Iterator[Outcome]:
     end = _end_of(one)
     early = [look for look in one.looks if end is not None and look.received < end and is_end(one.body, look.word)]
     if early:
-        yield Case(
-            holds=False, exchange=early[0].exchange, expected=f"no end before that of a goal {one.course}",
-            observed=f"{early[0].word!r} {(end or 0.0) - early[0].received:.2f} s before it", cause="early",
-        )  # fmt: skip
+        found = f"{early[0].word!r} {(end or 0.0) - early[0].received:.2f} s before it"
+        yield Case(False, early[0].exchange, f"no end before that of a goal {one.course}", found, "early")
     ended = [look for look in one.looks if is_end(one.body, look.word)]
     left = next((late for first, late in pairwise(ended) if late.word != first.word), None)
     if ended:
@@ -175,10 +168,10 @@ def _number_of(look: Look, one: Goal, trace: Goals, ros: RosMap) -> int | None:
     """Return which of the server's feedback a reading shows, or None."""
     definition = trace.definitions[f"{one.operation}#Feedback"]
     pointer = one.body.feedback or ""
-    for number, value in enumerate(one.feedback):
-        if not differing(look.exchange, value, definition, one.body, pointer, ros):
-            return number
-    return None
+    given = enumerate(one.feedback)
+    return next(
+        (n for n, value in given if not differing(look.exchange, value, definition, one.body, pointer, ros)), None
+    )
 
 
 @rule("ros-gateway/goal-cancel", on=(action_goals,))
@@ -203,17 +196,11 @@ def _judge_cancel(one: Goal, cancel: Exchange) -> Iterator[Outcome]:
         words = one.body.state.canceled if one.body.state else ()
         said = next((look for look in one.looks if look.word in words), None)
         found = said.word if said else ""
-        yield Case(
-            said is None, (said or one).exchange, f"no cancellation of a goal {one.course}", found, cause="refused"
-        )
+        yield Case(said is None, (said or one).exchange, f"no cancellation of a goal {one.course}", found, "refused")
         return
-    yield Case(
-        ok and len(asked) == 1,
-        cancel,
-        f"2xx, and one request to cancel at {one.body.action}",
-        observed=f"{cancel.came}, and {len(asked)} requests to cancel",
-        cause="lost" if not asked else "refused" if not ok else "doubled",
-    )
+    expected, found = f"2xx, and one request to cancel at {one.body.action}", f"{len(asked)} requests to cancel"
+    cause = "lost" if not asked else "refused" if not ok else "doubled"
+    yield Case(ok and len(asked) == 1, cancel, expected, f"{cancel.came}, and {found}", cause)
 
 
 @rule("ros-gateway/recovers", on=(action_goals,))

@@ -64,17 +64,8 @@ def _absence(one: Absence) -> Case:
 @rule("ros-gateway/own-topic", on=(publishers_end,))
 def own(trace: Publishers) -> Iterator[Outcome]:
     """Judge whether an operation returns the messages of its topic while others have as new ones."""
-    for presence in trace.presences:
-        if presence.publisher == _ALL:
-            found = f"the message of {presence.instead}" if presence.instead else _older(presence)
-            expected = "the message of its own topic, while all topics have one"
-            yield Case(
-                presence.shown, presence.exchange, expected, observed=found, cause="another" if presence.instead else ""
-            )
-
-
-def _older(one: Presence) -> str:
-    return "an older message" if one.exchange.response.ok else ""
+    every = (presence for presence in trace.presences if presence.publisher == _ALL)
+    yield from _judge_heard(every, "the message of its own topic, while all topics have one")
 
 
 @rule("ros-gateway/recovers", on=(publishers_end,))
@@ -89,11 +80,14 @@ def qualities(trace: tuple[Presence, ...]) -> Iterator[Outcome]:
     yield from _judge_heard(trace)
 
 
-def _judge_heard(presences: Iterable[Presence]) -> Iterator[Case]:
+def _judge_heard(presences: Iterable[Presence], expected: str = "") -> Iterator[Case]:
     """Judge whether the message of each publisher is returned."""
     for presence in presences:
-        text = f"the message of {presence.publisher}"
-        yield Case(presence.shown, presence.exchange, text, _older(presence), presence.publisher)
+        found = "an older message" if presence.exchange.response.ok else ""
+        found = f"the message of {presence.instead}" if presence.instead else found
+        cause = "another" if presence.instead else presence.publisher
+        text = expected or f"the message of {presence.publisher}"
+        yield Case(presence.shown, presence.exchange, text, found, cause)
 
 
 @rule("ros-gateway/lists", on=(graph_lists,))
@@ -105,13 +99,8 @@ def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
         expected = f"{wanted} within {listing.body.timeout_s:g} s after {when} the graph"
         if "/_" in listing.name and not listing.there:
             expected = f"no {listing.name}, a hidden name"
-        yield Case(
-            listing.right,
-            listing.exchange,
-            expected,
-            listing.found or "no such name",
-            cause=f"{listing.there} {bool(listing.found)}",
-        )
+        cause = f"{listing.there} {bool(listing.found)}"
+        yield Case(listing.right, listing.exchange, expected, listing.found or "no such name", cause)
 
 
 @rule("ros-gateway/subscriptions", on=(many_reads,))

@@ -7,11 +7,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from typing import Any, Final
 
-from conformance.rules.ros_gateway.judging import differing, fails_as, fields_in, statuses
+from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, fields_in, statuses
 from conformance.scenarios.ros.definition import Definition
-from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
-from conformance.scenarios.ros.web import changes, is_success
+from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
@@ -27,19 +26,14 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
     for call in trace.probes:
         if call.server not in _RESPONDS or not call.answer:
             continue
-        ok = call.is_success
+        ok, body, found = call.is_success, call.body, ""
         if not ok and call.server is not Server.RESPONDS:
             # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
             continue
-        found = ""
         if ok and isinstance(call.attempt, Exchange):
-            found = differing(
-                call.attempt, call.answer, trace.responses[call.operation], call.body, call.body.result, ros
-            )
-        expected = f"2xx with the response of {call.body.service}, {call.server}"
-        yield Case(
-            ok and not found, call.attempt, expected, observed=found, cause=f"{call.server} {found.split(' ')[0]}"
-        )
+            found = differing(call.attempt, call.answer, trace.responses[call.operation], body, body.result, ros)
+        expected = f"2xx with the response of {body.service}, {call.server}"
+        yield Case(ok and not found, call.attempt, expected, found, f"{call.server} {found.split(' ')[0]}")
     for crowd in trace.crowds:
         yield from _own(crowd, trace.responses[crowd.operation], ros)
 
@@ -53,9 +47,7 @@ def _own(crowd: Crowd, definition: Definition, ros: RosMap) -> Iterator[Outcome]
     for request, attempt in zip(crowd.requests, crowd.attempts, strict=True):
         if isinstance(attempt, Exchange) and is_success(attempt, body):
             own = left[_key(json.loads(request), body)]
-            fits = next(
-                (text for text in own if not differing(attempt, text, definition, body, body.result, ros)), None
-            )
+            fits = next((one for one in own if not differing(attempt, one, definition, body, body.result, ros)), None)
             expected = f"the response of {body.service} to this call, one of {len(crowd.requests)} at once"
             yield Case(fits is not None, attempt, expected, observed="another one", cause="another")
             if fits is not None:
@@ -76,7 +68,8 @@ def once(trace: Services) -> Iterator[Outcome]:
         expected, cause = f"one call of {call.body.service} for one accepted request", "doubled" if requests else "lost"
         yield Case(len(requests) == 1, call.attempt, expected, f"{len(requests)} calls", cause)
         if requests:
-            yield from _as_sent(call, requests[0])
+            found = change_text(requests[0].content, call.request, call.body)
+            yield Case(not found, call.attempt, f"the request's fields at {call.body.service}", found, "changed")
     for crowd in trace.crowds:
         yield from _judge_reach(crowd)
 
@@ -95,12 +88,6 @@ def _judge_reach(crowd: Crowd) -> Iterator[Outcome]:
         yield Case(done[key] <= heard[key] <= sent[key], attempt, expected, f"{heard[key]} calls", cause)
 
 
-def _as_sent(one: Called, request: Heard) -> Iterator[Outcome]:
-    wrong = next(changes(fields_in(request.content, one.body), fields_in(json.loads(one.request), one.body)), None)
-    found = f"{wrong[0]} is {wrong[1]} in place of {wrong[2]}" if wrong else ""
-    yield Case(not wrong, one.attempt, f"the request's fields at {one.body.service}", observed=found, cause="changed")
-
-
 @rule("ros-gateway/service-failure", on=(service_calls,))
 def failures(trace: Services) -> Iterator[Outcome]:
     """Judge whether a call without a response is reported as a failure in time, by a declared status."""
@@ -108,9 +95,8 @@ def failures(trace: Services) -> Iterator[Outcome]:
         if call.server not in _ABSENT or (call.server is Server.SILENT and not call.heard):
             continue
         body = call.body
-        declared = body.too_late if call.server is Server.SILENT else (*body.unavailable, *body.too_late)
-        if call.server is not Server.SILENT and not body.unavailable:
-            declared = ()
+        gone = body.unavailable and (*body.unavailable, *body.too_late)
+        declared = body.too_late if call.server is Server.SILENT else gone
         expected = f"{statuses(declared)} within {body.within_s:g} s for {body.service}, {call.server}"
         if call.is_open and body.timeout_s is None:
             yield NotClaimed(f"the map does not say how long a call of {body.service} may take: `timeout_s`")
@@ -138,13 +124,9 @@ def others(trace: Services) -> Iterator[Outcome]:
         if shown is None:
             yield NotTested("no other operation was read while a service did not respond")
             continue
-        yield Case(
-            not is_held_up or len(held) < ROUNDS,
-            shown.attempt,
-            f"a response while {calls[0].operation} waits for {calls[0].body.service}",
-            observed=f"a response after {shown.took:.1f} s, when that call had ended; usually {shown.usual:.2f} s",
-            cause=shown.operation,
-        )
+        expected = f"a response while {calls[0].operation} waits for {calls[0].body.service}"
+        found = f"a response after {shown.took:.1f} s, when that call had ended; usually {shown.usual:.2f} s"
+        yield Case(not is_held_up or len(held) < ROUNDS, shown.attempt, expected, found, shown.operation)
 
 
 @rule("ros-gateway/recovers", on=(service_calls,))

@@ -32,9 +32,8 @@ def stream_once(trace: tuple[Streamed, ...]) -> Iterator[Outcome]:
         expected = f"each message on {event.body.topic} once ({event.how})"
         if not event.sent:
             expected = f"no message on {event.body.topic} {event.how}"
-            yield Case(
-                not event.came, event.opened, expected, f"{len(event.came)} messages", f"{event.operation} unsubscribe"
-            )
+            cause = f"{event.operation} unsubscribe"
+            yield Case(not event.came, event.opened, expected, f"{len(event.came)} messages", cause)
             continue
         if twice:
             yield Case(False, event.opened, expected, f"message {_list(twice)} more than once", cause)

@@ -67,11 +67,12 @@ def read_exact(trace: Topics, ros: RosMap) -> Iterator[Outcome]:
 
 
 def _with_older(trace: Topics) -> Iterator[tuple[Shown, list[Shown]]]:
-    """Yield each message with those that the same operation showed before it, and that are not equal to it."""
+    """Yield each message with those that were published on its topic before it, and that are not equal to it."""
     before: dict[str, list[Shown]] = {}
     for answer in trace.probes:
-        older = before.setdefault(answer.operation, [])
-        yield answer, [each for each in reversed(older) if each.value != answer.value]
+        older = before.setdefault(answer.topic, [])
+        other = (replace(each, operation=answer.operation) for each in reversed(older) if each.value != answer.value)
+        yield answer, list(other)
         older.append(answer)
 
 
@@ -133,13 +134,8 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
         for message in burst.sent:
             if message.is_wrong and message.accepted and burst.heard:
                 came = f"{message.exchange.came}, and the message {burst.heard[0].value[:_SHOWN]}"
-                yield Case(
-                    False,
-                    message.exchange,
-                    f"an error status for {message.what}",
-                    came,
-                    f"{message.operation} {message.what}",
-                )
+                expected, cause = f"an error status for {message.what}", f"{message.operation} {message.what}"
+                yield Case(False, message.exchange, expected, came, cause)
             if not message.accepted or not message.value:
                 continue
             wanted = json.loads(message.value)

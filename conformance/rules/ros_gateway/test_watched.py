@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 from conformance.rules.ros_gateway.test_topics import SLACK_S, reads_of, rows
 from conformance.scenarios.ros.watching import Look, Watched, topic_watches
-from conformance.scenarios.ros.web import Difference, differences, differing, document_of, is_success
+from conformance.scenarios.ros.web import differences, differing, document_of, is_success
 from conformance.scenarios.rule import Note, Outcome, rule
 from conformance.statement.ros_map import RosMap
 from conformance.verdict.evidence import Case
@@ -29,11 +29,6 @@ def _places(one: Watched, ros: RosMap) -> list[tuple[Look, list[int]]]:
     return found
 
 
-def _differences(one: Watched, look: Look, value: dict[str, Any], ros: RosMap) -> list[Difference]:
-    document = document_of(look.exchange.response.body)
-    return differences(document, value, one.definition, reads_of(ros, one.operation), ros)
-
-
 @rule("ros-gateway/read-exact", on=(topic_watches,))
 def watched_exact(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each message that is returned is one that was published."""
@@ -51,7 +46,8 @@ def watched_exact(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
                 yield Case(True, look.exchange, f"a message that was published on {watch.topic}")
                 continue
             near = [each for each in watch.heard if each.at < look.sent + SLACK_S] or list(watch.heard)
-            every = [_differences(watch, look, json.loads(each.value), ros) for each in near]
+            document, reads = document_of(look.exchange.response.body), reads_of(ros, watch.operation)
+            every = [differences(document, json.loads(each.value), watch.definition, reads, ros) for each in near]
             own, web = rows(min(every, key=len))
             expected = f"a message that was published on {watch.topic}; the most similar one has {own}"
             yield Case(False, look.exchange, expected, web, watch.operation)
@@ -69,9 +65,8 @@ def watched_fresh(trace: tuple[Watched, ...], ros: RosMap) -> Iterator[Outcome]:
             next_at = watch.heard[found[-1] + 1].at if found[-1] + 1 < len(watch.heard) else look.sent
             expected = f"a message on {watch.topic} that was the last one {within_s:g} s before, or a newer one"
             late_s = look.sent - next_at
-            yield Case(
-                late_s <= within_s, look.exchange, expected, f"one {late_s:.1f} s after the next", watch.operation
-            )
+            came = f"one {late_s:.1f} s after the next"
+            yield Case(late_s <= within_s, look.exchange, expected, came, watch.operation)
 
 
 @rule("ros-gateway/read-newest", on=(topic_watches,))

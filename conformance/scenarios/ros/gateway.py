@@ -20,7 +20,7 @@ from conformance.scenarios.ros.samples import Maker
 from conformance.scenarios.ros.web import document_for, document_of
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_calls import NAME
-from conformance.statement.ros_map import Acts, Body, Calls, Lists, Publishes, Reads, RosMap
+from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Reads, RosMap
 from conformance.transport.exchange import Exchange, Outgoing, Response
 from conformance.transport.rosbridge import Subscription
 from conformance.transport.streams import Message, Stream
@@ -34,9 +34,7 @@ PACE_S: Final = 0.03
 #: PATIENCE_S: additional time for a busy machine to show the last messages, s. _DISCOVERY_S: to discover the graph, s.
 PATIENCE_S: Final = 10.0
 _DISCOVERY_S: Final = 15.0
-_KEYS: Final[dict[type, str]] = {
-    Reads: "topic", Publishes: "publishes", Calls: "service", Acts: "action", Lists: "lists"
-}  # fmt: skip
+_KEYS: Final[dict[type, str]] = {kind: name for name, kind in KINDS.items()}
 #: What of a type an operation is sent.
 _PARTS: Final[dict[type, str]] = {Calls: "#Request", Acts: "#Goal"}
 
@@ -130,9 +128,7 @@ class Gateway:
             NotPossibleError: it is a real one, and may not be moved.
         """
         if not (self.plays or self.run.allow_motion):
-            raise NotPossibleError(
-                "it sends something to the robot: give --ros-play (the suite is the robot) or --allow-motion"
-            )
+            raise NotPossibleError("it sends to the robot: give --ros-play (the suite is the robot) or --allow-motion")
 
     def definition(self, name: str) -> Definition:
         """Return the definition of a type.

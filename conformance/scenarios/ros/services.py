@@ -183,11 +183,8 @@ class _Caller:
 
     def calls(self, effort: Effort) -> Iterator[Called]:
         """Yield calls of a server in each of its states."""
-        pairs = zip(
-            self._finite(self._requests, _CALLS[effort.name]),
-            self._finite(self._responses, _CALLS[effort.name]),
-            strict=False,
-        )
+        finite = (self._finite(maker, _CALLS[effort.name]) for maker in (self._requests, self._responses))
+        pairs = zip(*finite, strict=False)
         yield self._call_server(Server.MISSING, {})
         self._serve([{"answer": {}}])
         yield self._reach_server(Server.RESPONDS)

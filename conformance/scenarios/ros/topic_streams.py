@@ -10,7 +10,6 @@ from typing import Any, Final
 from msgspec.structs import replace
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import PATIENCE_S, Gateway, exchange_of
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import differences, document_of
@@ -88,18 +87,15 @@ def topic_streams(gateway: Gateway, effort: Effort) -> tuple[Streamed, ...]:
 
 def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Streamed]:
     """Yield the messages of the streams of two clients, which are opened and closed for this."""
-    definition = gateway.definition(body.type)
-    maker, streams = gateway.maker(definition), [gateway.stream(call, body) for _ in range(2)]
+    maker, streams = gateway.maker(gateway.definition(body.type)), [gateway.stream(call, body) for _ in range(2)]
     robot, clock = gateway.robot, WALL_CLOCK
     try:
-        # The last of these may come late: each is another message than those that count.
-        robot.publish(body.topic, body.type, maker.usual().value, repeat_s=0.1)
+        before = gateway.complete(body.type, maker.usual().value)
+        robot.publish(body.topic, body.type, before, repeat_s=0.1)
         for stream in streams:
             stream.take_new(1, body.within_s + PATIENCE_S)
         robot.publish(body.topic, body.type)
         clock.sleep(_MORE_S + body.throttle_s)
-        for stream in streams:
-            stream.take_new()
         number, gap_s = _IN_A_ROW, _GAP_S
         if body.throttle_s:
             number, gap_s = _INTERVALS * _IN_EACH, body.throttle_s / _IN_EACH
@@ -110,53 +106,56 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
         for place, stream in enumerate(streams):
             how = f"{number} messages in a row, {('first', 'second')[place]} of two clients"
             how += f" after it has reconnected {turn} times" if turn else ""
-            came = _came(stream, 1 if body.throttle_s else number, body)
-            lasted_s = max(published_s, came[-1].at - came[0].at if came else 0.0)
-            shown = tuple(_match(gateway, stream, message, body, definition, values) for message in came)
-            opened = exchange_of(stream, came[-1] if came else Message(began, b""))
-            text = tuple(map(json.dumps, values))
-            yield Streamed(call, body, how, text, shown, lasted_s, opened, published.reliably)
-            if stream.last_id and not turn and [one for _, one in shown] == list(range(number)):
+            came = _came(gateway, stream, body, values, 1 if body.throttle_s else number, before)
+            opened = came[-1][0] if came else exchange_of(stream, Message(began, b""))
+            times = [exchange.response.received_s for exchange, _ in came] or [began]
+            text, lasted_s = tuple(map(json.dumps, values)), max(published_s, times[-1] - times[0])
+            yield Streamed(call, body, how, text, came, lasted_s, opened, published.reliably)
+            if stream.last_id and not turn and [one for _, one in came] == list(range(number)):
                 # The next ones are published while it is away (HTML Living Standard, 9.2.4).
                 stream.close()
                 away = [gateway.complete(body.type, maker.usual().value) for _ in range(_AWAY)]
                 robot.publish(body.topic, body.type, *away, gap_s=gap_s)
                 clock.sleep(_MORE_S)
                 back = streams[place] = gateway.stream(call, body, stream.last_id)
-                came = [*back.take_new(_AWAY, _RESUMES_S), *back.take_new(_AWAY, _MORE_S)]
-                shown = tuple(_match(gateway, back, message, body, definition, [*values, *away]) for message in came)
+                came = _came(gateway, back, body, [*values, *away], _AWAY, before, _RESUMES_S)
                 text, how = (*text, *map(json.dumps, away)), f"after {number} messages, with its Last-Event-ID"
-                yield Streamed(call, body, how, text, shown, 0.0, opened, published.reliably, number)
+                yield Streamed(call, body, how, text, came, 0.0, opened, published.reliably, number)
         if isinstance(streams[0], Subscription):
             streams[0].unsubscribe()
             clock.sleep(_MORE_S)
             streams[0].take_new()
             robot.publish(body.topic, body.type, *values)
-            came = streams[0].take_new(1, _MORE_S)
-            shown = tuple((exchange_of(streams[0], message), -1) for message in came)
+            came = tuple((exchange_of(streams[0], message), -1) for message in streams[0].take_new(1, _MORE_S))
             opened = exchange_of(streams[0], streams[0].last)
-            yield Streamed(call, body, "after it was unsubscribed from", (), shown, 0.0, opened, reliable=True)
+            yield Streamed(call, body, "after it was unsubscribed from", (), came, 0.0, opened, reliable=True)
     finally:
         for stream in streams:
             stream.close()
 
 
-def _came(stream: Stream, number: int, body: Reads) -> list[Message]:
-    """Return messages until the expected number, or no more can come, and those of a moment after."""
-    found: list[Message] = []
-    while len(found) < number and (more := stream.take_new(1, body.within_s)):
-        found += more
-    return [*found, *stream.take_new(number, _MORE_S + body.throttle_s)]
+def _came(
+    gateway: Gateway, stream: Stream, body: Reads, values: list[Any], number: int, before: Any, within_s: float = 0.0
+) -> tuple[tuple[Exchange, int], ...]:
+    """Return what came until the number or the last value is there, or none can come, and that of a moment after.
 
+    A busy gateway may still be sending the message from ``before`` those that count.
+    """
+    definition, known = gateway.definition(body.type), [*values, before]
+    found: list[tuple[Exchange, int]] = []
 
-def _match(
-    gateway: Gateway,
-    stream: Stream,
-    message: Message,
-    body: Reads,
-    definition: Definition,
-    values: list[dict[str, Any]],
-) -> tuple[Exchange, int]:
-    document = document_of(message.octets)
-    places = (n for n, value in enumerate(values) if not differences(document, value, definition, body, gateway.ros))
-    return exchange_of(stream, message), next(places, -1)
+    def take_new(count: int, within_s: float) -> bool:
+        messages = stream.take_new(count, within_s)
+        for message in messages:
+            document = document_of(message.octets)
+            alike = (n for n, one in enumerate(known) if not differences(document, one, definition, body, gateway.ros))
+            place = next(alike, -1)
+            if place != len(values):
+                found.append((exchange_of(stream, message), place))
+        return bool(messages)
+
+    within_s = within_s or body.within_s + PATIENCE_S
+    while len(found) < number and (not found or found[-1][1] < len(values) - 1) and take_new(1, within_s):
+        pass
+    take_new(number, _MORE_S + body.throttle_s)
+    return tuple(found)

@@ -15,7 +15,7 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import content_of, differences, document_of, equal, is_success
+from conformance.scenarios.ros.web import content_of, differences, differing, document_of, equal, is_success
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -99,8 +99,9 @@ def topic_reads(gateway: Gateway, effort: Effort) -> Topics:
     with partial_trace(lambda: Topics(tuple(shown), definitions)):
         for call, reads in gateway.of(Reads):
             definitions[call] = gateway.definition(reads.type)
+            older = [json.loads(one.value) for one in shown if one.topic == reads.topic]
             with gateway.robot.publishing(reads.topic):
-                shown.extend(_Reader(gateway, call, reads, definitions[call]).publish_samples(effort))
+                shown.extend(_Reader(gateway, call, reads, definitions[call], older).publish_samples(effort))
     return Topics(tuple(shown), definitions)
 
 
@@ -110,6 +111,7 @@ class _Reader:
     call: str
     reads: Reads
     definition: Definition
+    older: list[dict[str, Any]]
     contents: set[str] = field(default_factory=set)
 
     def publish_samples(self, effort: Effort) -> Iterator[Shown]:
@@ -168,7 +170,12 @@ class _Reader:
 
     def is_stale(self, exchange: Exchange) -> bool:
         """Return whether a response shows no message, or one that was shown before."""
-        return not is_success(exchange, self.reads) or content_of(exchange, self.reads) in {"None", *self.contents}
+        if not is_success(exchange, self.reads) or content_of(exchange, self.reads) in {"None", *self.contents}:
+            return True
+        # Another operation showed it.
+        document = document_of(exchange.response.body)
+        found = (differing(document, value, self.definition, self.reads, self.gateway.ros) for value in self.older)
+        return any(next(fields, None) is None for fields in found)
 
 
 @dataclass(frozen=True)
@@ -264,8 +271,7 @@ class _Writer:
         Raises:
             NotPossibleError: nothing comes.
         """
-        robot, topic = self.gateway.robot, self.body.publishes
-        clock = WALL_CLOCK
+        robot, topic, clock = self.gateway.robot, self.body.publishes, WALL_CLOCK
         until = clock.now() + 2 * self.body.within_s
         while True:
             self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
@@ -321,11 +327,8 @@ class _Writer:
 
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
         """Yield each message with its outcome."""
-        if self.gateway.plays:
-            samples = list(self.maker.samples(_SAMPLES[effort.name], large=_LARGE[effort.name]))
-        else:
-            samples = [self.maker.gentle() for _ in range(_BURST)]
-        for sample in samples:
+        extreme = self.maker.samples(_SAMPLES[effort.name], large=_LARGE[effort.name])
+        for sample in extreme if self.gateway.plays else (self.maker.gentle() for _ in range(_BURST)):
             if sample.kind is Kind.NON_FINITE and self.gateway.ros.non_finite != "string":
                 # JSON has no such number, and null may be refused as well.
                 continue

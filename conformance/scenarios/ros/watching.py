@@ -76,14 +76,13 @@ def _watch_topic(gateway: Gateway, call: str, reads: Reads, number: int) -> Watc
     """Return the reads and messages of a topic, or None if it is silent."""
     robot, clock = gateway.robot, WALL_CLOCK
     definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.within_s
-    best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-    heard = robot.take_heard(reads.topic, 1, reads.within_s)
-    if not heard:
+    for _ in range(2):
+        best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
+        if heard := robot.take_heard(reads.topic, 1, reads.within_s):
+            break
         # Publishers that were found meanwhile may be of best effort, which a reliable subscriber does not hear.
         robot.tell("forget", name=reads.topic)
-        best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
-        heard = robot.take_heard(reads.topic, 1, reads.within_s)
-    if not heard:
+    else:
         return None
     # From now on, what the gateway has must be one that was heard.
     clock.sleep(within_s)

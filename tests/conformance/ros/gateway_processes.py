@@ -48,7 +48,7 @@ def gateway(style: str, domain_id: int, folder: Path, faults: Iterable[str] = ()
     script = "rosbridge.py" if style == "node" else f"on_{style}.py"
     python = [sys.executable, _GATEWAYS / script, bridge if style == "node" else port, domain_id, ",".join(faults)]
     node = ["node", "--experimental-websocket", _GATEWAYS / "over_rosbridge.js", port, bridge]
-    commands = [python] + ([[*node, folder / "surface.json"]] if style == "node" else [])
+    commands = [python] + ([[*node, folder / "surface.json", ",".join(faults)]] if style == "node" else [])
     url = f"http://127.0.0.1:{port}"
     with ExitStack() as stack:
         for command in commands:

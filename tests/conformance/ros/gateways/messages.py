@@ -6,6 +6,7 @@ import importlib
 import json
 import math
 import struct
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +53,11 @@ class Forms:
         fields = {name: self._out(getattr(message, name), slot) for name, slot in slots.items()}
         if "fields swapped" in self.faults and "y" in slots:
             fields["x"], fields["y"] = fields["y"], fields["x"]
+        if "nanosec" in slots and "stamps as doubles" in self.faults:
+            seconds = message.sec + message.nanosec / 1e9
+            fields = {"sec": int(seconds), "nanosec": int(seconds % 1 * 1e9)}
+        if "nanosec" in slots and "stamps of the request" in self.faults:
+            fields = {"sec": int(time.time()), "nanosec": 0}
         return fields
 
     def read(self, value: Any, kind: type, place: str = "") -> Any:
@@ -98,8 +104,9 @@ class Forms:
     def _array_out(self, value: Any, kind: AbstractNestedType) -> Any:
         if _octets(kind):
             octets = b"".join(one if isinstance(one, bytes) else bytes([int(one) & 255]) for one in value)
+            octets = octets[:65536] if "arrays cut" in self.faults else octets
             return base64.b64encode(octets).decode() if self.bytes == "base64" else list(octets)
-        return [self._out(one, kind.value_type) for one in value]
+        return [self._out(one, kind.value_type) for one in (value[:1000] if "arrays cut" in self.faults else value)]
 
     def _wide(self, value: int) -> Any:
         if "2^53" in self.faults:
@@ -107,6 +114,7 @@ class Forms:
         return str(value) if self.integers == "string" else value
 
     def _text(self, value: str) -> str:
+        value = value[:255] if "texts cut" in self.faults else value
         return value.encode("ascii", "replace").decode() if "ascii" in self.faults else value
 
     def _number(self, value: float) -> Any:
@@ -114,7 +122,7 @@ class Forms:
             return round(value, 6) if "6 digits" in self.faults else value
         if "NaN as 0" in self.faults:
             return 0.0
-        if self.non_finite == "null":
+        if (self.non_finite == "null") is not ("NaN unsaid" in self.faults):
             return None
         return next(word for word, meant in _WORDS.items() if repr(meant) == repr(value))
 
@@ -169,7 +177,7 @@ class Forms:
             number = math.inf
         if not math.isfinite(number) or (name == "float" and abs(number) > _FLOAT32_MOST):
             raise RefusedError(f"{place} is beyond what ROS can hold")
-        return number
+        return round(number, 6) if "6 digits sent" in self.faults else number
 
     def _integer(self, value: Any, name: str, place: str) -> Any:
         wide = name in {"int64", "uint64"}
@@ -178,6 +186,8 @@ class Forms:
         if isinstance(value, bool) or not isinstance(value, int):
             raise RefusedError(f"{place} is not an integer")
         lowest, highest = _range(name)
+        if "integers wrap" in self.faults:
+            value = (value - lowest) % (highest - lowest + 1) + lowest
         if not lowest <= value <= highest:
             raise RefusedError(f"{place} is not from {lowest} to {highest}")
         if wide and "2^53" in self.faults:

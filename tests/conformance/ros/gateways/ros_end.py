@@ -42,11 +42,15 @@ class Goal:
     status: int = GoalStatus.STATUS_EXECUTING
     feedback: list[Any] = field(default_factory=list)
     result: Any = None
+    reads: int = 0
 
     def latest(self) -> Any:
         """Return the last feedback, or None."""
         if not self.feedback:
             return None
+        self.reads += 1
+        if "feedback goes back" in self.faults and self.reads % 2:
+            return self.feedback[-2:][0]
         return self.feedback[0 if "first feedback for ever" in self.faults else -1]
 
 
@@ -56,6 +60,7 @@ class _Heard:
     callback: Callable[[Any], None] | None
     subscription: Any = None
     quality: tuple[ReliabilityPolicy, DurabilityPolicy] | None = None
+    is_deaf: bool = False
 
 
 class RosEnd:
@@ -72,7 +77,8 @@ class RosEnd:
         self.deadline_s = DEADLINE_S
         self.goals: dict[str, Goal] = {}
         self._before: dict[str, Any] = {}
-        self._reads = 0
+        self._reads, self._sent, self._called, self._refused = 0, 0, 0.0, False
+        self._result: Any = None
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
         self.node = Node("gateway", context=self._context, start_parameter_services=False, enable_rosout=False)
@@ -107,8 +113,11 @@ class RosEnd:
         try:
             return self.forms.read(value, kind)
         except RefusedError:
+            self._refused = True
             if "invalid published" in self.faults and "/msg/" in end.type:
                 self.publish(end, kind())
+            if "invalid as default" in self.faults:
+                return kind()
             raise
 
     def subscribe(self, topic: str, kind: str, callback: Callable[[Any], None]) -> Callable[[], None]:
@@ -118,6 +127,8 @@ class RosEnd:
         self._heard.setdefault(topic, []).append(heard)
 
         def end() -> None:
+            if "subscriptions of streams left" in self.faults:
+                return
             heard.callback = None  # the executor may be waiting for it: its own thread destroys it
 
         return end
@@ -142,6 +153,8 @@ class RosEnd:
                     send(held[-2])
                 return
             send(held[-1])
+            if "stream doubles" in self.faults and len(held) % 4 == 0:
+                send(held[-1])
 
         return self.subscribe(end.ros, end.type, came)
 
@@ -149,6 +162,12 @@ class RosEnd:
         """Return the last message of a topic; None without one, or if it is too old."""
         topic, kind, max_age_s = end.ros, end.type, end.max_age_s
         message, at = self._last.get(topic, (None, 0.0))
+        while "calls hold up reads" in self.faults and self._waiting and time.monotonic() - self._called < DEADLINE_S:
+            time.sleep(_LOOK_S)
+        while "deadlock" in self.faults and self._waiting:
+            time.sleep(_LOOK_S)
+        if "subscriptions left" in self.faults:
+            self.node.create_subscription(interface(kind), topic, lambda _: None, 1)
         if message is None:
             return interface(kind)() if "empty at first" in self.faults else None
         if max_age_s is not None and time.monotonic() - at > max_age_s:
@@ -166,10 +185,6 @@ class RosEnd:
         """Publish a message."""
         publisher = self.publisher(end)
         with self._creating:
-            if "message dropped" in self.faults and end.name == "say":
-                self._held.append(message)
-                if len(self._held) % 3 == 0:
-                    return
             if "reordered" in self.faults:
                 self._held.append(message)
                 if len(self._held) == 2:
@@ -184,11 +199,20 @@ class RosEnd:
                 threading.Timer(0.3 * (len(self._held) % 2), publisher.publish, [message]).start()
                 self._held.append(message)
                 return
-            publisher.publish(message)
+            for _ in range(self._copies(end, is_crowd=is_crowd)):
+                publisher.publish(message)
             if "publishers left" in self.faults:
                 self.node.create_publisher(interface(end.type), end.ros, 1)
-            if "message doubled" in self.faults:
-                publisher.publish(message)
+
+    def _copies(self, end: End, *, is_crowd: bool) -> int:
+        """Return how often a message is published."""
+        was_refused, self._refused = self._refused, False
+        self._sent += end.name == "say"
+        is_dropped = "message dropped" in self.faults and end.name == "say" and self._sent % 3 == 0
+        is_dropped |= "message dropped in a crowd" in self.faults and is_crowd
+        is_dropped |= "lost after a refusal" in self.faults and was_refused
+        is_doubled = "doubled after a refusal" in self.faults and was_refused
+        return 0 if is_dropped else 1 + ("message doubled" in self.faults or is_doubled)
 
     def client(self, end: End) -> Any:
         """Return the client of a service."""
@@ -206,10 +230,14 @@ class RosEnd:
                 return None
             future.set_result(empty())
             return future
-        self._waiting += 1
+        self._waiting, self._called = self._waiting + 1, time.monotonic()
         if "call doubled" in self.faults:
             client.call_async(request)
         _passed_on(client.call_async(request), future, lambda response: self._served(end.ros, response))
+        if "call repeated" in self.faults:
+            threading.Timer(0.6, lambda: future.done() or client.call_async(request)).start()
+        if "silence as success" in self.faults:
+            threading.Timer(0.8 * DEADLINE_S, lambda: future.done() or future.set_result(empty())).start()
         return future
 
     def send_goal(self, end: End, request: Any) -> tuple[str, Goal, Future] | None:
@@ -232,11 +260,12 @@ class RosEnd:
             handle.get_result_async().add_done_callback(lambda done: self._finished(goal, done.result()))
             return True
 
-        self._ask(
-            lambda: client.send_goal_async(request, lambda came: goal.feedback.append(came.feedback)),
-            accepted,
-            responded,
-        )
+        def progressed(came: Any) -> None:
+            goal.feedback.append(came.feedback)
+            if "succeeded at once" in self.faults:
+                goal.status = GoalStatus.STATUS_SUCCEEDED
+
+        self._ask(lambda: client.send_goal_async(request, progressed), accepted, responded)
         return name, goal, accepted
 
     def goal(self, name: str) -> Goal | None:
@@ -249,13 +278,24 @@ class RosEnd:
         if "cancel lost" in self.faults:
             canceled.set_result(result=True)
             return canceled
-        self._ask(goal.handle.cancel_goal_async, canceled, lambda response: bool(response.goals_canceling))
+        for other in self.goals.values() if "all goals canceled" in self.faults else ():
+            if other.status == GoalStatus.STATUS_EXECUTING and other.handle and other is not goal:
+                other.handle.cancel_goal_async()
+
+        def responded(response: Any) -> bool:
+            is_wrong = "refused cancel as canceled" in self.faults and not response.goals_canceling
+            goal.status = GoalStatus.STATUS_CANCELED if is_wrong else goal.status
+            return is_wrong or bool(response.goals_canceling)
+
+        self._ask(goal.handle.cancel_goal_async, canceled, responded)
         return canceled
 
     def topics(self) -> dict[str, str]:
         """Return the topics of the graph, with their types."""
         found = {name: kinds[0] for name, kinds in self.node.get_topic_names_and_types()}
         there = {name: kind for name, kind in found.items() if self._ends_of(name)}
+        if "list without namespaces" in self.faults:
+            return {"/" + name.rpartition("/")[2]: kind for name, kind in there.items()}
         if "list keeps what is gone" in self.faults:
             self._topics |= there
             return self._topics
@@ -277,9 +317,18 @@ class RosEnd:
         return response
 
     def _finished(self, goal: Goal, done: Any) -> None:
-        is_wrong = "aborted as succeeded" in self.faults and done.status == GoalStatus.STATUS_ABORTED
+        if "refused cancel as canceled" in self.faults and goal.status == GoalStatus.STATUS_CANCELED:
+            return
+        wrong = {
+            ("aborted as succeeded", GoalStatus.STATUS_ABORTED): GoalStatus.STATUS_SUCCEEDED,
+            ("canceled as aborted", GoalStatus.STATUS_CANCELED): GoalStatus.STATUS_ABORTED,
+            ("canceled as succeeded", GoalStatus.STATUS_CANCELED): GoalStatus.STATUS_SUCCEEDED,
+        }
         goal.result = type(done.result)() if "result lost" in self.faults else done.result
-        goal.status = GoalStatus.STATUS_SUCCEEDED if is_wrong else done.status
+        if "result of another goal" in self.faults:
+            goal.result, self._result = self._result or done.result, done.result
+        statuses = [status for (fault, was), status in wrong.items() if fault in self.faults and was == done.status]
+        goal.status = statuses[0] if statuses else done.status
 
     def _came(self, topic: str, message: Any) -> None:
         if "first message for ever" in self.faults and topic in self._last:
@@ -305,12 +354,19 @@ class RosEnd:
         """Subscribe with the reliability and durability of the topic's publishers."""
         found = [one.qos_profile for one in self.node.get_publishers_info_by_topic(topic)]
         reliable = all(one.reliability == ReliabilityPolicy.RELIABLE for one in found)
-        latched = bool(found) and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in found)
+        latched = (
+            "volatile only" not in self.faults
+            and bool(found)
+            and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in found)
+        )
         quality = (
             ReliabilityPolicy.RELIABLE if reliable or "reliable only" in self.faults else ReliabilityPolicy.BEST_EFFORT,
             DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
-        if quality == heard.quality or (heard.quality and not found):
+        if "deaf after a publisher" in self.faults and heard.quality and not found and topic in self._last:
+            heard.is_deaf = True
+            self.node.destroy_subscription(heard.subscription)
+        if heard.is_deaf or quality == heard.quality or (heard.quality and not found):
             return
         old, heard.quality = heard.subscription, quality
         profile = QoSProfile(depth=_DEPTH, reliability=quality[0], durability=quality[1])
