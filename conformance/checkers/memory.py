@@ -32,6 +32,7 @@ from conformance.api.rest.things import (
     parts_of,
 )
 from conformance.checkers.occasion import Occasion
+from conformance.checkers.writes import DEFAULTED
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
@@ -194,6 +195,7 @@ class Memory:
             return
         item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
         made = self._of_collections.get(operation.template.rstrip("/")) if operation is not None else None
+        yield from self._replaced(occasion)
         if operation is None or not occasion.response.ok:
             self.forget()
         elif item is not None and method in {"PUT", "PATCH", "DELETE"}:
@@ -344,6 +346,12 @@ class Memory:
                 cause, doubt = f"{operation.label} {name}", "the default may stand for a value that the device chooses"
                 doubt = "" if isinstance(one, int | float) else doubt
                 yield occasion.case("description/defaults", not other, expected, other, cause=cause, doubt=doubt)
+
+    def _replaced(self, occasion: Occasion) -> Iterator[Case]:
+        """Judge the response to a PUT whose description says that what is left out has its default."""
+        operation = occasion.operation if occasion.request.method == "PUT" else None
+        if operation is not None and occasion.response.status == HTTPStatus.OK and DEFAULTED.search(operation.text):
+            yield from self._defaults(occasion, operation)
 
     def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         """Judge whether a request has written members that the device sets, or members that never change."""

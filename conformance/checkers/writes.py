@@ -60,7 +60,8 @@ GONE: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\b(?:gone|removed|deleted|cleared|unset)\b",
     re.IGNORECASE,
 )
-_DEFAULTED: Final = re.compile(
+#: Phrases in a description which say that what a PUT leaves out has its default.
+DEFAULTED: Final = re.compile(
     r"\b(?:not (?:sent|given|named)|left out|omitted|missing|absent)\b[^.]*\bdefault", re.IGNORECASE
 )
 _STAYS: Final = re.compile(
@@ -467,7 +468,7 @@ class Writes:
             of = "the default of what" if "default" in given else "which"
             expected = f"{clip(default) if 'default' in given else 'no value'} as {name}, {of} {change.label} left out"
             found, cause = f"{clip(now)} as {name}, as before", f"{item.label} {name}"
-            doubt = "" if _DEFAULTED.search(change.operation.text) else "PUT may keep what it leaves out"
+            doubt = "" if DEFAULTED.search(change.operation.text) else "PUT may keep what it leaves out"
             yield occasion.case(_DEFAULTS, not is_kept, expected, found, cause=cause, doubt=doubt)
 
     def _judge_merge(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:

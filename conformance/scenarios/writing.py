@@ -157,12 +157,21 @@ class Writer:
         whole = {**base, **{name: now[name] for name in made[0] if name in now and name in base}}
         values = another(schema, whole, 1, self.values.collections)
         chosen = {name: value for name, value in values.items() if value != whole.get(name)}
-        chosen |= {name: one for name, one in other_texts(schema, whole).items() if name in chosen}
+        texts = other_texts(schema, whole)
+        chosen |= {name: one for name, one in texts.items() if name in chosen or whole[name] is None}
         parts, found = flat(schema).get("properties", {}), list[dict[str, Any]]()
         for name, value in chosen.items():
             body = {name: value} if change.method == "PATCH" else {**whole, name: value}
             found += [body] if may(name, parts[name]) and fits(schema, body) else []
-        return [*found[:_MEMBERS], *([whole] if found and fits(schema, whole) else [])]
+        # A PUT of all members, and one that leaves out what it may, show defaults.
+        least = {name: whole[name] for name in flat(schema).get("required", ()) if name in whole}
+        every = {**whole, **{name: one for name, one in chosen.items() if may(name, parts[name])}}
+        is_put = change.method == "PUT" and least != whole and fits(schema, least) and fits(schema, every)
+        return [
+            *found[:_MEMBERS],
+            *([every, least] if found and is_put else []),
+            *([whole] if found and fits(schema, whole) else []),
+        ]
 
     def with_items(
         self, operation: Operation, bodies: list[dict[str, Any]], turn: int, *, whole: bool = False

@@ -210,8 +210,9 @@ def _matching(encoded: str) -> str:
 
 
 def other_texts(schema: Schema, value: dict[str, Any]) -> dict[str, str]:
-    """Return another text, beyond ASCII, for each free text of an object."""
+    """Return another text, beyond ASCII, for each free text of an object, also for one that is null."""
     parts = flat(schema).get("properties", {})
-    free = [name for name, one in value.items() if isinstance(one, str) and name in parts and is_free_text(parts[name])]
+    texts = [name for name, one in value.items() if isinstance(one, str) or one is None]
+    free = [name for name in texts if name in parts and is_free_text(parts[name])]
     found = {name: [text for text in TEXTS if text != value[name] and fits(parts[name], text)] for name in free}
     return {name: texts[0] for name, texts in found.items() if texts}
