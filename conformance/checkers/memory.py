@@ -195,7 +195,7 @@ class Memory:
             return
         item = self._items.get(operation.template.rstrip("/")) if operation is not None else None
         made = self._of_collections.get(operation.template.rstrip("/")) if operation is not None else None
-        yield from self._replaced(occasion)
+        yield from self._judge_replacement(occasion)
         if operation is None or not occasion.response.ok:
             self.forget()
         elif item is not None and method in {"PUT", "PATCH", "DELETE"}:
@@ -347,7 +347,7 @@ class Memory:
                 doubt = "" if isinstance(one, int | float) else doubt
                 yield occasion.case("description/defaults", not other, expected, other, cause=cause, doubt=doubt)
 
-    def _replaced(self, occasion: Occasion) -> Iterator[Case]:
+    def _judge_replacement(self, occasion: Occasion) -> Iterator[Case]:
         """Judge the response to a PUT whose description says that what is left out has its default."""
         operation = occasion.operation if occasion.request.method == "PUT" else None
         if operation is not None and occasion.response.status == HTTPStatus.OK and DEFAULTED.search(operation.text):
