@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from reports.attestation.envelope import ENVELOPE_NAME, open_envelope, read_envelope, statement_in
 from reports.attestation.statement import RESULT_SUBJECT, sha256
-from reports.certificate.moves_drawn import pictures
+from reports.certificate.moves_drawn import grid, pictures
 from reports.certificate.page import Seal, certificate_html, certificate_print
-from reports.certificate.states_shown import grid
 from reports.errors import ReportError, ResultMissingError, ResultUnsignableError
-from reports.fleet.page import fleet_html, fleet_markdown
-from reports.formats.catalogue import FORMATS
-from reports.formats.ci_systems import latency_junit
+from reports.fleet import fleet_html, fleet_markdown
+from reports.formats.catalogue import FORMATS, latency_junit
 from reports.given_files import read_octets, showing
 from reports.pages.page import write_pages
 from reports.reading import FLEET_NAME, LATENCY_NAME, RESULT_NAME, read_fleet, read_latency, read_result

@@ -241,7 +241,7 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
     if options.plan:
         return _plan(chosen, options, contract)
     if chosen.motion_map is not None and not contract.is_claimed:
-        from conformance.engine.map_faults import check_map  # noqa: PLC0415 - of a map alone
+        from conformance.engine.map_text import check_map  # noqa: PLC0415 - of a map alone
 
         check_map(_run(chosen, options, contract), statement)
     if options.drive:

@@ -31,7 +31,7 @@ def init(path: Path | None, chosen: Statement, contract: Contract, *, force: boo
     Raises:
         click.UsageError: no file is named, or it exists.
     """
-    from conformance.engine.first_statement import write_first_statement  # noqa: PLC0415 - only --init needs it
+    from conformance.engine.first_described import write_first_statement  # noqa: PLC0415 - only --init needs it
 
     path = _new_file(path, force=force)
     problem = write_first_statement(path, chosen, contract)

@@ -15,7 +15,7 @@ from conformance.statement.statement import StatementError, empty_statement, loa
 from conformance.verdict.finding import count_of
 
 if TYPE_CHECKING:
-    from conformance.engine.judge_stored import Judged
+    from conformance.engine.stored_result import Judged
     from conformance.verdict.verdicts import Verdict
 
 _FAIL = "fail"
@@ -101,8 +101,8 @@ def _judge_folder(
         StatementError: the statement is invalid.
     """
     # Imported here, so that --help stays quick.
-    from conformance.engine.judge_stored import judge_stored  # noqa: PLC0415
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415
+    from conformance.engine.stored_result import judge_stored  # noqa: PLC0415
     from conformance.history.events import HistoryError  # noqa: PLC0415
     from conformance.scenarios.stored import TracesError  # noqa: PLC0415
     from conformance.verdict.run import Run  # noqa: PLC0415

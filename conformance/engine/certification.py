@@ -18,10 +18,9 @@ from conformance.commandline.secrecy import SECRETS
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, ROS, SOAP
 from conformance.engine.checks_plugin import ChecksPlugin
-from conformance.engine.interruption import note_signals
 from conformance.engine.motion_answers import answers
 from conformance.engine.planning import conftests, pytest_options
-from conformance.engine.progress import Progress
+from conformance.engine.progress import Progress, note_signals
 from conformance.engine.resending import look_again, mask
 from conformance.engine.result import RESULT_NAME, left_out, result_document, rfc3339, write_result
 from conformance.engine.robot_under_test import RobotUnderTest

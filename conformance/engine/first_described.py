@@ -1,25 +1,337 @@
-"""``roaas certify --init`` for a device that is judged by its own description: a statement with its operations."""
+"""``roaas certify --init``: write a first statement: operations, and a motion map as names suggest one."""
 
 from __future__ import annotations
 
+import json
 import os
+import posixpath
+import re
+import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
 from conformance.api.call_rules import CallRules
+from conformance.commandline.help_pages import inert
 from conformance.commandline.out_folder import write_atomically
+from conformance.contract.classes import Interface
+from conformance.contract.pack import Contract
 from conformance.contract.toml_file import basic_string
 from conformance.documents.description import Description, DescriptionError, is_url
-from conformance.documents.json_schema import UnresolvedError, kinds_of
+from conformance.documents.json_schema import Schema, UnresolvedError, kinds_of
 from conformance.documents.openapi import Operation, read_operations
 from conformance.documents.writing import json_text
-from conformance.engine.first_motion import proposed_map, why_no_map
+from conformance.engine.commanded import (
+    Commanded,
+    axis_of,
+    body_schema,
+    bounds_of,
+    commanded_by,
+    is_velocity,
+    numbers_in,
+    parts_of,
+    unit_of,
+    with_query,
+)
+from conformance.engine.finding import stop_beside
+from conformance.engine.map_text import direction_line, inline, key, template_of
+from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.statement.endpoints import Endpoints
-from conformance.statement.statement import Api, Calls
+from conformance.statement.statement import Api, Calls, Statement
+from conformance.target.connecting import connection_of
+from conformance.transport.client import HttpClient
+from conformance.transport.exchange import NoAnswerError
+from conformance.verdict.run import Run
+
+_CONTRACT_TEMPLATE = """\
+# Implementation conformance statement: what the vendor says of the robot, and what it is then judged by.
+# Written from the robot's own descriptions; look over every line, then: roaas certify {file} --allow-motion
+
+[robot]
+name = {name}
+vendor = ""
+version = {version}
+
+[endpoints]
+{endpoints}
+# ca_file = "ca.pem"         # authorities to trust for https
+# token_file = "token"       # holds a bearer token
+# request_rate = 100         # ceiling, requests per second
+# timeout_s = 10             # deadline of one request
+
+[claims]
+# profile = "full"           # claims all; beside or instead of single classes
+classes = [
+{claims}]
+"""
+
+
+def write_first_statement(path: Path, known: Statement, contract: Contract) -> str:
+    """Connect to the robot and write a commented statement.
+
+    Returns:
+        Why the robot could not be reached, or an empty text.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    robot = RobotUnderTest(Run(known, contract), connection_of(known.endpoints))
+    robot.connect(sys.stderr)
+    if not robot.was_reached:
+        return "; ".join(f"{name}: {why}" for name, why in robot.run.unreachable.items())
+    info = _openapi(robot.rest.client).get("info", {}) if robot.rest else {}
+    info = info if isinstance(info, dict) else {}
+    doubts = _doubts(robot)
+    lines = [f'  "{name}",' if name not in doubts else f'  # "{name}",  # {doubts[name]}' for name in contract.classes]
+    write_atomically(
+        path,
+        _CONTRACT_TEMPLATE.format(
+            file=path.name,
+            name=_quote(info.get("title", "")),
+            version=_quote(info.get("version", "")),
+            endpoints="\n".join(_endpoints(robot)),
+            claims="".join(f"{line}\n" for line in lines),
+        )
+        + robot.device.statement_template,
+    )
+    return ""
+
+
+def _quote(text: Any) -> str:
+    return basic_string(str(text)[:200])
+
+
+def _openapi(rest: HttpClient) -> dict[str, Any]:
+    try:
+        answer = rest.send("GET", "/openapi.json").response
+        document = json.loads(answer.body) if answer.ok else {}
+    except (NoAnswerError, ValueError, RecursionError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def _endpoints(robot: RobotUnderTest) -> list[str]:
+    where = robot.run.statement.endpoints
+    lines = []
+    for name, interface, value in (
+        ("rest", Interface.REST, where.rest),
+        ("publishers_wsdl", Interface.PUBLISHERS, where.publishers_wsdl),
+        ("subscribers_wsdl", Interface.SUBSCRIBERS, where.subscribers_wsdl),
+        ("publishers_endpoint", Interface.PUBLISHERS, where.publishers_endpoint),
+        ("subscribers_endpoint", Interface.SUBSCRIBERS, where.subscribers_endpoint),
+    ):
+        why = inert(robot.run.unreachable.get(interface, ""))
+        remark = f"  # did not answer: {why}" if why else ""
+        lines.append(f"{name} = {_quote(value)}{remark}" if value else f'# {name} = ""')
+    return lines
+
+
+def _descriptions_missing(robot: RobotUnderTest) -> list[str]:
+    """Return the names of the descriptions that the robot does not serve."""
+    asked: list[tuple[HttpClient, str, str]] = []
+    if robot.rest:
+        asked += [(robot.rest.client, path, path) for path in ("/openapi.json", "/application.wadl")]
+    asked += [(there.client, f"{there.path}?wsdl", f"?wsdl of {name}") for name, there in robot.soap.there.items()]
+    missing = []
+    for client, path, told in asked:
+        try:
+            served = client.send("GET", path).response.ok
+        except NoAnswerError:
+            served = False
+        if not served:
+            missing.append(told)
+    return missing
+
+
+def _doubts(robot: RobotUnderTest) -> dict[str, str]:
+    """Return, by class, why the robot does not seem to implement it."""
+    unreached = robot.run.unreachable
+    doubts: dict[str, str] = {
+        name: f"no address for {' and '.join(missing)}"
+        for name, missing in robot.run.statement.lacking(robot.run.contract).items()
+    }
+    for name, item in robot.run.contract.classes.items():
+        silent = [interface for interface in item.interfaces if interface in unreached]
+        if silent:
+            doubts.setdefault(name, f"{' and '.join(silent)} did not answer")
+    doubts = {**robot.device.doubts, **doubts}
+    if "describe" not in doubts:
+        missing = _descriptions_missing(robot)
+        if missing:
+            doubts["describe"] = f"the robot serves no {' and no '.join(missing)}"
+    if robot.rest and "rest-formats" not in doubts:
+        try:
+            answer = robot.rest.client.send("GET", robot.rest.path, headers=[("Accept", "application/xml")]).response
+            xml = answer.media_type == "application/xml"
+        except NoAnswerError:
+            xml = False
+        if not xml:
+            doubts["rest-formats"] = "the robot did not send XML when asked for it"
+    return doubts
+
+
+_GOES: Final = re.compile(r"goto|go_to|go-to|move|target|goal|pose|position|joint", re.IGNORECASE)
+_STAMP: Final = re.compile(r"stamp|timestamp", re.IGNORECASE)
+_MEASURED: Final = re.compile(r"twist|velocit|speed", re.IGNORECASE)
+
+
+class _Pair(NamedTuple):
+    """What is sent and where it is read: the numbers that are commanded, by their places in a state, or in one each."""
+
+    state: Operation
+    sent: Operation
+    places: Mapping[str, Commanded]
+    reads: Mapping[str, Operation] = {}
+
+
+def proposed_map(operations: Sequence[Operation]) -> Iterator[str]:
+    """Yield the lines of a map; nothing where no names suggest one.
+
+    What is sent and what is read are taken for one axis if they have the same name.
+    """
+    reading = [item for item in operations if item.safe and item.shape]
+    acting = [with_query(item) for item in operations if not (item.safe or item.never)]
+    sending = [(item, numbers) for item in acting if (numbers := commanded_by(item))]
+    goes = _best(reading, [one for one in sending if not is_velocity(*one) and _GOES.search(one[0].label)], _position)
+    drives = _best(reading, [one for one in sending if is_velocity(*one)], _velocity)
+    goes = goes or max(
+        (pair for item in sending if not is_velocity(*item) if (pair := _axis_by_axis(reading, *item))),
+        key=lambda pair: len(pair.places),
+        default=None,
+    )
+    first = goes or drives
+    if first is None:
+        return
+    # One reading tells all of a map.
+    drives = drives if drives and drives.state is first.state else None
+    schemas = dict(numbers_in(first.state.shape or {}))
+    schemas |= {at: one.shape or {} for at, one in first.reads.items()}
+    driven = {at: one for at, one in (drives.places if drives else {}).items() if not _MEASURED.search(at)}
+    axes = {at: one.name for at, one in {**driven, **(goes.places if goes else {})}.items()}
+    yield "[motion.state]"
+    yield f"read = {basic_string(first.state.label)}"
+    yield from (f"stamp = {basic_string(at)}" for at in _stamps(first.state.shape or {}))
+    yield ""
+    yield "[motion.state.axes]  # limits and units: yours"
+    for at, name in axes.items():
+        number = goes.places.get(at) if goes else None
+        least, most = (number and not number.is_relative and number.bounds) or bounds_of(schemas[at]) or (-0.1, 0.1)
+        own = "" if goes else ", tolerance = 0.05"
+        unit = basic_string(unit_of(at, schemas[at]))
+        read = first.reads.get(at, first.state)
+        own += "" if read is first.state else f", read = {basic_string(read.label)}"
+        place = basic_string(at.rpartition("#")[2])
+        yield f"{key(name)} = {{ at = {place}, unit = {unit}, limits = [{least:g}, {most:g}]{own} }}"
+    if goes:
+        yield ""
+        yield "[motion.goto]"
+        yield from _sending_lines(goes)
+        if any(command.is_relative for command in goes.places.values()):
+            yield "relative = true"
+        yield "tolerance = 0.05"
+        yield from _stop(operations, goes.sent)
+    if drives:
+        yield ""
+        yield "[motion.velocity]"
+        yield from _sending_lines(drives)
+        yield "tolerance = 0.05"
+        yield "# hold_s = 0.5  # so long after the last command it goes on"
+        yield ""
+        yield "[motion.velocity.axes]  # of: the axis that it changes, by scale at velocity 1"
+        for at, one in drives.places.items():
+            least, most = one.bounds or (-0.1, 0.1)
+            where = f"of = {basic_string(axes[at])}" if at in axes else f"at = {basic_string(at)}"
+            yield f"{key(one.name)} = {{ limits = [{least:g}, {most:g}], {where} }}"
+
+
+def why_no_map(operations: Sequence[Operation]) -> Iterator[str]:
+    """Yield a sentence on each operation that may move the device, where no map is proposed."""
+    for operation in (item for item in operations if not item.safe):
+        named = "" if operation.never else ", ".join(number.name for number in commanded_by(operation))
+        why = f"no GET tells numbers called {named}; --drive '{operation.label}' finds what shows them"
+        none = "it must never be called" if operation.never else "it takes no numbers"
+        yield f"{operation.label}: {why if named else none}."
+
+
+def _sending_lines(pair: _Pair) -> Iterator[str]:
+    """Yield how an operation is sent."""
+    yield f"send = {basic_string(pair.sent.label)}"
+    schema, numbers = body_schema(pair.sent), list(pair.places.values())
+    if schema is not None:
+        yield f"body = {inline(template_of(schema, {command.place: f'{{{command.name}}}' for command in numbers}))}"
+    yield from (direction_line(command) for command in numbers if command.direction)
+
+
+def _stop(operations: Sequence[Operation], move: Operation) -> Iterator[str]:
+    """Propose the stop beside a move."""
+    if (found := stop_beside(operations, move)) is not None:
+        yield ""
+        yield "[motion.stop]"
+        yield f"send = {basic_string(found.label)}"
+        body = body_schema(found)
+        if body is not None:
+            yield f"body = {inline(template_of(body, {}))}  # an id of the move: " + '"{goto:/id}"'
+        yield "rests_within_s = 0.5"
+
+
+def _belongs(state: Operation, sent: Operation) -> bool:
+    """Return whether whoever knows the path of what is sent can read a state."""
+    return {item.name for item in state.parameters if item.required} <= {item.name for item in sent.parameter("path")}
+
+
+def _axis_by_axis(reading: Sequence[Operation], sent: Operation, numbers: Sequence[Commanded]) -> _Pair | None:
+    """Return a pair of which an operation of its own, called as the number, tells each; None: some have none."""
+    folder, reads, places = posixpath.dirname(sent.template), dict[str, Operation](), dict[str, Commanded]()
+    for number in numbers:
+        for state in reading:
+            named = posixpath.basename(state.template).lower() == axis_of(number.place)
+            values = [at for at, _ in numbers_in(state.shape or {}) if at.rpartition("/")[2].lower() == "value"]
+            if named and values and posixpath.dirname(state.template) == folder and _belongs(state, sent):
+                at = f"{number.name}#{values[0]}"
+                reads[at], places[at] = state, number
+                break
+    return _Pair(next(iter(reads.values())), sent, places, reads) if len(places) == len(numbers) else None
+
+
+def _best(
+    reading: Sequence[Operation],
+    sending: Sequence[tuple[Operation, Sequence[Commanded]]],
+    place_of: Callable[[Commanded, Sequence[str]], str | None],
+) -> _Pair | None:
+    """Return the two operations of which most of what one commands is in the response of the other."""
+    found = []
+    for state in reading:
+        told = [at for at, _ in numbers_in(state.shape or {})]
+        for sent, numbers in ((sent, numbers) for sent, numbers in sending if _belongs(state, sent)):
+            # The first of several numbers of one name: in an ONVIF vector, pan comes before zoom.
+            places = {at: command for command in reversed(numbers) if (at := place_of(command, told)) is not None}
+            found.append(_Pair(state, sent, places))
+    return max(
+        (pair for pair in found if pair.places),
+        key=lambda pair: (len(pair.places), not any(one.is_relative for one in pair.places.values())),
+        default=None,
+    )
+
+
+def _position(number: Commanded, told: Sequence[str]) -> str | None:
+    """Return where a state tells the position of what is commanded."""
+    return next((at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place)), None)
+
+
+def _velocity(number: Commanded, told: Sequence[str]) -> str | None:
+    """Return where a state tells a velocity, or else the position that it changes."""
+    measured = (at for at in told if _MEASURED.search(at) and f"{at}/".endswith(f"{number.place}/"))
+    changed = (at for at in told if not _MEASURED.search(at) and axis_of(at) == axis_of(number.place))
+    return next(measured, None) or (next(changed, None) if axis_of(number.place).strip("xyz") else None)
+
+
+def _stamps(schema: Schema) -> list[str]:
+    found = [f"/{name}" for part in parts_of(schema) for name in part.get("properties", {}) if _STAMP.search(name)]
+    return found[:1]
+
 
 # _MOST_REASONS: operations without a proposed map that a comment names. _TEMPLATE: a first statement.
 _MOST_REASONS = 20

@@ -4,14 +4,14 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from conformance.cli.explanation import EFFORTS, NEEDS, Explanation, explanation_of, ledger_of, page_of
+from conformance.cli.explain import EFFORTS, NEEDS, Explanation, explanation_of, ledger_of, page_of
 from conformance.contract.classes import QUESTIONS, ConformanceClass, Origin
 from conformance.contract.generic import generic_classes
 from conformance.contract.ledger import Requirement
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, Source, Topic, topics
 from proof.mutation.self_test import self_test_of
-from reports.formats.code_hosts import page_of as clause_page
+from reports.formats.catalogue import page_of as clause_page
 
 _INDEX = """# Requirements
 

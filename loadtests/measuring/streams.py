@@ -1,4 +1,4 @@
-"""Listen to streams of a robot's state, and poll beside them: rate, jitter, gaps, and the age of the data on arrival.
+"""Listen to streams of a robot's state, and poll beside them: rate, jitter, gaps, and the age of the data.
 
 Streams are server-sent events (HTML Living Standard, section 9.2), WebSocket messages (RFC 6455), and topics of a
 rosbridge (its protocol v2, section 3.4). The age is this machine's clock less the stamp in a message. The polls show
@@ -6,7 +6,7 @@ what the robot's clock differs by from this machine's.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -17,6 +17,7 @@ import gevent
 import gevent.socket
 import httptools
 import msgspec
+import numpy as np
 from jsonpath import JSONPointer
 from websockets.client import ClientProtocol
 from websockets.exceptions import InvalidHandshake
@@ -32,6 +33,62 @@ from loadtests.clients.wire import now_ns
 from loadtests.measuring.clocks import RobotClock, stamp_of
 from loadtests.measuring.robot_process import is_here, same_machine
 from loadtests.settings.settings import Settings, Streams
+from loadtests.statistics.figures import rounded
+from loadtests.statistics.histogram import SHARES
+from loadtests.statistics.intervals import samples_for_point
+from loadtests.statistics.recorder import Offset
+
+_GAP = 2.0
+_ENOUGH = 3
+
+
+def stream_figures(
+    moments_ns: Sequence[int], ages_ms: Sequence[float], listened_s: float, offset: Offset | None
+) -> dict[str, Any]:
+    """Return figures on the messages of a stream; None where there are too few.
+
+    A gap is an interval of more than twice the median; the jitter is the intervals' standard deviation.
+
+    Args:
+        moments_ns: when each came.
+        ages_ms: our clock less the stamp, of those with a stamp.
+        listened_s: for how long they were waited for.
+        offset: of the robot's clock; None where it is not known, so that the ages are not known either.
+    """
+    intervals = np.diff(np.array(moments_ns, dtype=np.float64)) / 1e6
+    found: dict[str, Any] = {
+        "messages": len(moments_ns),
+        "listened_s": rounded(listened_s),
+        "rate": None,
+        "interval_ms": None,
+        "jitter_ms": None,
+        "gaps": None,
+        "stamped": len(ages_ms),
+        "clock_offset_ms": None if offset is None else rounded(offset.middle_s * 1e3),
+        "age_ms": None if offset is None else _spread([age + offset.middle_s * 1e3 for age in ages_ms]),
+        "age_error_ms": None if offset is None else rounded(offset.error_s * 1e3),
+    }
+    if len(intervals) >= _ENOUGH:
+        limit = _GAP * float(np.median(intervals))
+        found |= {
+            "rate": rounded(1e3 * len(intervals) / float(intervals.sum())) if intervals.sum() else None,
+            "interval_ms": _spread(intervals.tolist()),
+            "jitter_ms": rounded(float(intervals.std(ddof=1))),
+            "gaps": {"longer_than_ms": rounded(limit), "count": int((intervals > limit).sum())},
+        }
+    return found
+
+
+def _spread(values: Sequence[float]) -> dict[str, float | None] | None:
+    """Return extremes and quantiles in ms; None where there are too few values."""
+    if len(values) < _ENOUGH:
+        return None
+    found = {"min": min(values), "max": max(values)}
+    for name in ("p50", "p90", "p99"):
+        if len(values) >= samples_for_point(SHARES[name]):
+            found[name] = float(np.quantile(np.array(values), SHARES[name]))
+    return {name: rounded(found.get(name)) for name in ("min", "p50", "p90", "p99", "max")}
+
 
 _CHUNK = 65_536
 _MOST_MESSAGES = 200_000

@@ -12,8 +12,7 @@ from loadtests.clients.payloads import LIBRARY, VARIANTS
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.machine import first_in_line, leaves_the_robot_room
-from loadtests.measuring.recording import AFTER_ERROR_S, NS, Recording
-from loadtests.measuring.scenario import ScenarioSession
+from loadtests.measuring.scenario import AFTER_ERROR_S, NS, Recording, ScenarioSession
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.pacer import Arrival, Pacer
 from loadtests.schedule.plan import BOTH, Plan

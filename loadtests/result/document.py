@@ -15,14 +15,15 @@ from loadtests.measuring.executor import Member
 from loadtests.measuring.machine import Moment, conditions
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import describe, same_machine
+from loadtests.measuring.streams import stream_figures
 from loadtests.result.files import FORMAT
 from loadtests.result.outcome import Outcome, RunAborted
 from loadtests.schedule.plan import GAP_S, Plan
 from loadtests.settings.settings import Settings
-from loadtests.statistics import counts, figures, modes, over_time, service_levels, streams, verdict
+from loadtests.statistics import counts, figures, modes, over_time, service_levels
 from loadtests.statistics.against import EXIT_CODES, Against, against
 from loadtests.statistics.comparisons import AaControl, aa_controls, further_interfaces, soap_over_rest
-from loadtests.statistics.headline import Found, headline
+from loadtests.statistics.headline import Found, failures, generator_figures, headline, invalid_because, says_nothing
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.over_time import stage_figures
 from loadtests.statistics.overload import overload
@@ -136,15 +137,13 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     executor, settings = outcome.executor, outcome.settings
     recorder = executor.recorder if executor else Recorder()
     measured = Measured([carried.plan for carried in outcome.carried] or [plan], recorder)
-    generator = verdict.generator_figures(measured, outcome.cpu_share)
+    generator = generator_figures(measured, outcome.cpu_share)
     counted = counts.counts(measured, ((one.plan, one.elapsed_s) for one in outcome.carried))
     pacing = executor.pacing if executor else ""
     machine, spoilt = conditions(outcome.before, Moment.now())
     deviation = between_runs(machine, os.cpu_count() or 1, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
-    reasons, notes = (
-        ([str(aborted)], []) if aborted else verdict.invalid_because(generator, counted, plan, pacing, spoilt)
-    )
+    reasons, notes = ([str(aborted)], []) if aborted else invalid_because(generator, counted, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
     overloaded = None if aborted or reasons or outcome.interrupted else overload(measured, counted)
     undecided = (
@@ -152,7 +151,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         if aborted or reasons
         else [overloaded.sentence()]
         if overloaded
-        else [*_why_undecided(settings, counted), *verdict.says_nothing(comparisons), *_silent(outcome)]
+        else [*_why_undecided(settings, counted), *says_nothing(comparisons), *_silent(outcome)]
     )
     workers, losses = process_figures(executor.members if executor else [])
     controls = aa_controls(measured)
@@ -219,7 +218,7 @@ def _why_undecided(settings: Settings, counted: counts.Counts) -> list[str]:
     """Return why failed requests leave nothing to compare, unless a service level judges those of each operation."""
     levels = [settings.slo.get(name) for name in settings.selection.operations]
     judged = all(level is not None and level.error_rate is not None for level in levels)
-    return [] if judged else verdict.failures(counted)
+    return [] if judged else failures(counted)
 
 
 def _endings(outcome: Outcome, plan: Plan) -> list[str]:
@@ -250,7 +249,7 @@ def _streams(outcome: Outcome) -> list[dict[str, Any]]:
     for message in outcome.heard:
         offset = None if message.clock is None else SHARED if here else message.clock.offset
         clock = "not known" if offset is None else "shared" if here else "estimated"
-        figures_of = streams.stream_figures(message.moments_ns, message.ages_ms, message.listened_s, offset)
+        figures_of = stream_figures(message.moments_ns, message.ages_ms, message.listened_s, offset)
         found.append({"name": message.name, "kind": message.kind, "clock": clock, "error": message.error} | figures_of)
     return found
 

@@ -15,7 +15,7 @@ from conformance.commandline.exit_codes import ExitCode
 from conformance.commandline.extras import lacking_soap
 from conformance.commandline.help_pages import inert
 from conformance.contract.locating import ContractError
-from proof.cli.selftest_progress import Progress, compare
+from proof.cli.selftest_generated import Progress, compare
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -1,4 +1,4 @@
-"""Judge generated mutants: a pack's (``roaas selftest --generated``), or those of any running device (``--api``)."""
+"""Judge generated mutants: a pack's (``roaas selftest --generated``), or those of a running device (``--api``)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,96 @@ from conformance.documents.openapi import operations_of
 from conformance.statement.endpoints import Endpoints
 from conformance.target.describing import described_contract
 from conformance.transport.reach import UnreachableError
-from proof.cli.selftest_progress import Progress, compare
 from proof.selftest.generated.mutant import GeneratedMutant
 from proof.selftest.report import Report
 
 if TYPE_CHECKING:
-    from conformance.contract.pack import Contract
-    from proof.selftest.generated.mutant import GeneratedMutant
-    from proof.selftest.report import Report
+    from collections.abc import Callable, Iterable
+
+    from proof.mutation.table import Mutant
+    from proof.selftest.comparison import Comparison, Settings, Tool, ToolResult
+    from proof.selftest.controls import ControlResult
+    from proof.selftest.generated.judging import GeneratedResult
+    from proof.selftest.mutant_run import MutantResult, Pool
+
+
+class Progress:
+    """Writes progress to stderr and adds each result to the report, so that an interrupted run keeps it."""
+
+    def __init__(self, report: Report, total: int) -> None:
+        self.total = total
+        self._report = report
+        self._done = 0
+        self._controls = 0
+
+    def mutant(self, result: MutantResult) -> None:
+        """Report the result of a hand-written mutant."""
+        self._report.mutant_results.append(result)
+        self._done += 1
+        said = result.not_tried or (
+            f"SURVIVED {', '.join(result.survived)}" if result.survived else f"killed by {_few(result)}"
+        )
+        click.echo(f"[{self._done}/{self.total}] {result.mutant.name}: {said} ({result.seconds:.1f} s)", err=True)
+
+    def by_rule(self, result: GeneratedResult) -> None:
+        """Report the result of a generated mutant."""
+        self._report.generated_results.append(result)
+        self._done += 1
+        by = f" by {result.by[0]}" if result.by else ""
+        line = f"[{self._done}/{self.total}] {result.mutant.name}: {result.outcome}{by} ({result.seconds:.1f} s)"
+        click.echo(line, err=True)
+
+    def tell_compared(self, comparison: Comparison, result: ToolResult) -> None:
+        """Report the result of another tool on a mutant."""
+        comparison.results.append(result)
+        said = f"killed: {result.findings[0]}" if result.killed else "survived"
+        click.echo(f"[{len(comparison.results)}] {comparison.tool}, {result.mutant}: {said}"[:400], err=True)
+
+    def control(self, result: ControlResult) -> None:
+        """Report the result of a good device."""
+        self._report.control_results.append(result)
+        self._controls += 1
+        name = f"{result.robot} {result.variant}".strip()
+        said = result.not_tried or (
+            "conformant"
+            if result.conformant
+            else f"FALSE POSITIVE: {result.false_positives or result.unjudged or 'given up'}"
+        )
+        click.echo(f"[{self._controls}/{self.total}] {name}, seed {result.seed}: {said}"[:400], err=True)
+
+
+def _few(result: MutantResult) -> str:
+    rest = len(result.killed_by) - len(result.mutant.catches)
+    return ", ".join(result.mutant.catches) + (f" and {rest} more" if rest > 0 else "")
+
+
+def compare(
+    report: Report,
+    pool: Pool,
+    mutants: Iterable[Mutant],
+    progress: Progress,
+    settings: Callable[[Tool], Settings] | None = None,
+) -> None:
+    """Run other tools on the REST mutants, and add the results: Specmatic only if ``settings`` makes the settings."""
+    from proof.selftest import comparison  # noqa: PLC0415 - it costs what --help need not pay
+
+    plain = comparison.schemathesis()
+    if plain is None:
+        report.notes.append("Schemathesis' command line is not installed, so that nothing was compared with it.")
+        return
+    mutants = list(mutants)
+    chosen = settings(plain) if settings else comparison.Settings()
+    beside = comparison.specmatic() if settings else None
+    for tool in filter(None, (plain, beside)):
+        one = comparison.Comparison(tool.name)
+        report.compared.append(one)
+        one.good = comparison.compare(pool, mutants, tool, chosen, partial(progress.tell_compared, one))
+    report.notes.append(
+        f"Schemathesis ran with all checks, --max-examples {chosen.examples}, phases {chosen.phases}, and at most "
+        f"{chosen.limit_s:g} s for each mutant; findings that it has of the good device as well do not count."
+    )
+    if settings and beside is None:
+        report.notes.append("Specmatic is not installed (pip install specmatic, and a Java), so that it was not run.")
 
 
 def described_device(options: dict[str, Any]) -> tuple[Contract, str]:
@@ -53,9 +135,12 @@ def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) ->
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import compose, kinds_in_requests  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.adversary import (  # noqa: PLC0415 - see selftest.py
+        compose,
+        kinds_in_requests,
+        sample,
+    )
     from proof.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
-    from proof.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
     every = described_mutants(contract, urlsplit(base_url).path.rstrip("/"))
@@ -121,9 +206,12 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import compose, kinds_in_requests  # noqa: PLC0415 - see selftest.py
+    from proof.selftest.generated.adversary import (  # noqa: PLC0415 - see selftest.py
+        compose,
+        kinds_in_requests,
+        sample,
+    )
     from proof.selftest.generated.catalogue import generated_mutants, open_place  # noqa: PLC0415 - as above
-    from proof.selftest.generated.sampling import sample  # noqa: PLC0415 - see selftest.py
 
     patterns = options["patterns"] or ("*",)
     every = generated_mutants(contract)

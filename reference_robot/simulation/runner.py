@@ -12,15 +12,13 @@ from std_msgs.msg import Header
 from reference_robot.kinematics import DIFFERENTIAL, KINEMATICS
 from reference_robot.names import RosNames
 from reference_robot.ros import RosRuntime
-from reference_robot.simulation.base import Base
+from reference_robot.simulation.base import Base, MapServer
 from reference_robot.simulation.delivery import Delivery, DeliveryRequests
-from reference_robot.simulation.frames import MapServer
 from reference_robot.simulation.messages import Localisation, stamped_pose
-from reference_robot.simulation.navigation import Navigation
+from reference_robot.simulation.navigation import EXACT, Navigation
 from reference_robot.simulation.office import OFFICE
 from reference_robot.simulation.planner import Planner
 from reference_robot.simulation.planning import Planning
-from reference_robot.simulation.pursuit import EXACT
 from reference_robot.simulation.realism import NEAR_ENOUGH, Realism
 from reference_robot.simulation.sensors import Sensors
 

@@ -18,9 +18,9 @@ from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from sensor_msgs.msg import BatteryState, Imu, LaserScan
 
 from reference_robot.names import RosNames
-from reference_robot.simulation.kinematics import Motion
 from reference_robot.simulation.messages import quaternion_of
 from reference_robot.simulation.office import OFFICE
+from reference_robot.simulation.realism import Motion
 
 _SCAN_PERIOD_S: Final = 0.2
 _IMU_PERIOD_S: Final = 0.04

@@ -16,8 +16,6 @@ from reference_robot.webservices.nodes.calls import ManagedNode, RosCalls
 from reference_robot.webservices.nodes.publishers import RobotPublishersNode
 from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.problems import Problem
-from reference_robot.webservices.resources.about import Health as HealthResource
-from reference_robot.webservices.resources.about import OpenApi, Wadl
 from reference_robot.webservices.resources.resource import Resource
 from reference_robot.webservices.resources.robot import (
     Delivery,
@@ -25,9 +23,12 @@ from reference_robot.webservices.resources.robot import (
     Goal,
     GraphList,
     LinearVelocity,
+    OpenApi,
     Plan,
     Pose,
+    Wadl,
 )
+from reference_robot.webservices.resources.robot import Health as HealthResource
 from reference_robot.webservices.resources.robot import Velocity as VelocityResource
 from reference_robot.webservices.robot.deliveries import Deliveries
 from reference_robot.webservices.robot.goals import Goals
@@ -35,9 +36,8 @@ from reference_robot.webservices.robot.health import Health
 from reference_robot.webservices.robot.odometry import LatestOdometry
 from reference_robot.webservices.robot.plans import Planner
 from reference_robot.webservices.robot.velocity import Velocity
-from reference_robot.webservices.soap.publishers import PublishersWebService
 from reference_robot.webservices.soap.service import SoapInterface
-from reference_robot.webservices.soap.subscribers import SubscribersWebService
+from reference_robot.webservices.soap.subscribers import PublishersWebService, SubscribersWebService
 
 Handlers = dict[str, Callable[[Request], Response | Awaitable[Response]]]
 

@@ -1,8 +1,9 @@
-"""Pictures of how a device moved, drawn from the traces of a run (traces.json.gz) as SVG for the certificate."""
+"""Pictures for the certificate from the traces of a run: how a device moved (SVG), and what it took in which state."""
 
 from __future__ import annotations
 
 import math
+import re
 import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -13,6 +14,72 @@ from reports.given_files import parsed, read_octets, unzipped
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
+
+# States and operations that are shown.
+_MOST_STATES: Final = 40
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One operation in one state.
+
+    Attributes:
+        sign: in a word or two.
+        tone: good, bad or quiet.
+        words: the same for whoever does not see it.
+    """
+
+    sign: str
+    tone: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All operations in all states.
+
+    Attributes:
+        states: their names.
+        rows: by operation, a cell for each state.
+    """
+
+    states: tuple[str, ...]
+    rows: dict[str, tuple[Cell, ...]]
+
+    @property
+    def wrong(self) -> int:
+        """How many cells have a finding."""
+        return sum(cell.tone == "bad" for row in self.rows.values() for cell in row)
+
+
+def grid(folder: Path, result: Mapping[str, Any]) -> Grid | None:
+    """Return the grid of a run with the class ``states``; None without readable traces."""
+    try:
+        walk, named = traces_in(folder)["walked"], messages(result, "states")
+        states = tuple(map(str, walk["states"]))[:_MOST_STATES]
+        steps = {(item["operation"], item["state"]): bool(item["taken"]) for item in walk["steps"]}
+        names = list(walk["operations"])[:_MOST_STATES]
+        return Grid(states, {name: tuple(_cells(name, states, steps, named)) for name in names})
+    except (ReportError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _cells(
+    name: str, states: tuple[str, ...], steps: Mapping[tuple[str, str], bool], named: list[str]
+) -> Iterator[Cell]:
+    for state in states:
+        if (name, state) not in steps:
+            yield Cell("·", "quiet", "never sent")
+            continue
+        was = "taken" if steps[name, state] else "refused"
+        place = re.compile(rf"{re.escape(f'{name} in {state}')}(?!\w)")
+        wrong = any(place.search(message) for message in named)
+        yield (
+            Cell(f"✗ {was}", "bad", f"{was}, and wrong")
+            if wrong
+            else Cell(f"✓ {was}", "good", f"{was}, as the map says")
+        )
+
 
 TRACES_NAME: Final = "traces.json.gz"
 # _MOST: pictures of a certificate. _POINTS: points of a line. WIDTH, HEIGHT: size of one axis's drawing, CSS pixels.

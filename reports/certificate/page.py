@@ -15,8 +15,7 @@ import segno
 from markupsafe import Markup
 
 from reports.certificate.described import WORDS, Described, description_of
-from reports.certificate.moves_drawn import Picture
-from reports.certificate.states_shown import Grid
+from reports.certificate.moves_drawn import Grid, Picture
 from reports.findings import FOLDED, QUESTIONS, Finding, by_cause, by_requirement, by_topic, findings
 from reports.pages.page import html_page, markdown_page
 

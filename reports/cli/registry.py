@@ -7,9 +7,8 @@ import click
 
 from reports.cli.options import CONTRACT, FILE, FOLDER, PATH, FrontDoor, policy_of
 from reports.pages.untrusted import on_a_line
-from reports.registry.entries import Certificate, Refused, read_entries, read_keys
+from reports.registry.entries import Certificate, Refused, histories, read_entries, read_keys
 from reports.registry.site import INDEX, write_site
-from reports.registry.standing import histories
 
 EXIT_REFUSED = 1
 

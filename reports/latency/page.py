@@ -6,12 +6,10 @@ from typing import Any
 
 from reports.latency.distributions import AllSeries, all_series
 from reports.latency.figures.canvas import COLOUR, INK, Picture
-from reports.latency.figures.load import load
 from reports.latency.figures.ratios import SPANS, Ratio, means, ratios, spans
 from reports.latency.figures.spectrum import spectrum
-from reports.latency.figures.timeline import heat, timeline
-from reports.latency.findings import AGAINST, PAPER, remarks, verdict
-from reports.latency.noticed import sentences
+from reports.latency.figures.timeline import heat, load, timeline
+from reports.latency.findings import AGAINST, PAPER, remarks, sentences, verdict
 from reports.latency.numbers import NONE, interval, ms, rate, ratio, share
 from reports.pages.page import html_page, markdown_page
 

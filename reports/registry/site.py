@@ -12,8 +12,7 @@ from reports.certificate.difference_page import SHOWN, headline
 from reports.errors import ResultUnreadableError
 from reports.pages.matrix import Mark, Matrix, Row, marks
 from reports.pages.page import html_page, write_pages
-from reports.registry.entries import Refused
-from reports.registry.standing import History, Standing, firmware_changes
+from reports.registry.entries import History, Refused, Standing, firmware_changes
 
 INDEX = "index.html"
 ROBOTS, ENVELOPES = "robots", "envelopes"

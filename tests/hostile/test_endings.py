@@ -24,7 +24,7 @@ from conformance.contract.pack import Contract
 from conformance.engine.resending import as_json
 from conformance.transport.exchange import Request
 from conformance.verdict.finding import Sent
-from proof.selftest.variants import certificate
+from proof.selftest.controls import certificate
 from reports.reading import read_latency
 
 _GUARD = Path(conformance.api.rest.guard.__file__).with_name("guard_process.py")

@@ -38,8 +38,8 @@ from conformance.target.describing import described_contract, soap_contract
 from conformance.transport.client import Connection
 from conformance.transport.exchange import NoAnswerError
 from conformance.verdict.run import Run
-from reports.fleet.page import fleet_html, fleet_markdown
-from reports.formats.ci_systems import latency_junit
+from reports.fleet import fleet_html, fleet_markdown
+from reports.formats.catalogue import latency_junit
 from reports.latency.page import latency_html, latency_markdown
 
 _DATA = Path(__file__).parents[1] / "reports" / "data"

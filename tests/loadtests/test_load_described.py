@@ -7,8 +7,8 @@ import pytest
 from lxml import etree
 from toy_api import LOGIN, MAP, TOKEN
 
-from reports.formats.ci_systems import latency_junit
-from reports.latency.noticed import sentences
+from reports.formats.catalogue import latency_junit
+from reports.latency.findings import sentences
 from reports.latency.page import latency_html, latency_markdown
 
 SHORT = "--rate 200 --duration 1 --warmup 0.1"

@@ -10,7 +10,7 @@ import pytest
 from lxml import etree
 from soap_devices import PASSWORD, USER, camera, serving, table
 
-from reports.formats.ci_systems import latency_junit
+from reports.formats.catalogue import latency_junit
 from reports.latency.page import latency_html, latency_markdown
 
 SHORT = "--rate 100 --duration 2 --warmup 0.1"

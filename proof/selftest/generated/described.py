@@ -14,8 +14,8 @@ from conformance.documents.openapi import Operation, is_json, operations_of
 from conformance.documents.representation import flat
 from proof.mutation.messages import Change, Request, Response
 from proof.selftest.generated import described_collections, described_http, described_promises, described_requests
-from proof.selftest.generated import described_failures as failures
-from proof.selftest.generated.breaches import breaks, undeclared_status, undeclared_type
+from proof.selftest.generated import described_http as failures
+from proof.selftest.generated.described_requests import breaks, undeclared_status, undeclared_type
 from proof.selftest.generated.mutant import MODES, Alter, GeneratedMutant, Tally, answers, in_mode
 from proof.selftest.generated.operators import OPERATORS
 from proof.selftest.generated.places import Exchange, Place, fields_of, rest_exchange

@@ -9,9 +9,9 @@ from typing import Any
 
 from conformance.contract.pack import Contract
 from proof.selftest.comparison import Comparison
+from proof.selftest.generated.adversary import Rate, group_of, rate_of, rates_by
 from proof.selftest.generated.catalogue import every_change, generated_mutants, open_place, open_places
 from proof.selftest.generated.judging import BROKEN, GIVEN_UP, KILLED, NOT_REACHED, SURVIVED, GeneratedResult
-from proof.selftest.generated.sampling import Rate, group_of, rate_of, rates_by
 
 # _WRITTEN: word of roaas-selftest/1 for a killed mutant.
 _WRITTEN = {KILLED: "caught"}

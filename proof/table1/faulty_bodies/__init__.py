@@ -7,8 +7,7 @@ send consistent messages and behave otherwise.
 from pathlib import Path
 
 from proof.table1.faulty_bodies.missions import MISSIONS
-from proof.table1.faulty_bodies.readings import READINGS
-from proof.table1.faulty_bodies.velocities import VELOCITIES
+from proof.table1.faulty_bodies.velocities import READINGS, VELOCITIES
 
 FAULTY_BODIES = {**VELOCITIES, **READINGS, **MISSIONS}
 #: By fault: statement of a faulty body that declares other values than ``baroque.toml``.

@@ -18,14 +18,15 @@ from typing import Final, cast
 
 from httptools import HttpParserCallbackError, HttpParserError, HttpParserUpgrade, HttpRequestParser
 
-from reference_robot.webservices.http.answering import DRAINED, FIELD_BYTES, PacedConnection
-from reference_robot.webservices.http.crowd import Client
-from reference_robot.webservices.http.heads import (
+from reference_robot.webservices.http.answering import (
+    DRAINED,
+    FIELD_BYTES,
     FRAMING_FIELDS,
     FRAMING_LIMIT,
     FRAMING_PER_BYTE,
     HEAD_LIMIT,
     TARGET_LIMIT,
+    PacedConnection,
     fields_by_name,
     framing_too_large,
     full,
@@ -36,6 +37,7 @@ from reference_robot.webservices.http.heads import (
     require_head,
     require_old_version,
 )
+from reference_robot.webservices.http.crowd import Client
 from reference_robot.webservices.http.hosts import take_forwarded
 from reference_robot.webservices.http.interface import problem_response
 from reference_robot.webservices.http.messages import BODY_LIMIT, Field, Request

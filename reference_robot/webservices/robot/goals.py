@@ -22,7 +22,7 @@ from reference_robot.webservices.nodes.subscribers import RobotSubscribersNode
 from reference_robot.webservices.representation.messages import message_from, reader_of
 from reference_robot.webservices.representation.problems import Problem, not_yet
 from reference_robot.webservices.representation.shapes import Record, Text, shape_of
-from reference_robot.webservices.robot.poses import require_pose
+from reference_robot.webservices.robot.plans import require_pose
 
 _GOAL_ID: Final = Record("GoalID", (("stamp", shape_of(Time)), ("id", Text(1, 255))), optional=frozenset({"stamp"}))
 # move_base_msgs/MoveBaseActionGoal, a ROS 1 type that only the web interface uses.

@@ -12,9 +12,8 @@ from reference_robot.webservices.http.access import Admission, Scope
 from reference_robot.webservices.http.interface import Interface, await_response
 from reference_robot.webservices.http.messages import Request, Response, content
 from reference_robot.webservices.representation.problems import Problem, clip
-from reference_robot.webservices.representation.reading import parsed_content_type
+from reference_robot.webservices.representation.reading import parsed, parsed_content_type
 from reference_robot.webservices.representation.writing import element_of
-from reference_robot.webservices.representation.xml_input import parsed
 from reference_robot.webservices.soap.envelope import SOAP, Fault, FaultCode, client_fault, operation_element
 
 Operation = Callable[[etree._Element], Response | Awaitable[Response]]  # noqa: SLF001 - lxml's only name for the class

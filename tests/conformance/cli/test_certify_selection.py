@@ -11,7 +11,7 @@ import sys
 import pytest
 from small_device import answers, certified, constant, described, small_device
 
-from reports.formats.code_hosts import annotations, sarif
+from reports.formats.catalogue import annotations, sarif
 
 _SCHEMA = {"type": "object", "required": ["name"]}
 # The 404 of an unknown parameter's value is declared nowhere, and the object lacks its member.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from conformance.cli.explanation import explanation_of, ledger_of
+from conformance.cli.explain import explanation_of, ledger_of
 from conformance.contract.pack import Contract
 from conformance.explaining.advice import FRAMEWORKS, sources_of, topic_of, topics
 from roaas import main

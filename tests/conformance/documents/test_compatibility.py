@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from conformance.documents.description import as_openapi_3
 from conformance.documents.operation_compatibility import changes
-from conformance.documents.swagger import as_openapi_3
 
 POSE = {
     "type": "object",

@@ -3,8 +3,8 @@
 import pytest
 
 from conformance.api.rest.inputs import Inputs, request_of
+from conformance.documents.description import as_openapi_3
 from conformance.documents.openapi import read_operations
-from conformance.documents.swagger import as_openapi_3
 
 _TEXT = {"type": "string"}
 _FORM = "application/x-www-form-urlencoded"

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from conformance.engine.certification import certify
-from conformance.engine.interruption import note_signals
+from conformance.engine.progress import note_signals
 from conformance.engine.robot_under_test import RobotUnderTest
 from conformance.verdict.run import Run
 

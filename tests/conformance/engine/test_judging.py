@@ -15,8 +15,8 @@ from processes import Begun, ended
 from small_device import certified, described, reading, small_device
 
 from conformance.contract.pack import Contract
-from conformance.engine.judge_stored import judge_stored
 from conformance.engine.robot_under_test import RobotUnderTest
+from conformance.engine.stored_result import judge_stored
 from conformance.history.events import read_history
 from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.statement.statement import empty_statement

@@ -2,7 +2,7 @@
 
 import json
 
-from conformance.engine.smaller_requests import smaller
+from conformance.engine.lost_device import smaller
 from conformance.transport.exchange import Request
 
 _JSON = (("Accept", "*/*"), ("Content-Type", "application/json"))

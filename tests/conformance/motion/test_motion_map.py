@@ -13,7 +13,7 @@ from processes import ended
 from serving_apps import serving_app
 
 from conformance.documents.openapi import read_operations
-from conformance.engine.first_motion import proposed_map
+from conformance.engine.first_described import proposed_map
 from conformance.statement.motion_map import MotionMap
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -4,7 +4,7 @@ import pytest
 
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request, Response
-from proof.selftest.generated import whens
+from proof.selftest.generated import mutant
 from proof.selftest.generated.adversary import compose, kinds_in_requests, unreached_names
 from proof.selftest.generated.catalogue import generated_mutants
 from proof.selftest.generated.mutant import Tally
@@ -37,7 +37,7 @@ def test_there_are_many_and_each_has_its_own_name(faults):
     assert len(faults) > 20_000
     always = [one for one in faults.values() if "@" not in one.operator]
     assert {one.operator.partition("@")[2] for one in faults.values()} - {""} == (
-        whens.TIMES.keys() | whens.OF_NUMBERS.keys() | whens.OF_TEXTS.keys() | whens.OF_FORMATS.keys()
+        mutant.TIMES.keys() | mutant.OF_NUMBERS.keys() | mutant.OF_TEXTS.keys() | mutant.OF_FORMATS.keys()
     )
     assert len(always) < len(faults) / 10
 
@@ -78,15 +78,15 @@ def test_a_fault_strikes_for_its_values(faults, when, x, strikes):
 
 
 def test_times_of_texts_and_formats(faults):
-    assert whens.OF_TEXTS["markup"][1](whens.Seen(Request("rest", "GET", "/a?b=c%3Cd"), 1, 0, 0, 0, None))
-    assert whens.OF_TEXTS["beyond-ascii"][1](whens.Seen(Request("rest", "GET", "/a/%C3%A9"), 1, 0, 0, 0, None))
+    assert mutant.OF_TEXTS["markup"][1](mutant.Seen(Request("rest", "GET", "/a?b=c%3Cd"), 1, 0, 0, 0, None))
+    assert mutant.OF_TEXTS["beyond-ascii"][1](mutant.Seen(Request("rest", "GET", "/a/%C3%A9"), 1, 0, 0, 0, None))
     wants = Request("rest", "GET", "/robot/velocity/", fields=[("Accept", "application/xml")])
     assert _statuses(faults["status@xml:getVelocity:200-500"], [_get(), wants]) == [200, 500]
 
 
 def test_times_pass(faults, monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(whens.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(mutant.time, "monotonic", lambda: now[0])
     pause, spell = (faults[f"status@{when}:getVelocity:200-500"] for when in ("after-pause", "now-and-then"))
     for fault, moments, struck in ((pause, [0, 0.5, 1.6, 2], [2]), (spell, [0, 7, 8.5, 9.5, 11], [2, 3])):
         change, found = fault.make(Tally()), []

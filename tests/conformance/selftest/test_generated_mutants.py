@@ -13,13 +13,12 @@ from proof.mutation.messages import Request, Response
 from proof.selftest.certifying import Outcome
 from proof.selftest.comparison import Comparison, ToolResult
 from proof.selftest.generated import judging
-from proof.selftest.generated.adversary import compose, kinds_in_requests
+from proof.selftest.generated.adversary import Rate, compose, kinds_in_requests, rate_of, rates_by, sample
 from proof.selftest.generated.catalogue import every_change, generated_mutants, open_places
 from proof.selftest.generated.judging import GIVEN_UP, KILLED, NOT_REACHED, GeneratedResult, judge
 from proof.selftest.generated.mutant import Tally
 from proof.selftest.generated.operators import OPERATORS
 from proof.selftest.generated.report import document, summary
-from proof.selftest.generated.sampling import Rate, rate_of, rates_by, sample
 from proof.selftest.mutant_run import RobotPool
 from proof.selftest.report import Report
 from proof.table1.selftest import PLAIN

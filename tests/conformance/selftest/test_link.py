@@ -8,9 +8,8 @@ from dataclasses import replace
 import pytest
 
 from conformance.contract.pack import Contract
-from proof.selftest.controls import Case, run_controls
+from proof.selftest.controls import VARIANTS, Case, run_controls
 from proof.selftest.link import LINKS, Direction, Link, link_to
-from proof.selftest.variants import VARIANTS
 from proof.table1.selftest import PLAIN
 
 WIFI, FAR, OUTAGE = LINKS

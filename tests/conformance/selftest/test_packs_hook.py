@@ -10,11 +10,10 @@ from conformance.contract.locating import ContractError
 from conformance.contract.pack import Contract
 from proof.mutation.messages import Request
 from proof.mutation.self_test import GoodDevice, OpenPlace, SelfTest, self_test_of
-from proof.selftest.controls import controls_of
+from proof.selftest.controls import controls_of, variants_of
 from proof.selftest.generated.catalogue import generated_mutants
 from proof.selftest.generated.mutant import Tally
 from proof.selftest.generated.places import classes_of, places
-from proof.selftest.variants import variants_of
 from proof.table1.selftest import BAROQUE, PLAIN
 
 LAMP = Contract.load(Path(__file__).parents[3] / "examples" / "lamp")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from proof.mutation.parsing import RequestParser, ResponseParser
+from proof.mutation.wire import RequestParser, ResponseParser
 
 PUT = b"PUT /p HTTP/1.1\r\nHost: a\r\nX-Two:  b \r\nContent-Length: 3\r\n\r\nabc"
 CHUNKED = b"PUT /p HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"

@@ -15,9 +15,9 @@ from toy_server import serving
 from proof.mutation.changes import altered, becomes, header, instead, plain, rest, rewritten, values
 from proof.mutation.messages import HangUpError, Response
 from proof.mutation.self_test import GoodDevice
+from proof.selftest.controls import VARIANTS, certificate
 from proof.selftest.proxy import Proxy
 from proof.selftest.robots import Robot
-from proof.selftest.variants import VARIANTS, certificate
 from proof.table1.independent_robots.plain import serve as plain_robot
 
 

@@ -18,7 +18,7 @@ from conformance.statement.state_map import StateMap
 from conformance.statement.statement import StatementError, load_statement
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
-from reports.certificate.states_shown import grid
+from reports.certificate.moves_drawn import grid
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 _RULES = [one for one in vars(test_state_machine).values() if isinstance(one, Rule)]

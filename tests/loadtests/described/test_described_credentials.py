@@ -14,8 +14,7 @@ from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.robot import Robot, Secrets, with_secrets, without_secrets
 from loadtests.clients.wire import Connection
 from loadtests.described.device import CREDENTIALS, Device, Named, secrets_of
-from loadtests.described.operations import choose
-from loadtests.described.requests import robot_of
+from loadtests.described.operations import choose, robot_of
 from loadtests.measuring.preflight import preflight
 from loadtests.settings.settings import SettingsError
 

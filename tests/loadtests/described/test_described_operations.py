@@ -12,9 +12,8 @@ from loadtests.clients.failures import CallError, Declared
 from loadtests.clients.robot import Secrets, with_secrets
 from loadtests.described import operations, run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import choose, named_alike
-from loadtests.described.pairs import streams_to_hear
-from loadtests.described.requests import robot_of
+from loadtests.described.operations import choose, named_alike, robot_of
+from loadtests.described.run import streams_to_hear
 from loadtests.schedule.plan import rotation, turns_of_all
 from loadtests.settings.settings import Selection, SettingsError, Target
 

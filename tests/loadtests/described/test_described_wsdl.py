@@ -11,11 +11,9 @@ from loadtests.cli import load
 from loadtests.clients.failures import CallError, Reply
 from loadtests.described import run
 from loadtests.described.device import DESCRIBED_ONLY, Device, Named
-from loadtests.described.operations import choose
-from loadtests.described.pairs import Choice
-from loadtests.described.requests import robot_of
-from loadtests.measuring.equivalence import values_difference
-from loadtests.measuring.preflight import preflight
+from loadtests.described.operations import choose, robot_of
+from loadtests.described.run import Choice
+from loadtests.measuring.preflight import preflight, values_difference
 from loadtests.settings.settings import SettingsError
 
 NONE = dict.fromkeys([*DESCRIBED_ONLY, *run._PAPERS_ONLY, "rest", "timeout_s", "token_file", "ca_file"])  # noqa: SLF001

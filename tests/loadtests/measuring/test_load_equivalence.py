@@ -6,7 +6,7 @@ from loadtests.clients.endpoint import Endpoint
 from loadtests.clients.payloads import CATALOGUE, rest_request, soap_request, variants
 from loadtests.clients.robot import Robot
 from loadtests.clients.wire import Request
-from loadtests.measuring.equivalence import pose_difference, request_difference, requests_difference
+from loadtests.measuring.preflight import pose_difference, request_difference, requests_difference
 
 ROBOT_REST = Endpoint.parse("http://robot:7003")
 ROBOT = Robot("http://robot:7003/base", "http://robot:5555/p", "http://robot:5555/s", token="t0ken")  # noqa: S106 - made up

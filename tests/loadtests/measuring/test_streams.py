@@ -10,10 +10,9 @@ from websockets.sync.server import serve
 
 from loadtests.clients.robot import Described, Robot, Stream
 from loadtests.measuring.clocks import RobotClock, Stamp, stamp_of
-from loadtests.measuring.streams import listen
+from loadtests.measuring.streams import listen, stream_figures
 from loadtests.settings.settings import Streams
 from loadtests.statistics.recorder import SHARED, Offset
-from loadtests.statistics.streams import stream_figures
 
 
 def robot_at(port):

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from loadtests.clients.wire import now_ns
 from loadtests.measuring.machine import first_in_line
-from loadtests.schedule.alarm import make_alarm
 from loadtests.schedule.arrivals import Schedule
-from loadtests.schedule.pacer import Pacer
+from loadtests.schedule.pacer import Pacer, make_alarm
 from loadtests.schedule.plan import BLOCK_S, CLIENTS, SHORT_BLOCK_S, Load, Plan
 
 LOAD = Load(rate=100.0, users=None, duration_s=20.0, warmup_s=1.0, arrivals="constant", seed=1)

@@ -7,9 +7,9 @@ from rclpy.serialization import deserialize_message
 from tf2_msgs.msg import TFMessage
 
 from reference_robot.simulation.base import SerializedOdometry
-from reference_robot.simulation.kinematics import Motion
 from reference_robot.simulation.messages import LATCHED, quaternion_of
 from reference_robot.simulation.office import DEPOT, DESTINATION, OFFICE, SOURCE
+from reference_robot.simulation.realism import Motion
 
 
 def test_frames_and_map_are_told(robot):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference_robot.kinematics import KINEMATICS
-from reference_robot.simulation.kinematics import MAX_ANGULAR, MAX_LINEAR, Motion, advance, wrap
+from reference_robot.simulation.realism import MAX_ANGULAR, MAX_LINEAR, Motion, advance, wrap
 
 speeds = st.floats(-10, 10)
 steps = st.floats(0.001, 0.5)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from conformance.papers_robot.delivery import MESSAGE_FIELDS
 from reference_robot.deliveries import DeliveryRequest
-from reference_robot.simulation.missions import Mission, Missions, MissionState
+from reference_robot.simulation.delivery import Mission, Missions, MissionState
 
 
 def request(number=0):

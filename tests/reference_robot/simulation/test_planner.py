@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from nav2_msgs.action import ComputePathToPose
 
 from reference_robot.kinematics import KINEMATICS
-from reference_robot.simulation.kinematics import Motion, advance
+from reference_robot.simulation.navigation import Pursuit
 from reference_robot.simulation.office import BODY_RADIUS, DEPOT, DESTINATION, OFFICE, SOURCE
 from reference_robot.simulation.planner import CLEARANCE, STEP, PlanError, PlanFailure, Planner
-from reference_robot.simulation.pursuit import Pursuit
+from reference_robot.simulation.realism import Motion, advance
 
 PLANNER = Planner(OFFICE)
 SOLID = OFFICE.grown(BODY_RADIUS)

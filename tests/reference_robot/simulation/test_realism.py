@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference_robot.simulation.kinematics import Motion, advance
-from reference_robot.simulation.realism import IMPERFECT, Delayed, Realism
+from reference_robot.simulation.realism import IMPERFECT, Delayed, Motion, Realism, advance
 
 seeds = st.integers(0, 10_000)
 

@@ -8,7 +8,7 @@ from web_certificate import pair
 from web_protocol import BIG, PATIENCE, TIMEOUT, closed, request, runs, statuses, until
 
 from reference_robot.webservices.http.messages import BODY_LIMIT
-from reference_robot.webservices.http.tls import server_context
+from reference_robot.webservices.http.server import server_context
 
 
 @pytest.mark.parametrize("declared", [True, False])

@@ -15,10 +15,9 @@ from sensor_msgs.msg import BatteryState, LaserScan
 
 from reference_robot.webservices.representation.messages import message_from, reader_of
 from reference_robot.webservices.representation.problems import Problem
-from reference_robot.webservices.representation.reading import read
+from reference_robot.webservices.representation.reading import KnownNames, parsed, read
 from reference_robot.webservices.representation.shapes import Record, Series, shape_of
 from reference_robot.webservices.representation.writing import write_json, write_text, write_xml
-from reference_robot.webservices.representation.xml_input import KnownNames, parsed
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -5,8 +5,7 @@ import json
 
 import pytest
 
-from reports.certificate.moves_drawn import pictures
-from reports.certificate.states_shown import grid
+from reports.certificate.moves_drawn import grid, pictures
 
 _WALK = {
     "states": ["ready", "run", "running"],

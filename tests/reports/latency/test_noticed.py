@@ -5,8 +5,8 @@ import copy
 import pytest
 from lxml import etree, html
 
-from reports.formats.ci_systems import latency_junit
-from reports.latency.noticed import sentences
+from reports.formats.catalogue import latency_junit
+from reports.latency.findings import sentences
 from reports.latency.page import latency_html, latency_markdown
 
 LEVEL = {

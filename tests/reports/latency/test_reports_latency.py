@@ -10,9 +10,8 @@ from lxml import html
 
 from reports.errors import ResultInvalidError
 from reports.latency.distributions import all_series
-from reports.latency.figures.load import load
 from reports.latency.figures.ratios import spans
-from reports.latency.figures.timeline import stalls, timeline
+from reports.latency.figures.timeline import load, stalls, timeline
 from reports.latency.findings import remarks, verdict
 from reports.latency.page import latency_html, latency_markdown
 

@@ -6,7 +6,7 @@ from vendors import Door, requirement
 
 from reports.certificate.difference import difference
 from reports.certificate.difference_page import difference_html
-from reports.fleet.page import fleet_html
+from reports.fleet import fleet_html
 
 WIDTHS = (1280, 390)
 MEASURE = """(page, view) => {

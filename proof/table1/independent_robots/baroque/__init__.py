@@ -19,9 +19,8 @@ Freedoms that it takes:
 
 from collections.abc import Callable
 
-from proof.table1.independent_robots.baroque.rest import Rest
+from proof.table1.independent_robots.baroque.rest import Rest, Soap
 from proof.table1.independent_robots.baroque.server import Loop
-from proof.table1.independent_robots.baroque.soap import Soap
 from proof.table1.independent_robots.body import Body, Build
 
 BUILD = Build(

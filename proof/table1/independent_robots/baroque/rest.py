@@ -6,17 +6,18 @@ Values are written in three formats, each in a valid but unusual notation.
 import json
 import time
 from email.message import Message
+from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import yaml
 from lxml import etree
 
 from proof.table1.independent_robots.body import Body, Goal, stamp
-from proof.table1.independent_robots.plain import reading, rest
-from proof.table1.independent_robots.plain.reading import RefusedError
+from proof.table1.independent_robots.plain import reading, rest, soap
+from proof.table1.independent_robots.plain.reading import RefusedError, choose
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.plain.writing import choose
+from proof.table1.independent_robots.plain.soap import SOAP, TNS, FaultError
 
 _ROOTS = {"Sensors": "sensor_list", "NavigationServices": "services", "Deliveries": "history"}
 SENSORS = [
@@ -256,3 +257,48 @@ def _wadl_resource(path: str, methods: list[str]) -> str:
         for method in methods
     )
     return f"<resource path='{path}'>{said['path']}{body}</resource>"
+
+
+class Soap(soap.Soap):
+    """The SOAP interface of one body."""
+
+    sensors, services = SENSORS, SERVICES
+    folder, files = Path(__file__).parent, {"wsdl": "wsdl", "xsd=1": "xsd"}
+
+    def malformed_answer(self, problem: str) -> Answer:
+        """Return a fault for content that is no XML."""
+        return self.fault("Client", problem)
+
+    def no_goal(self) -> list[Any]:
+        """Return a fault which says that there is no goal.
+
+        Raises:
+            FaultError: always.
+        """
+        raise FaultError("Client", "the robot has no goal")
+
+    def response(self, operation: str, values: list[Any]) -> str:
+        """Return the response element, whose children are in no namespace although it has a default one."""
+        content = "".join(_without_namespace("return", value) for value in values)
+        return f'<{operation}Response xmlns="{TNS}"><!-- answered -->{content}</{operation}Response>'
+
+    def envelop(self, status: int, content: str) -> Answer:
+        """Return a SOAP message."""
+        text = f'<!-- baroque --><Envelope xmlns="{SOAP}"><Body>\n {content}\n </Body></Envelope>'
+        return Answer(status, text.encode(), 'text/xml; charset="UTF-8"')
+
+    def fault(self, code: str, text: str) -> Answer:
+        """Return a fault with a detail of its own."""
+        said = escape("".join(char if char.isprintable() else " " for char in text))
+        return self.envelop(
+            500,
+            f'<Fault><faultcode xmlns="" xmlns:code="{SOAP}">\n code:{code} </faultcode>'
+            f'<faultstring xmlns="" xml:lang="en">{said}</faultstring>'
+            f'<detail xmlns=""><advice xmlns="urn:example:baroque">see the manual</advice></detail></Fault>',
+        )
+
+
+def _without_namespace(name: str, value: Any) -> str:
+    element = etree.Element(name)
+    fill(element, value, nested=False)
+    return etree.tostring(element, encoding="unicode").replace(f"<{name}", f'<{name} xmlns=""', 1)

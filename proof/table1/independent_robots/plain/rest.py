@@ -14,9 +14,8 @@ import yaml
 from conformance.papers_robot.statement import CONTRACT_DIR
 from proof.table1.independent_robots.body import Body, BusyError, ConflictError, Goal, NoPlanError, pose, stamp, yaw_of
 from proof.table1.independent_robots.plain import reading
-from proof.table1.independent_robots.plain.reading import RefusedError
+from proof.table1.independent_robots.plain.reading import FORMATS, RefusedError, as_json, choose, element, write
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.plain.writing import FORMATS, as_json, choose, element, write
 
 _FRAMES = ("map", "odom")
 # Time for which a goal is accepted before it is executing (action_msgs/GoalStatus), s.

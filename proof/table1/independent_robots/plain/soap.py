@@ -6,9 +6,15 @@ from typing import Any
 
 from proof.table1.independent_robots.body import Body
 from proof.table1.independent_robots.plain import reading, rest
-from proof.table1.independent_robots.plain.reading import Element, MalformedError, RefusedError, fit_element, parse_xml
+from proof.table1.independent_robots.plain.reading import (
+    Element,
+    MalformedError,
+    RefusedError,
+    element,
+    fit_element,
+    parse_xml,
+)
 from proof.table1.independent_robots.plain.server import Answer
-from proof.table1.independent_robots.plain.writing import element
 
 SOAP = "http://schemas.xmlsoap.org/soap/envelope/"
 TNS = "http://soap.turtlebot.mybot.org/"

@@ -11,9 +11,17 @@ from urllib.parse import parse_qsl
 import yaml
 
 from proof.table1.independent_robots.plain import reading
-from proof.table1.independent_robots.plain.reading import MalformedError, RefusedError, fit_element, parse_xml
+from proof.table1.independent_robots.plain.reading import (
+    MalformedError,
+    RefusedError,
+    as_json,
+    choose,
+    element,
+    fit_element,
+    parse_xml,
+    write,
+)
 from proof.table1.independent_robots.plain.server import Answer, start
-from proof.table1.independent_robots.plain.writing import as_json, choose, element, write
 
 CONTRACT = Path(__file__).parent.parent / "data" / "library-contract"
 _BOOK = {"title": "id", "year": "int32", "price": "double", "shelf": {"room": "id", "row": "int32"}}

@@ -6,8 +6,8 @@ import pytest
 from toy_messages import exchange
 
 from conformance.packs.table1.limits import Noise
+from conformance.packs.table1.robot.drive_rules import way_and_turn
 from conformance.packs.table1.robot.geometry import Pose, length_of, quaternion_of, wrapped, yaw_of
-from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import Odometry, Velocity
 
 _NONE = Noise()

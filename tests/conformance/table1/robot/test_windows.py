@@ -10,9 +10,9 @@ from toy_messages import exchange
 
 from conformance.packs.table1.limits import DeclaredLimits, Limits, Noise
 from conformance.packs.table1.robot import drive_trace
+from conformance.packs.table1.robot.drive_rules import way_and_turn
 from conformance.packs.table1.robot.drive_trace import Turn
 from conformance.packs.table1.robot.geometry import Pose, wrapped
-from conformance.packs.table1.robot.path import way_and_turn
 from conformance.packs.table1.robot.robot import STILL, Odometry, Velocity
 
 _EXCHANGE = exchange()

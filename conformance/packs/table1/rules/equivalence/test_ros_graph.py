@@ -9,7 +9,7 @@ from conformance.observe.clock import poll_for
 from conformance.packs.table1.robot.message_shapes import SENSORS as SENSORS_SHAPE
 from conformance.packs.table1.robot.probe import Probe, ProbeError, RosProbe
 from conformance.packs.table1.robot.robot import SENSORS, Robot
-from conformance.packs.table1.scenarios.velocities_on_ros import OnRos, velocities_on_ros
+from conformance.packs.table1.scenarios.interfaces_in_motion import OnRos, velocities_on_ros
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, rule
 from conformance.verdict.evidence import Case, Judge

@@ -23,8 +23,7 @@ from conformance.packs.table1.robot.goal_trace import (
     SpecialGoal,
 )
 from conformance.packs.table1.scenarios.goal_life import ID, goal_life
-from conformance.packs.table1.scenarios.goal_reached import goal_reached
-from conformance.packs.table1.scenarios.special_goals import goal_ids, goal_poses, refused_goals
+from conformance.packs.table1.scenarios.goal_reached import goal_ids, goal_poses, goal_reached, refused_goals
 from conformance.packs.table1.scenarios.walks import goal_walk
 from conformance.packs.table1.statement import said_of
 from conformance.scenarios.rule import Outcome, Rule, rule

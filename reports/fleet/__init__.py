@@ -1,1 +1,0 @@
-"""Write the pages for a fleet run: which robot passed which classes."""
