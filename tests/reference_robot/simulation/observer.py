@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from mybot_delivery_app.msg import DeliveryRequestMsg
 from nav2_msgs.action import ComputePathToPose, NavigateToPose
 from nav_msgs.msg import Odometry
+from nav_msgs.srv import GetPlan
 from rclpy.action import ActionClient
 from std_msgs.msg import String
 
@@ -49,6 +50,7 @@ class Observer:
         self.requests = node.create_publisher(DeliveryRequestMsg, topics.delivery, 100)
         self.navigate = ActionClient(node, NavigateToPose, names.actions.navigate_to_pose)
         self.compute = ActionClient(node, ComputePathToPose, names.actions.compute_path_to_pose)
+        self.plans = node.create_client(GetPlan, names.services.get_plan)
         # What an operator's tool uses to stop the robot, whoever set it going.
         self.cancels = node.create_client(CancelGoal, f"{names.actions.navigate_to_pose}/_action/cancel_goal")
         node.create_subscription(
@@ -62,7 +64,7 @@ class Observer:
 
     def is_connected(self):
         heard = (self.velocities.get_subscription_count, self.requests.get_subscription_count)
-        served = (self.navigate.server_is_ready, self.compute.server_is_ready)
+        served = (self.navigate.server_is_ready, self.compute.server_is_ready, self.plans.service_is_ready)
         return self.odometry and self.goals and all(each() for each in (*heard, *served))
 
     @property
@@ -124,6 +126,12 @@ class Observer:
     def end_of(self, handle):
         """Wait for a goal's end and return its status."""
         return self.ask(handle.get_result_async).status
+
+    def plan(self, goal, start=None, tolerance=0.0):
+        request = GetPlan.Request(goal=goal, tolerance=tolerance)
+        if start is not None:
+            request.start = start
+        return self.ask(self.plans.call_async, request).plan
 
     def request(self, source, destination, depot, code=4):
         coordinates = dict(zip(COORDINATES, map(float, (*depot, *destination, *source)), strict=True))
