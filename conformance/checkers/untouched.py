@@ -69,6 +69,8 @@ class Untouched:
         # By template and refused operation: how many refusals were seen. Below: members that had changed after them.
         self._count: Counter[tuple[str, str]] = Counter()
         self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+        # By path: a case that fails if two reads without a request in between show a member unchanged, by its name.
+        self._waiting: dict[str, tuple[str, Case]] = {}
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the resources."""
@@ -109,6 +111,10 @@ class Untouched:
         if before is None or len(before.since) > 1:
             return
         label = next(iter(before.since), "")
+        if not label and path in self._waiting:
+            # What goes on by itself, as a job does, changes a moment later too.
+            name, case = self._waiting.pop(path)
+            yield from [case] if same(now.get(name), before.members.get(name)) else []
         key = template, label
         self._count[key] += 1
         self._changed[key].update(name for name in now if not same(now[name], before.members.get(name)))
@@ -133,7 +139,11 @@ class Untouched:
         )
         expected = f"the members as before {label}, as {times} times"
         doubt = "" if self._keeps_all and label != _CONDITIONAL else "it may count requests, also refused ones"
-        yield occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched", doubt=doubt)
+        case = occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched", doubt=doubt)
+        if wrong:
+            self._waiting[path] = wrong[0], case
+        else:
+            yield case
 
 
 def _is_list_of_things(value: Any) -> bool:

@@ -145,8 +145,9 @@ class Reaching:
                 known = steps if "{" in read.template else read.template.split("/")
                 targets.append("/".join(known[: read.template.count("/") + 1]))
         with suppress(NoAnswerError):
-            for turn in range(-ALONE if len(held) == 1 else 0, OFTEN + 1):
-                if turn > 0:
+            # The last read shows what changes by itself.
+            for turn in range(-ALONE if len(held) == 1 else 0, OFTEN + 2):
+                if 0 < turn <= OFTEN:
                     self.api.send(request)
                 for target in targets:
                     self.api.send(Outgoing("GET", target))

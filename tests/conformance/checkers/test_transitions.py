@@ -72,7 +72,8 @@ def _refused(action, *runs, change=1):
         (("GET . 200", "running", one), (f"POST /{action} 409",), ("GET . 200", "running", one + change))
         for one in runs
     ]
-    return [step for pair in pairs for step in pair]
+    steps = [step for pair in pairs for step in pair]
+    return [*steps, steps[-1]]
 
 
 _RESUMED = [("GET . 200", "stopped"), ("POST /resume 200", "running")]
@@ -107,10 +108,11 @@ _RIGHT = {
     "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
     "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
     "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
+    "a count that goes on by itself from then on": [*_refused("start", 1, 2, 3)[:-1], ("GET . 200", "running", 5)],
     "a count that goes on by itself": [
         *(("GET . 200", "running", 1), ("GET . 200", "running", 2)), *_refused("start", 2, 3, 4),
     ],
-    "a count of all refusals": [*_refused("start", 1, 2, 3)[:-1], *_refused("resume", 3, 4, 5)],
+    "a count of all refusals": [*_refused("start", 1, 2, 3)[:-2], *_refused("resume", 3, 4, 5)],
     "one that runs after another": [("GET 1 200", "running"), ("GET 2 200", "running"), ("GET 1 200", "stopped")],
     "a refusal of which nothing is said": _refused("pause", 1, 2, 3),
     "a refusal that keeps": _refused("start", 1, 2, 3, change=0)[:3],

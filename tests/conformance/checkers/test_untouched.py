@@ -61,7 +61,7 @@ def _rounds(between, name="revision", path="/valves/1", idle=0, times=3):
         found += [(f"GET {path} 200", {name: now}), (f"GET {path} 200", {name: now + idle})]
         now += 1 + idle
         found += [between, (f"GET {path} 200", {name: now})]
-    return found
+    return [*found, (f"GET {path} 200", {name: now + idle})]
 
 
 def _listed(path, times=3):
