@@ -379,10 +379,20 @@ def is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
     return is_said or (total != count and count >= _LEAST and count % _ROUND == 0)
 
 
+_GROUPED: Final = re.compile(r"\b(?:first|groups?|each)\b", re.IGNORECASE)
+
+
 def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
     """Judge the order in time that the description of a list tells, by the one time that all its items have."""
-    said = IN_TIME.search(listing.operation.text)
-    if said is None or (listing.sort is not None and listing.sort.name in sent) or listing.direction is not None:
+    text = listing.operation.text
+    said = IN_TIME.search(text)
+    # "Pinned notes first, in both groups the newest first": the newest of all need not come first.
+    if (
+        said is None
+        or _GROUPED.search(text[: said.start()].rpartition(".")[2])
+        or (listing.sort is not None and listing.sort.name in sent)
+        or listing.direction is not None
+    ):
         return
     dated = [name for name, one in listing.members.items() if flat(one).get("format") == "date-time"]
     made = [name for name in dated if plain_name(name).startswith("created")] or (dated if len(dated) == 1 else [])

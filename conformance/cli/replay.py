@@ -123,7 +123,9 @@ def replay(  # noqa: C901 - one branch for each way to judge
         acting = [failure for (_, failure), may in zip(chosen, sure, strict=True) if not may]
         chosen = [one for one, may in zip(chosen, sure, strict=True) if may]
         if not chosen:
-            raise click.UsageError("these requests may move the robot: add --allow-motion, or name one that only reads")
+            raise click.UsageError(
+                "these requests change the device, and may move it: add --allow-motion, or name one that only reads"
+            )
         if connection.token or connection.certificate:
             _check_addresses([failure for _, failure in chosen], trusted)
         replayed, unstopped = replay_and_stop(chosen, document, connection, contract, minutes)
@@ -139,7 +141,9 @@ def replay(  # noqa: C901 - one branch for each way to judge
         click.echo(f"{one.outcome}: {inert(one.requirement)}: {inert(told)}")
     if acting:
         numbers = inert(", ".join(str(failure.get("number", "")) for failure in acting))
-        click.echo(f"not sent, because they may move the robot: finding {numbers}; --allow-motion sends them")
+        click.echo(
+            f"not sent, because they change the device, and may move it: finding {numbers}; --allow-motion sends them"
+        )
     outcomes = {one.outcome for one in replayed}
     if Outcome.STILL_THERE in outcomes:
         return CommandResult(ExitCode.FAILED)
