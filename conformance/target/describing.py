@@ -129,7 +129,7 @@ def fetch_description(
                 found = read_description(urljoin(source, path), load, overlays, trust)
             except DescriptionError:
                 continue
-            remark = f"Judged by {found.source}, because {source} is no description."
+            remark = f"The description was found at {found.source}."
             return replace(found, elsewhere=(remark,))
         if "; are credentials missing" in str(error):
             raise

@@ -70,7 +70,7 @@ def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any], *, in_stages: bo
         ("not sent", counts["not_sent"], "no connection was free until their deadline"),
         ("lost", counts["lost"], "neither sent nor given up"),
         ("in the series", counts["in_series"], "what the times are of"),
-        ("in the A/A control", counts["in_control"], "" if counts["control_only"] else "of those in the series"),
+        ("in the A/A control", counts["in_control"], "" if counts["control_only"] else "of these, to estimate noise"),
         ("to the other robot", counts["other_robot"], ""),
     ]
     always = {"asked", "sent", "answered", "failed", "in the series"}

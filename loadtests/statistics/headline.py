@@ -112,7 +112,7 @@ def invalid_because(
 
 def _late(figures: GeneratorFigures, pacing: str, spoilt: Sequence[str]) -> list[str]:
     late = [
-        f"{lag:.3f} ms ({name}, at most {limit:.3f} ms)"
+        f"{lag:.3f} ms ({name}; a valid run allows {limit:.3f} ms)"
         for name, limit in figures.lag_limits_ms.items()
         if limit is not None and (lag := figures.lag_ms[name] or 0.0) > limit
     ]

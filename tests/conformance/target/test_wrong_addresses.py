@@ -135,7 +135,7 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
         done = CliRunner().invoke(
             roaas.main, ["certify", f"http://{place}/docs", "--effort", "quick", "--out", str(tmp_path)]
         )
-    assert f"Judged by http://{place}/openapi.json, because http://{place}/docs is no description." in done.stderr
+    assert f"The description was found at http://{place}/openapi.json." in done.stderr
     assert any("Judged by" in note for note in json.loads((tmp_path / "result.json").read_text())["notes"])
 
 
