@@ -106,8 +106,9 @@ class Entries:
             yield occasion.case(requirement, id_ in items, expected, "a list without it", cause=cause, doubt=doubt)
             if id_ in items:
                 schema = next(iter(create.bodies.values())).schema
-                # Later entries move those behind them.
+                # Later entries move those behind them, and a list may show only the beginning of a text.
                 sent = {name: one for name, one in entry.sent.items() if plain_name(name) not in _PLACES}
+                sent = {name: one for name, one in sent.items() if not _begins(one, items[id_].get(plain_name(name)))}
                 wrong = next(differences(sent, items[id_], schema, create.shape, self._collections), "")
                 expected, cause = f"the entry {id_} as {entry.label} wrote it", f"{create.label} entry"
                 doubt = "a list may show its entries in short"
@@ -138,6 +139,11 @@ def _id_of(value: Any) -> str:
     """Return the identifier of an entry; empty if it has none."""
     item = members_of(value)
     return next((str(item[name]) for name in IDS if isinstance(item.get(name), str | int)), "")
+
+
+def _begins(value: Any, seen: Any) -> bool:
+    """Return whether a text in a list is the beginning of the one that was sent."""
+    return isinstance(value, str) and isinstance(seen, str) and value != seen and value.startswith(seen.rstrip(".… "))
 
 
 def _is_whole(occasion: Occasion, listing: Listing, page: Page) -> bool:

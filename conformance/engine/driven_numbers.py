@@ -21,8 +21,9 @@ _UNIT: Final = 0.02
 _RAD: Final = 7.0
 #: ANGLE: separates the pointer of a quaternion from the name of an angle.
 ANGLE: Final = "#"
-# A number that is written as a text, as each is in XML.
+# A number that is written as a text, as each is in XML; in JSON, digits alone may be an identifier.
 _NUMBER: Final = re.compile(r"[-+]?\d{1,12}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,2})?")
+_FRACTION: Final = re.compile(r"-?\d{1,12}\.\d{1,12}")
 #: Names of what turns without end, in rad or, if any of its values is greater than a turn in rad, in degrees.
 HEADING: Final = re.compile(r"yaw|heading|theta|orientation|bearing", re.IGNORECASE)
 _ANGLES: Final[tuple[Angle, ...]] = ("roll", "pitch", "yaw")
@@ -37,20 +38,20 @@ Numbers = dict[str, float]
 """Numbers by pointer; an angle of a quaternion by its pointer, `#` and the angle's name."""
 
 
-def numbers_of(document: Any) -> Numbers:
+def numbers_of(document: Any, *, in_xml: bool = False) -> Numbers:
     """Return the numbers of a document, at most some hundreds."""
     found: Numbers = {}
-    for place, value in _numbers(document, "", _DEEP):
+    for place, value in _numbers(document, "", _DEEP, _NUMBER if in_xml else _FRACTION):
         found[place] = value
         if len(found) >= _MANY:
             break
     return found
 
 
-def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
+def _numbers(value: Any, at: str, deep: int, number: re.Pattern[str]) -> Iterator[tuple[str, float]]:
     if isinstance(value, bool) or not deep:
         return
-    if isinstance(value, str) and _NUMBER.fullmatch(value):
+    if isinstance(value, str) and number.fullmatch(value):
         value = float(value)
     if isinstance(value, int | float):
         # A number with thousands of digits is no measurement.
@@ -62,10 +63,10 @@ def _numbers(value: Any, at: str, deep: int) -> Iterator[tuple[str, float]]:
             yield from ((f"{at}{ANGLE}{name}", angle) for name, angle in angles.items())
             return
         for key, item in value.items():
-            yield from _numbers(item, f"{at}/{str(key).replace('~', '~0').replace('/', '~1')}", deep - 1)
+            yield from _numbers(item, f"{at}/{str(key).replace('~', '~0').replace('/', '~1')}", deep - 1, number)
     elif isinstance(value, list):
         for index, item in enumerate(value[:_LISTED]):
-            yield from _numbers(item, f"{at}/{index}", deep - 1)
+            yield from _numbers(item, f"{at}/{index}", deep - 1, number)
 
 
 def _angles(value: Mapping[str, Any]) -> dict[str, float]:

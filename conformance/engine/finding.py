@@ -18,7 +18,7 @@ import msgspec
 
 from conformance.api.call_rules import CallRules, harmful_words
 from conformance.api.rest.interface import RestInterface
-from conformance.documents.openapi import Operation, is_json
+from conformance.documents.openapi import Operation, is_json, is_xml
 from conformance.engine.commanded import (
     Commanded,
     body_schema,
@@ -446,7 +446,9 @@ class Finder(ABC):
         self._turn += 1
         sent = self._clock.now()
         exchange = self._send(operation.label, None)
-        numbers = numbers_of(self._binding.content(exchange.response.body)) if exchange.response.ok else {}
+        answer = exchange.response
+        in_xml = is_xml(answer.media_type)
+        numbers = numbers_of(self._binding.content(answer.body), in_xml=in_xml) if answer.ok else {}
         moment = (sent + self._clock.now()) / 2
         if numbers:
             self._looks.add(operation.label, moment, numbers)
