@@ -166,15 +166,13 @@ _TEXTS: Final = {
 }
 
 
-def _text(kind: inspect.StrType, _: str) -> str:
-    return _TEXTS.get(kind.pattern or "", "a string that is not empty" if kind.min_length else "a string")
-
-
 _WORDS: dict[type[inspect.Type], Callable[[Any, str], str]] = {
     inspect.BoolType: lambda _, __: "true or false",
     inspect.IntType: _number,
     inspect.FloatType: _number,
-    inspect.StrType: _text,
+    inspect.StrType: lambda kind, _: _TEXTS.get(
+        kind.pattern or "", "a string" + " that is not empty" * bool(kind.min_length)
+    ),
     inspect.DateType: lambda _, __: "a date: YYYY-MM-DD, without quotes",
     inspect.LiteralType: lambda kind, _: f"one of {', '.join(map(str, kind.values))}",
     inspect.EnumType: lambda kind, _: f"one of {', '.join(str(item.value) for item in kind.cls)}",

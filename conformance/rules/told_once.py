@@ -58,7 +58,7 @@ def told_once(
         probe, fault = min(found, key=lambda pair: (_oddness(pair[0].kind), pair[0].attempt.request.size))
         showing = {
             probe.operation: Showing(probe.operation, 0),
-            **{label: Showing(label, 0) for label in _labels(found)},
+            **{label: Showing(label, 0) for label in sorted({probe.operation for probe, _ in found})},
         }
         for one, _ in found:
             was = showing[one.operation]
@@ -90,10 +90,6 @@ def held_back(probes: Iterable[Probe]) -> Iterator[NotSeen]:
 def _oddness(kind: Kind) -> int:
     """Return how odd a request is: a usual one shows a fault best."""
     return 0 if kind is Kind.USUAL else 2 if kind in _LESS_PLAIN else 1
-
-
-def _labels(found: list[tuple[Probe, Fault]]) -> list[str]:
-    return sorted({one.operation for one, _ in found})
 
 
 def without_numbers(text: str) -> str:

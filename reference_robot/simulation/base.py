@@ -138,13 +138,12 @@ class Base:
         self._frames = FramePublisher(node, names)
         newest = QoSProfile(depth=1)
         if names.velocity.message == "TwistStamped":
-            node.create_subscription(TwistStamped, names.topics.cmd_vel, self._receive_stamped, newest)
+            node.create_subscription(
+                TwistStamped, names.topics.cmd_vel, lambda stamped: self._receive(stamped.twist), newest
+            )
         else:
             node.create_subscription(Twist, names.topics.cmd_vel, self._receive, newest)
         node.create_timer(max(_PERIOD_S / time_scale, _SHORTEST_PERIOD_S), self._step)
-
-    def _receive_stamped(self, command: TwistStamped) -> None:
-        self._receive(command.twist)
 
     def _receive(self, command: Twist) -> None:
         setpoint = (command.linear.x, command.angular.z, command.linear.y)

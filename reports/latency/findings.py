@@ -66,8 +66,8 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
         )
     if slow > 0 and quantile != "p50" and not result.get("overload"):
         yield (
-            f"A program that waits for each response of {name} can repeat that about {rate(_round(1000 / slow))} times "
-            f"a second and is late in {_BEYOND[quantile]} cases."
+            f"A program that waits for each response of {name} can repeat that about "
+            f"{rate(float(f'{1000 / slow:.2g}'))} times a second and is late in {_BEYOND[quantile]} cases."
         )
     failed = one["errors"] + one.get("dropped", 0)
     if failed:
@@ -115,11 +115,6 @@ def _of_stops(result: Mapping[str, Any]) -> Iterator[str]:
         )
     if found["error"]:
         yield f"How late a stop takes effect is not known: {excerpt(found['error'], 200)}."
-
-
-def _round(value: float) -> float:
-    """Return a number with two significant digits."""
-    return float(f"{value:.2g}")
 
 
 def _how_often(share: float, result: Mapping[str, Any], one: Mapping[str, Any]) -> str:
@@ -202,7 +197,7 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
         *_stall_text(result),
         *_two_modes(series),
         *_failure_text(result, series),
-        *_note_text(result),
+        *(f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note),
     ]
 
 
@@ -266,11 +261,6 @@ def _failure_text(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]
         f"{counted(errors, 'request')} of {errors + answered:,} failed; each counts with at least the time until it "
         "was given up."
     )
-
-
-def _note_text(result: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the notes stored in the result as sentences, with a capital letter and a period."""
-    yield from (f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note)
 
 
 #: If the robot's own times over two interfaces differ by this factor, it does different work for them.

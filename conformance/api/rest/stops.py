@@ -95,7 +95,8 @@ def stop_device(api: RestInterface, tell: Callable[[str], None] = lambda _: None
 
 def stop_once(api: RestInterface) -> dict[_Way, str]:
     """Stop the device by each way that it has; return those that did not stop it, with the reasons."""
-    return _still_open([partial(way, api) for way in (_stop_by_pack, _stop_by_map, _stop_as_marked)])
+    by_map = api.stop_device or (lambda: "")
+    return _still_open([lambda: api.device.leave_at_rest(api), by_map, partial(_stop_as_marked, api)])
 
 
 def _still_open(ways: Iterable[_Way]) -> dict[_Way, str]:
@@ -144,14 +145,6 @@ def _unheard(client: HttpClient) -> Iterator[_Refusals]:
     finally:
         for name, value in kept.items():
             setattr(connection, name, value)
-
-
-def _stop_by_pack(api: RestInterface) -> str:
-    return api.device.leave_at_rest(api)
-
-
-def _stop_by_map(api: RestInterface) -> str:
-    return api.stop_device() if api.stop_device is not None else ""
 
 
 def _stop_as_marked(api: RestInterface) -> str:

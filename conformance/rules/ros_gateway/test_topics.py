@@ -44,9 +44,9 @@ def reads_of(ros: RosMap, call: str) -> Reads:
 def rows(found: list[Difference]) -> tuple[str, str]:
     """Return ROS's value and the web's value, field by field."""
     more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
-    own = "; ".join(f"{difference.at} = {difference.ros} ({difference.declared})" for difference in found[:_ROWS])
-    web = "; ".join(f"{difference.at} = {difference.web}" for difference in found[:_ROWS])
-    return own + more, web + more
+    shown = found[:_ROWS]
+    own = (f"{field.at} = {field.ros}" + f" ({field.declared})" * bool(field.declared) for field in shown)
+    return "; ".join(own) + more, "; ".join(f"{field.at} = {field.web}" for field in shown) + more
 
 
 @rule("ros-gateway/read-exact", on=(topic_reads,))
@@ -143,16 +143,15 @@ def write_exact(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
             if not heard:
                 continue  # whether one comes, another requirement says
             fits = any(equal(each, wanted) for each in heard)
-            found = [] if fits else list(changes(_fields_in(heard[-1], message, ros), _fields_in(wanted, message, ros)))
-            more = f", and {len(found) - _ROWS} other fields" if len(found) > _ROWS else ""
-            web = "; ".join(f"{at} = {sent}" for at, _, sent in found[:_ROWS]) + more
-            own = "; ".join(f"{at} = {came}" for at, came, _ in found[:_ROWS]) + more
+            changed = changes(_fields_in(heard[-1], message, ros), _fields_in(wanted, message, ros))
+            found = [] if fits else [Difference(at, "", sent, came) for at, came, sent in changed]
+            own, web = rows(found)
             yield Case(
                 not found,
                 message.exchange,
                 f"{message.what} on {message.topic} as the web sent it" + (f": {web}" if found else ""),
                 observed=f"on {message.topic}: {own}",
-                cause=f"{message.operation} {found[0][0] if found else ''}",
+                cause=f"{message.operation} {found[0].at if found else ''}",
             )
 
 
@@ -162,18 +161,19 @@ def _fields_in(message: dict[str, object], one: Sent, ros: RosMap) -> dict[str, 
     return fields_in(message, body)
 
 
-@rule("ros-gateway/once", on=(topic_writes, topic_bursts))
+@rule("ros-gateway/once", on=(topic_writes, topic_bursts, topic_refusals))
 def once(trace: tuple[Burst, ...], ros: RosMap) -> Iterator[Outcome]:
     """Judge whether each accepted request is exactly one message. Messages without a request are other publishers'."""
     for number, burst in enumerate(trace):
         same_operation = [one for one in trace if one.operation == burst.operation]
-        sent = [message for each in same_operation for message in each.sent]
+        sent = [message for each in same_operation for message in each.sent if message.value]
         after = [each for one in trace[number:] if one.operation == burst.operation for each in one.heard]
         wanted = {message.value: _fields_in(json.loads(message.value), message, ros) for message in sent}
         strange = [each for each in burst.heard if not any(equal(each.content, item) for item in wanted.values())]
         for message in burst.sent:
-            twins = sum(other.accepted and wanted[other.value] == wanted[message.value] for other in sent)
-            if not message.accepted or twins > 1:
+            if not message.accepted or not message.value:
+                continue
+            if sum(other.accepted and wanted[other.value] == wanted[message.value] for other in sent) > 1:
                 continue
             same = sum(equal(each.content, wanted[message.value]) for each in after)
             expected = f"one message on {message.topic} for an accepted request ({burst.how})"

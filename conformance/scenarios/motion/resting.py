@@ -81,7 +81,7 @@ def _seen_of(
     for name, noise in resting.speeds.items():
         most = declared[name].rest or _OF_SPEED * motion.speed_tolerance(name)
         seen = [(reading.sent, reading.speeds[name]) for reading in readings if reading.speeds]
-        yield f"{name} at", seen, _middle, _beside(most, noise.room)
+        yield f"{name} at", seen, lambda samples: median(value for _, value in samples), _beside(most, noise.room)
     for name, noise in resting.axes.items():
         most = motion.state.axes[name].rest or _OF_POSITION * motion.tolerance(name)
         seen = [((reading.sent + reading.received) / 2, reading.values[name]) for reading in readings if reading.values]
@@ -96,7 +96,3 @@ def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> s
 
 def _beside(most: float, room: Callable[[Sequence[Sample]], float]) -> Callable[[Sequence[Sample]], float]:
     return lambda samples: most + room(samples)
-
-
-def _middle(samples: Sequence[Sample]) -> float:
-    return median(value for _, value in samples)

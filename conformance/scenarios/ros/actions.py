@@ -125,16 +125,13 @@ def action_goals(gateway: Gateway) -> Goals:
             for part in _PARTS:
                 definitions[f"{call}#{part}"] = gateway.definition(f"{body.type}#{part}")
             with gateway.robot.publishing(body.action):
-                probes.extend(_Sender(gateway, call, body, definitions).goals())
+                probes.extend(_Sender(gateway, call, body).goals())
     return Goals(tuple(probes), definitions)
 
 
 class _Sender:
-    def __init__(self, gateway: Gateway, call: str, body: Acts, definitions: dict[str, Definition]) -> None:
+    def __init__(self, gateway: Gateway, call: str, body: Acts) -> None:
         self._gateway, self._call, self._body = gateway, call, body
-        self._makers = {
-            part: gateway.maker(definition) for part in _PARTS for definition in [definitions[f"{call}#{part}"]]
-        }
 
     def goals(self) -> Iterator[Goal]:
         """Yield a goal of each course."""
@@ -168,7 +165,7 @@ class _Sender:
 
     def _new(self, part: str) -> dict[str, Any]:
         """Return a message of a part that differs from all others."""
-        return self._gateway.complete(f"{self._body.type}#{part}", self._makers[part].usual().value)
+        return self._gateway.usual(f"{self._body.type}#{part}")
 
     def _send(self) -> tuple[dict[str, Any], Exchange]:
         value = self._new("Goal")

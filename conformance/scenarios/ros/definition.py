@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 _ARRAY: Final = re.compile(r"sequence<(?P<items>.+?)(?:, (?P<most>\d+))?>|(?P<item>.+)\[(?P<count>\d+)\]")
@@ -62,6 +63,7 @@ class Shape:
         return self.is_array and self.item in OCTETS
 
 
+@lru_cache(4096)
 def shape_of(declared: str) -> Shape:
     """Return the shape of a field by its declared type, such as "sequence<double, 3>"."""
     found = _ARRAY.fullmatch(declared)

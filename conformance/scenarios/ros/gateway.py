@@ -48,9 +48,6 @@ class Gateway:
         api: its web API.
         binding: how its operations become requests.
         ros: its map.
-
-    Attributes:
-        plays: whether the suite is the robot; otherwise it watches one.
     """
 
     run: Run
@@ -60,6 +57,7 @@ class Gateway:
     _robot: Robot | None = field(default=None, init=False)
     _problem: str = field(default="", init=False)
     _numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1), init=False)
+    _makers: dict[str, Maker] = field(default_factory=dict, init=False)
     _streams: dict[str, Stream] = field(default_factory=dict, init=False)
 
     @property
@@ -151,8 +149,13 @@ class Gateway:
         return found
 
     def maker(self, definition: Definition) -> Maker:
-        """Return this run's generator for messages of a type."""
-        return Maker(definition, self.run.seed, self.binding.syntax == "XML")
+        """Return this run's generator for messages of a type, so that none of its usual messages comes again."""
+        made = Maker(definition, self.run.seed, self.binding.syntax == "XML")
+        return self._makers.setdefault(definition.root, made)
+
+    def usual(self, name: str) -> dict[str, Any]:
+        """Return a message of a type, or of a part of it, that differs from all others."""
+        return self.complete(name, self.maker(self.definition(name)).usual().value)
 
     def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:
         """Return the request of an operation; ``value``: of the ROS message that it gets."""

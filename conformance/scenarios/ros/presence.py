@@ -9,12 +9,13 @@ import itertools
 import secrets
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import value_at
-from conformance.scenarios.ros.gateway import PACE_S, PATIENCE_S, Gateway
+from conformance.scenarios.ros.gateway import PACE_S, PATIENCE_S, Gateway, exchange_of
 from conformance.scenarios.ros.services import NO_PLAY
 from conformance.scenarios.ros.web import content_of, differences, document_of, is_success
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, scenario
@@ -28,8 +29,10 @@ _REPEAT_S: Final = 0.1
 # For a message on its way, and a late gateway: wait this long after a message's greatest age, s.
 _LATE_S: Final = 1.0
 _ROUNDS: Final = 5
-# Reads that show whether subscriptions are never closed.
+_LATCHED: Final = 3
+# Reads, and clients of a stream, that show whether subscriptions are never closed.
 _READS: Final = {"quick": 20, "standard": 40, "deep": 200}
+_CLIENTS: Final = 6
 
 
 @dataclass(frozen=True)
@@ -81,10 +84,9 @@ def topics_at_first(gateway: Gateway) -> tuple[Absence, ...]:
     if not gateway.plays:
         raise NotDeclaredError(NO_PLAY)
     also = {publishes.publishes for publishes in gateway.ros.operations.values() if isinstance(publishes, Publishes)}
-    there = gateway.robot.tell("graph")["topics"]
     found = []
     for call, body in gateway.of(Reads):
-        if body.topic in also or there.get(body.topic, {}).get("publishers"):
+        if body.topic in also or gateway.robot.count(body.topic, "publishers"):
             continue
         # Messages of an earlier run may still be published.
         exchange = _read_until(gateway, call, body, WALL_CLOCK.now() + (body.max_age_s or 0.0) + _LATE_S)
@@ -131,8 +133,10 @@ def publishers_of_each_quality(gateway: Gateway) -> tuple[Presence, ...]:
     topics = _Topics(gateway)
     found = [*topics.publish_all("a best-effort publisher", reliability="best_effort")]
     topics.leave()
-    found += topics.publish_all("a latched publisher", repeat_s=0.0, durability="transient_local")
-    topics.leave()
+    # A gateway that happens to find the publisher before the message gets it without asking for older ones.
+    for _ in range(_LATCHED):
+        found += topics.publish_all("a latched publisher", repeat_s=0.0, durability="transient_local")
+        topics.leave()
     return tuple(found)
 
 
@@ -143,8 +147,6 @@ class _Topics:
         self._gateway = gateway
         self._reads = dict(gateway.of(Reads))
         self._definitions = {call: gateway.definition(body.type) for call, body in self._reads.items()}
-        # One for each type, so that topics of the same type get different messages.
-        self._makers = {body.type: gateway.maker(self._definitions[call]) for call, body in self._reads.items()}
 
     def publish_all(self, publisher: str, repeat_s: float = _REPEAT_S, **quality: str) -> Iterator[Presence]:
         """Publish on all topics, and yield the gateway's response for each."""
@@ -183,11 +185,11 @@ class _Topics:
 
     def _message(self, kind: str) -> dict[str, Any]:
         """Return a new message, whose stamp is the present: its age may be read from that."""
-        value = self._makers[kind].usual().value
+        value = self._gateway.usual(kind)
         if "stamp" in value.get("header", {}):
             now = time.time_ns()
             value["header"]["stamp"] = {"sec": now // 10**9, "nanosec": now % 10**9}
-        return self._gateway.complete(kind, value)
+        return value
 
     def silence(self) -> None:
         """Publish no more, and stay."""
@@ -308,39 +310,49 @@ def _types_in(exchange: Exchange, body: Lists) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Growth:
-    """How many subscriptions a topic had before and after many reads.
+    """How many subscriptions more a topic had after many reads.
 
     Attributes:
-        reads: how many.
-        before, after: subscriptions.
+        body: its map.
+        count: how many reads, or clients of a stream that came and went.
+        more: how many subscriptions more it had after them.
         exchange: the last read.
     """
 
-    reads: int
-    before: int
-    after: int
+    body: Reads
+    count: int
+    more: int
     exchange: Exchange
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
 def many_reads(gateway: Gateway, effort: Effort) -> tuple[Growth, ...]:
-    """Read a topic many times, and count its subscriptions."""
-    count, read = _READS[effort.name], []
-    for call, body in gateway.of(Reads):
-        gateway.read(call, body)
-        before = _subscriptions(gateway, body.topic)
-        read.append((body, before, [gateway.read(call, body) for _ in range(count)][-1]))
-    # The graph shows a new subscription a moment later.
-    WALL_CLOCK.sleep(_LATE_S)
-    found = []
-    for body, before, exchange in read:
-        # A subscription that is closed late is closed nevertheless.
-        until = WALL_CLOCK.now() + body.within_s
-        while (after := _subscriptions(gateway, body.topic)) > before + 1 and WALL_CLOCK.now() < until:
-            WALL_CLOCK.sleep(PACE_S)
-        found.append(Growth(count, before, after, exchange))
+    """Read a topic many times, or have clients of its stream come and go, and count its subscriptions."""
+    read = []
+    with ExitStack() as stack:
+        for call, body in gateway.of(Reads):
+            gateway.read(call, body)
+            before = gateway.robot.count(body.topic, "subscribers")
+            if body.stream and gateway.plays:
+                stack.enter_context(gateway.robot.publishing(body.topic))
+                exchanges = [_follow(gateway, call, body) for _ in range(_CLIENTS)]
+            else:
+                exchanges = [gateway.read(call, body) for _ in range(_READS[effort.name])]
+            read.append((body, len(exchanges), before, exchanges[-1]))
+        # The graph shows a new subscription a moment later.
+        WALL_CLOCK.sleep(_LATE_S)
+        found, until = [], WALL_CLOCK.now() + PATIENCE_S
+        for body, count, before, exchange in read:
+            # A subscription that is closed late is closed nevertheless.
+            while (after := gateway.robot.count(body.topic, "subscribers")) > before + 1 and WALL_CLOCK.now() < until:
+                WALL_CLOCK.sleep(PACE_S)
+            found.append(Growth(body, count, after - before, exchange))
     return tuple(found)
 
 
-def _subscriptions(gateway: Gateway, topic: str) -> int:
-    return int(gateway.robot.tell("graph")["topics"].get(topic, {}).get("subscribers", 0))
+def _follow(gateway: Gateway, call: str, body: Reads) -> Exchange:
+    """Open a stream, get a message and leave; a server may notice that when it sends the next message."""
+    gateway.robot.publish(body.topic, body.type, gateway.usual(body.type), repeat_s=_REPEAT_S)
+    with closing(gateway.stream(call, body)) as stream:
+        stream.take_new(1, _LATE_S)
+        return exchange_of(stream, stream.last)

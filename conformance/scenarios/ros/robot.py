@@ -93,6 +93,10 @@ class Robot(RosProcess):
         events = self.tell("heard", name=name, count=count, within_s=within_s)["events"]
         return [Heard(at / _NS, what, json.dumps(value)) for at, what, value in events]
 
+    def count(self, topic: str, ends: str) -> int:
+        """Return how many "publishers" or "subscribers" a topic has on the graph."""
+        return int(self.tell("graph")["topics"].get(topic, {}).get(ends, 0))
+
     @contextmanager
     def publishing(self, topic: str) -> Iterator[None]:
         """Leave a topic in the end."""

@@ -207,9 +207,9 @@ class _Caller:
     def of_many(self, number: int) -> Crowd:
         """Call from many clients at once. It comes last, as calls that were given up may still reach the server."""
         robot, body = self._gateway.robot, self._body
-        requests = [self._complete("Request", self._requests.usual().value) for _ in range(number)]
+        requests = [self._gateway.usual(f"{body.type}#Request") for _ in range(number)]
         script = [
-            {"answer": self._complete("Response", self._responses.usual().value), "delay_s": _OVERTAKEN_S * (turn % 2)}
+            {"answer": self._gateway.usual(f"{body.type}#Response"), "delay_s": _OVERTAKEN_S * (turn % 2)}
             for turn in range(number)
         ]
         robot.tell("script", name=body.service, script=[*script, {}])
@@ -290,7 +290,7 @@ class _Caller:
         others = self._others()
         # Measured once, because later a call may hold up all others.
         self._usual_s = self._usual_s or [self._read(call, read, 0.0).took for call, read in others]
-        request = self._complete("Request", self._requests.usual().value)
+        request = self._gateway.usual(f"{body.type}#Request")
         robot.tell("script", name=body.service, script=[{"never": True}])
         robot.take_heard(body.service)
         made, text = self._gateway.request(self._call, body, request), json.dumps(request)

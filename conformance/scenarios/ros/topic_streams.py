@@ -87,10 +87,9 @@ def topic_streams(gateway: Gateway, effort: Effort) -> tuple[Streamed, ...]:
 
 def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Streamed]:
     """Yield the messages of the streams of two clients, which are opened and closed for this."""
-    maker, streams = gateway.maker(gateway.definition(body.type)), [gateway.stream(call, body) for _ in range(2)]
-    robot, clock = gateway.robot, WALL_CLOCK
+    robot, clock, streams = gateway.robot, WALL_CLOCK, [gateway.stream(call, body) for _ in range(2)]
     try:
-        before = gateway.complete(body.type, maker.usual().value)
+        before = gateway.usual(body.type)
         robot.publish(body.topic, body.type, before, repeat_s=0.1)
         for stream in streams:
             stream.take_new(1, body.within_s + PATIENCE_S)
@@ -99,7 +98,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
         number, gap_s = _IN_A_ROW, _GAP_S
         if body.throttle_s:
             number, gap_s = _INTERVALS * _IN_EACH, body.throttle_s / _IN_EACH
-        values = [gateway.complete(body.type, maker.usual().value) for _ in range(number)]
+        values = [gateway.usual(body.type) for _ in range(number)]
         began = clock.now()
         published = robot.publish(body.topic, body.type, *values, gap_s=gap_s)
         published_s = clock.now() - began
@@ -114,7 +113,7 @@ def _round(gateway: Gateway, call: str, body: Reads, turn: int) -> Iterator[Stre
             if stream.last_id and not turn and [one for _, one in came] == list(range(number)):
                 # The next ones are published while it is away (HTML Living Standard, 9.2.4).
                 stream.close()
-                away = [gateway.complete(body.type, maker.usual().value) for _ in range(_AWAY)]
+                away = [gateway.usual(body.type) for _ in range(_AWAY)]
                 robot.publish(body.topic, body.type, *away, gap_s=gap_s)
                 clock.sleep(_MORE_S)
                 back = streams[place] = gateway.stream(call, body, stream.last_id)

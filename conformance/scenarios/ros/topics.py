@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.definition import Definition, put_at, value_at
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
@@ -334,9 +334,12 @@ class _Writer:
                 continue
             one = self.send(sample)
             yield Burst(self.call, sample.what, (one,), tuple(self.hear_of(one)), self.reliable)
-        # What comes now, came of one of them.
+        yield self.late()
+
+    def late(self) -> Burst:
+        """Return the messages that come later, each of a request before."""
         late = self.gateway.robot.take_heard(self.body.publishes, 1, 2 * _MORE_S)
-        yield Burst(self.call, "nothing more", (), tuple(late), self.reliable)
+        return Burst(self.call, "nothing more", (), tuple(late), self.reliable)
 
     def hear_of(self, one: Sent) -> Iterator[Heard]:
         """Yield the messages until that of a request, or until it surely comes no more."""
@@ -354,22 +357,19 @@ class _Writer:
 
     def in_bursts(self, times: int, *, many: bool) -> Iterator[Burst]:
         """Yield messages in a row of one client, at once of several, and of many, each of which sends several."""
-        before = self.publishers()
+        robot, ends = self.gateway.robot, (self.body.publishes, "publishers")
+        before = robot.count(*ends)
         for _ in range(times):
             yield self.burst(1, _BURST, f"{_BURST} messages in a row")
             crowded = self.burst(MOST_CLIENTS, 1, f"messages of {MOST_CLIENTS} clients at once")
             # A publisher that leaves late leaves all the same.
             until = WALL_CLOCK.now() + self.body.within_s
-            while (more := self.publishers() - before) > 1 and WALL_CLOCK.now() < until:
+            while (more := robot.count(*ends) - before) > 1 and WALL_CLOCK.now() < until:
                 WALL_CLOCK.sleep(PACE_S)
             yield replace(crowded, more=more)
         if many:
             # A publisher with ROS's usual depth of 10 may lose some of so many.
             yield replace(self.burst(CROWD, _OF_EACH, f"messages of {CROWD} clients at once"), reliable=False)
-
-    def publishers(self) -> int:
-        """Return how many publishers the topic has."""
-        return int(self.gateway.robot.tell("graph")["topics"].get(self.body.publishes, {}).get("publishers", 0))
 
     def burst(self, clients: int, each: int, how: str) -> Burst:
         """Return the outcome of messages of clients that send at the same moment, each one after another."""
@@ -398,8 +398,18 @@ class _Writer:
             wrong |= {"a list in place of the message": b"[]", "null": b"null", "a text": b'"x"'}
             # A gateway may make a text of anything; a number of a text it may not.
             (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = self._texts(right.body)
-        for what, body in (wrong | is_wrong).items():
-            yield from self.malformed_as(what, replace(right, body=body), is_wrong=what in is_wrong)
+        every = {what: replace(right, body=body) for what, body in (wrong | is_wrong).items()}
+        for what, made in every.items():
+            yield from self.malformed_as(what, made, is_wrong=what in is_wrong)
+        # A gateway refuses in several places, and each may change what becomes of the next message.
+        for what, made in every.items():
+            self.send_made(what, "", made)
+            one = self.send(self.usual())
+            heard = tuple(self.hear_of(one))
+            yield Burst(self.call, f"a message after {what}", (one,), heard, self.reliable)
+            if not heard:
+                break
+        yield self.late()
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
         """Yield an invalid request with its outcome, apart from messages that the gateway publishes by itself."""
@@ -421,11 +431,11 @@ class _Writer:
                 return True
         return False
 
-    @staticmethod
-    def _texts(body: bytes) -> bytes:
+    def _texts(self, body: bytes) -> bytes:
         def text(value: Any) -> Any:
             if isinstance(value, dict):
                 return {name: text(one) for name, one in value.items()}
             return [text(item) for item in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
 
-        return json.dumps(text(json.loads(body))).encode()
+        document, at = json.loads(body), self.body.at
+        return json.dumps(put_at(document, at, text(value_at(document, at)))).encode()

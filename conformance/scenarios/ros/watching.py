@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
 
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import Gateway
-from conformance.scenarios.ros.robot import Heard
+from conformance.scenarios.ros.robot import Heard, Robot
 from conformance.scenarios.scenario import NoOccasionError, NotSeenError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Reads
@@ -57,42 +58,48 @@ def topic_watches(gateway: Gateway, effort: Effort) -> tuple[Watched, ...]:
     """Read topics through the gateway while a robot publishes on them, and hear them as well."""
     if gateway.plays:
         raise NoOccasionError("the suite is the robot, and publishes itself")
-    found: list[Watched] = []
-    silent: list[str] = []
-    with partial_trace(lambda: tuple(found)):
-        for call, reads in gateway.of(Reads):
-            with gateway.robot.publishing(reads.topic):
-                seen = _watch_topic(gateway, call, reads, _READS[effort.name])
-            if seen is None:
-                silent.append(f"{reads.topic} ({reads.type})")
-            else:
-                found.append(seen)
-        if silent and not found:
+    robot, watched = gateway.robot, dict(gateway.of(Reads))
+    looks: dict[str, list[Look]] = {call: [] for call in watched}
+    heard: dict[str, list[Heard]] = {}
+    reliable: dict[str, bool] = {}
+
+    def watches() -> tuple[Watched, ...]:
+        WALL_CLOCK.sleep(_COMES_S)
+        for topic, messages in heard.items():
+            heard[topic] = [*messages, *robot.take_heard(topic)]
+        return tuple(
+            Watched(
+                call, topic, gateway.definition(reads.type), tuple(looks[call]), tuple(heard[topic]), reliable[topic]
+            )
+            for call, reads in watched.items()
+            if heard.get(topic := reads.topic)
+        )
+
+    with ExitStack() as stack, partial_trace(watches):
+        for reads in watched.values():
+            if reads.topic not in heard:
+                stack.enter_context(robot.publishing(reads.topic))
+                heard[reads.topic], reliable[reads.topic] = _listen(robot, reads)
+        if not any(heard.values()):
+            silent = dict.fromkeys(f"{reads.topic} ({reads.type})" for reads in watched.values())
             raise NotSeenError(f"no message came on {', '.join(silent)} in ROS domain {gateway.ros.domain}")
-    return tuple(found)
+        within_s = max(reads.max_age_s or reads.within_s for reads in watched.values())
+        # From now on, what the gateway has must be one that was heard.
+        WALL_CLOCK.sleep(within_s)
+        for _ in range(_READS[effort.name]):
+            # At once, so that one that goes back shows; and for so long that one that stands still does.
+            for call in [call for call, reads in watched.items() if heard[reads.topic] for _ in range(_AT_ONCE)]:
+                looks[call].append(Look(WALL_CLOCK.now(), gateway.read(call, watched[call])))
+            WALL_CLOCK.sleep((within_s + _LATE_S) / _READS[effort.name])
+        return watches()
 
 
-def _watch_topic(gateway: Gateway, call: str, reads: Reads, number: int) -> Watched | None:
-    """Return the reads and messages of a topic, or None if it is silent."""
-    robot, clock = gateway.robot, WALL_CLOCK
-    definition, within_s = gateway.definition(reads.type), reads.max_age_s or reads.within_s
+def _listen(robot: Robot, reads: Reads) -> tuple[list[Heard], bool]:
+    """Listen to a topic; return the first messages, and whether all of them arrive."""
     for _ in range(2):
         best_effort = robot.tell("listen", topic=reads.topic, type=reads.type)["best_effort"]
         if heard := robot.take_heard(reads.topic, 1, reads.within_s):
-            break
+            return heard, not best_effort
         # Publishers that were found meanwhile may be of best effort, which a reliable subscriber does not hear.
         robot.tell("forget", name=reads.topic)
-    else:
-        return None
-    # From now on, what the gateway has must be one that was heard.
-    clock.sleep(within_s)
-    looks: list[Look] = []
-    for _ in range(number):
-        # At once, so that one that goes back shows; and for so long that one that stands still does.
-        for _ in range(_AT_ONCE):
-            sent = clock.now()
-            looks.append(Look(sent, gateway.read(call, reads)))
-        clock.sleep((within_s + _LATE_S) / number)
-    clock.sleep(_COMES_S)
-    heard += robot.take_heard(reads.topic)
-    return Watched(call, reads.topic, definition, tuple(looks), tuple(heard), not best_effort)
+    return [], False

@@ -130,12 +130,9 @@ def _web(value: Any, shape: Shape, definition: Definition, ros: RosMap) -> Any:
     if shape.item in LONG and ros.integers == "string":
         return str(value)
     if shape.item in FLOATS and not math.isfinite(value):
-        return {"null": None, "string": _name_of(value)}.get(ros.non_finite or "", value)
+        name = "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+        return {"null": None, "string": name}.get(ros.non_finite or "", value)
     return value
-
-
-def _name_of(value: float) -> str:
-    return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
 def differences(

@@ -23,6 +23,7 @@ FAULTS = {
         "list keeps what is gone": "lists",
         "stream reorders": "stream-order",
         "stream repeats": "stream-once",
+        "subscriptions of streams left": "subscriptions",
     },
     ("flask", "quick"): {
         "NaN as 0": "read-exact write-exact",
@@ -47,6 +48,7 @@ FAULTS = {
         "6 digits": "read-exact",
         "stream throttle ignored": "stream-throttle",
         "unsubscribe ignored": "stream-once",
+        "lost after a refusal": "once",
         "service error as success": "service-failure",
     },
     ("flask", "standard"): {

@@ -34,7 +34,6 @@ class Probe(RosProcess):
 
     Args:
         ros: the statement's part on the robot's ROS side.
-
         recorder: records what is heard, and when it was.
 
     Attributes:
@@ -115,12 +114,11 @@ class RosProbe:
 
     def start(self) -> None:
         """Start the process if the statement names a domain, without waiting for it."""
-        if self._ros.domain_id is None or self._probe is not None or self._problem is not None:
-            return
-        try:
-            self._probe = Probe(self._ros, self._recorder)
-        except ProbeError as error:
-            self._problem = error
+        if self._probe is None and self._problem is None and self._ros.domain_id is not None:
+            try:
+                self._probe = Probe(self._ros, self._recorder)
+            except ProbeError as error:
+                self._problem = error
 
     def ready(self) -> Probe:
         """Return the probe once it has discovered the robot.
