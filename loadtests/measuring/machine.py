@@ -43,7 +43,6 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
     steal = (after.steal_s - before.steal_s) / passed
     throttled = (after.throttled_s - before.throttled_s) / (passed / cpus)
     quota, governor = cpu_quota(), _read(_GOVERNOR)
-    load = before.load[0] if before.load else None
     remarks = []
     if steal > _NOTED_STEAL:
         remarks.append(
@@ -57,14 +56,17 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
         )
     if governor and governor not in _STEADY:
         remarks.append(f"the processor's governor is {governor!r}: its clock rate follows the load")
-    if load is not None and load > cpus:
-        remarks.append(f"the machine was busy before the run: load average {load:.1f} on {cpus} CPUs")
+    if before.load and after.load and max(before.load[0], after.load[0]) > cpus:
+        remarks.append(
+            f"the machine was busy: load average {before.load[0]:.1f} before the run and {after.load[0]:.1f} after it "
+            f"on {cpus} CPUs, so that requests waited for a processor too"
+        )
     found = {
         "steal_share": round(steal, 6),
         "throttled_share": round(throttled, 6),
         "cpu_quota": quota,
         "governor": governor,
-        "load_average_before": round(load, 2) if load is not None else None,
+        "load_average_before": round(before.load[0], 2) if before.load else None,
         "load_average_after": round(after.load[0], 2) if after.load else None,
     }
     return found, remarks

@@ -7,7 +7,7 @@ from typing import Any
 
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.executor import busiest
-from loadtests.schedule.plan import BOTH, Plan, step_operation
+from loadtests.schedule.plan import BOTH, SERIES, Plan, step_operation
 from loadtests.settings.settings import Settings
 from loadtests.statistics.knee import Criterion, Step, knee_search, search_again, step_result
 
@@ -57,6 +57,9 @@ class RisingLoad:
             first_segment=self._next_segment,
         )
         self._next_segment += len(plan.segments)
+        spans = self.executor.recorder.spans  # kept by series: those of the step before would count for this one too
+        for key in [key for key in spans if SERIES[key[0]][0] == "step"]:
+            del spans[key]
         self.executor.run(plan, None, lambda _: self.stopped())
         if self.stopped():
             return None
@@ -74,15 +77,16 @@ class RisingLoad:
         found: list[dict[str, Any]] = []
         for interface in [*self._interfaces, *([BOTH] if {"rest", "soap"} <= set(self._interfaces) else [])]:
 
-            def attempt(rate: float, interface: str = interface) -> Step | None:
+            def attempt(rate: float, search: int, interface: str = interface) -> Step | None:
                 if time.monotonic() > until:
                     self.tell(f"knee: ended after {_MOST_S:.0f} s, with the searches done so far")
                     return None
                 result = self._run(interface, rate)
                 if result is not None:
+                    times = f"p50 {result.p50_ms or 0:.3f} ms, p99 {result.p99_ms or 0:.3f} ms"
                     self.tell(
-                        f"knee over {interface}: {rate:.0f}/s, p50 {result.p50_ms or 0:.3f} ms, "
-                        f"p99 {result.p99_ms or 0:.3f} ms: {'kept' if result.meets else result.reason}"
+                        f"knee over {interface}, search {search} of {wanted.knee_searches}: {rate:.0f}/s "
+                        f"{f'kept: {times}' if result.meets else f'missed: {result.reason}'}"
                     )
                 return result
 

@@ -11,6 +11,8 @@ _JUDGED = {
     "noise": "not significant",
     "none": "inconclusive",
 }
+#: When a request failed that the counts do not hold.
+_WHEN = {"preflight": ", before the run", "warmup": ", in the warm-up", "step": ", in the search for the knee"}
 
 
 def _ms(value: float | None) -> str:
@@ -28,14 +30,17 @@ def summary(document: dict[str, Any]) -> str:
     """Return a table of the series, the comparisons of medians, the service levels, and last the headline."""
     wide = max([9, *(len(entry["operation"]) for entry in document["series"])])
     lines = [
-        f"{'operation':{wide}}  interface  client     count  errors  service p50      p90      p99  response p99   (ms)"
+        (
+            f"{'operation':{wide}}  interface  client     count  errors  service p50      p90      p95      p99      max"
+            "  response p99   (ms)"
+        )
     ]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
         lines.append(
             f"{entry['operation']:{wide}}  {entry['interface']:10} {entry['client']:6} {entry['count']:9} "
-            f"{entry['errors']:7}     {_ms(service['p50'])} {_ms(service['p90'])} {_ms(service['p99'])}      "
-            f"{_ms(response['p99'])}"
+            f"{entry['errors']:7}     "
+            f"{' '.join(_ms(service[name]) for name in ('p50', 'p90', 'p95', 'p99', 'max'))}      {_ms(response['p99'])}"
         )
     lines += _counts(document["counts"], document["plan"], in_stages=bool(document["stages"]))
     lines += _stages(document["stages"])
@@ -47,7 +52,10 @@ def summary(document: dict[str, Any]) -> str:
         f"{entry['most']:g}: {entry['reason']}"
         for entry in document["slo"]
     ]
-    lines += [f"{entry['count']} errors ({entry['kind']}): {entry['message']}" for entry in document["errors"][:5]]
+    lines += [
+        f"{entry['count']} errors ({entry['kind']}{_WHEN.get(entry['phase'], '')}): {entry['message']}"
+        for entry in document["errors"][:5]
+    ]
     lines += [f"note: {note}" for note in document["notes"]]
     words, sentence = document["headline"]["words"], document["headline"]["sentence"]
     lines.append(sentence if sentence.startswith(words) else f"{words}. {sentence}")

@@ -145,12 +145,13 @@ def says_nothing(comparisons: Sequence[SoapOverRest]) -> list[str]:
 _ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations stay in the order of the options
 _TAIL = "p99"
 _TENTHS_MS = 10
+_MOST_IN_SHORT = 3  # further series that the sentence names
 _AGAINST = {
     SLOWER: "Slower than the other robot",
     NOT_SLOWER: "Not slower than the other robot",
     UNCLEAR: "Inconclusive whether it is slower than the other robot",
 }
-_WORTHLESS = "Not valid: these figures say nothing about the robot"
+_WORTHLESS = "Not valid"
 _INTERRUPTED = "Interrupted"
 _OVERLOADED = "The robot is overloaded"
 _UNDECIDED = "This run is inconclusive"
@@ -191,7 +192,9 @@ def headline(found: Found) -> dict[str, str]:
     words, sentence = _verdict(found)
     if knees := list(_knees(found.knees)):
         said = f"{'. '.join(knees)}."
-        if found.interrupted or found.worthless or found.overload is not None or found.undecided:
+        if found.worthless and not found.interrupted and any(search["rate"] for search in found.knees):
+            words, sentence = knees[0], f"{said} The other times are not valid, because {'; '.join(found.worthless)}."
+        elif found.interrupted or found.worthless or found.overload is not None or found.undecided:
             sentence = f"{sentence} {said}"
         else:
             words, sentence = words if found.levels else knees[0], f"{said} {sentence}"
@@ -203,7 +206,7 @@ def _verdict(found: Found) -> tuple[str, str]:
     if found.interrupted:
         return _INTERRUPTED, f"{_INTERRUPTED}; until then: {_result_words(found)[1]}"
     if found.worthless:
-        return _WORTHLESS, f"{_WORTHLESS}, because {'; '.join(found.worthless)}."
+        return _WORTHLESS, f"These figures say nothing about the robot, because {'; '.join(found.worthless)}."
     judged = _levels(found.levels)
     if found.overload is not None:
         return judged or _OVERLOADED, f"{_OVERLOADED}: {found.overload.sentence()}.{_answered_text(found)}"
@@ -269,7 +272,12 @@ def _result_words(found: Found) -> tuple[str, str]:
         )
         return words, f"{sentence}{_tail(tail)}: {leading.operation}, {_how(leading, found)}."
     series = [entry for entry in found.series if entry.service_ms[DECIDING] is not None]
-    return _alone(min(series, key=_rank), found) if series else ("Nothing was measured", _NOTHING)
+    if not series:
+        return "Nothing was measured", _NOTHING
+    first = min(series, key=_rank)
+    words, sentence = _alone(first, found)
+    others = [entry for entry in series if entry is not first and entry.client == first.client]
+    return words, " ".join([sentence, *map(_in_short, others[:_MOST_IN_SHORT])])
 
 
 def _rank(entry: SoapOverRest | Series) -> tuple[bool, int]:
@@ -376,6 +384,11 @@ def _alone(entry: Series, found: Found) -> tuple[str, str]:
         else f", and 99 of 100 take {_at_most(entry, _TAIL)}{_sure(entry, _TAIL)}"
     )
     return words, f"{words}{_sure(entry, DECIDING)}{tail}: {_how(entry, found)}."
+
+
+def _in_short(entry: Series) -> str:
+    tail = "" if entry.service_ms[_TAIL] is None else f", and 99 of 100 {_at_most(entry, _TAIL)}"
+    return f"{entry.operation} over {entry.interface.upper()}: half {_at_most(entry, DECIDING)}{tail}."
 
 
 def _at_most(entry: Series, quantile: str) -> str:

@@ -66,7 +66,7 @@ class Step(msgspec.Struct, kw_only=True):
         reason: why the step does not meet the criterion.
         achieved_rate: good responses in a second of the step, from its first responses on.
         cpu_share: the busiest generator process's share of a core.
-        lag_p99_ms: how late the generator itself was.
+        lag_p99_ms: how late the generator itself was in this step.
     """
 
     interface: str
@@ -225,16 +225,18 @@ def _is_decided(trials: Sequence[Step]) -> bool:
     return trials[-1].meets or misses >= _MISSES or len(trials) >= _MOST_TRIALS
 
 
-def search_again(searches: int, limits: tuple[float, float], attempt: Callable[[float], Step | None]) -> list[Search]:
-    """Search several times within the limits; `attempt` tries a rate, and returns None when time is up."""
+def search_again(
+    searches: int, limits: tuple[float, float], attempt: Callable[[float, int], Step | None]
+) -> list[Search]:
+    """Search several times within the limits; `attempt` tries a rate in a search, and returns None when time is up."""
     found: list[Search] = []
     near: tuple[float, float] | None = None
-    for _ in range(searches):
+    for number in range(1, searches + 1):
         search = Search(*limits, near=near)
         while (rate := search.next_rate()) is not None:
             trials: list[Step] = []
             while not _is_decided(trials):
-                trial = attempt(rate)
+                trial = attempt(rate, number)
                 if trial is None:
                     return found
                 trials.append(trial)

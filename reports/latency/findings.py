@@ -196,7 +196,7 @@ def remarks(result: Mapping[str, Any], series: AllSeries) -> list[str]:
         *_further(result),
         *_stall_text(result),
         *_two_modes(series),
-        *_failure_text(result, series),
+        *_failure_text(series),
         *(f"{opened(note.rstrip('.'))}." for note in result.get("notes", []) if note),
     ]
 
@@ -252,9 +252,9 @@ def _two_modes(series: AllSeries) -> Iterator[str]:
         yield f"Requests over five times the median: {', '.join(far)}."
 
 
-def _failure_text(result: Mapping[str, Any], series: AllSeries) -> Iterator[str]:
+def _failure_text(series: AllSeries) -> Iterator[str]:
     errors = sum(one.data["errors"] for one in series.values())
-    if not errors and not result.get("errors"):
+    if not errors:
         return
     answered = sum(one.data["count"] for one in series.values())
     yield (

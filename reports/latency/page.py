@@ -82,6 +82,7 @@ def _values(result: Mapping[str, Any], series: AllSeries) -> dict[str, Any]:
         "ratio": ratio,
         "rate": rate,
         "share": share,
+        "failed_when": _failed_when,
         "interval": interval,
         "dash": NONE,
         "tag": lambda change: AGAINST.get(change["verdict"]),
@@ -92,6 +93,16 @@ def _missing(series: AllSeries) -> list[str]:
     """Return the reasons why values of any series are missing, each reason once."""
     reasons = (reason for one in series.values() for reason in one.data.get("reasons", {}).values())
     return sorted({reason.rpartition("; ")[2] for reason in reasons})
+
+
+#: The phases whose failures no series counts.
+_UNCOUNTED = {"preflight": "before the run", "warmup": "in the warm-up", "step": "in the search for the knee"}
+
+
+def _failed_when(error: Mapping[str, Any]) -> str:
+    """Return when requests first failed of a kind: the phase if no series counts them, or else the time."""
+    first_s = error.get("first_s")
+    return _UNCOUNTED.get(error.get("phase", ""), NONE if first_s is None else f"{first_s:.1f} s")
 
 
 def _rounds(result: Mapping[str, Any]) -> list[str]:

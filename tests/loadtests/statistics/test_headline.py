@@ -85,7 +85,7 @@ def test_one_interface_alone_says_how_long_it_takes():
 def test_what_spoils_a_run_is_all_that_its_headline_says():
     compared = replace(FOUND, comparisons=[entry("differs"), entry("differs", "p99")])
     assert headline(replace(compared, worthless=["it was late"]))["sentence"] == (
-        "Not valid: these figures say nothing about the robot, because it was late."
+        "These figures say nothing about the robot, because it was late."
     )
     assert headline(replace(compared, undecided=["9 failed"]))["sentence"] == (
         "This run is inconclusive, because 9 failed."

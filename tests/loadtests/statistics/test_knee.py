@@ -11,7 +11,8 @@ from loadtests.statistics.knee import RESOLUTION, Step, knee_search, search_agai
 def robot(knee, tried=None):
     """What an attempt finds on a robot that gives way at a rate."""
 
-    def attempt(rate):
+    def attempt(rate, search):
+        assert search >= 1
         if tried is not None:
             tried.append(rate)
         meets = rate < knee
@@ -39,8 +40,8 @@ def test_a_rate_that_missed_by_chance_ends_no_branch():
     tried = []
     good = robot(900, tried)
 
-    def attempt(rate):
-        trial = good(rate)
+    def attempt(rate, search):
+        trial = good(rate, search)
         unlucky = rate == 200 or (rate > 600 and tried.count(rate) == 1)
         return msgspec.structs.replace(trial, meets=trial.meets and not unlucky)
 
@@ -52,9 +53,9 @@ def test_a_rate_that_missed_by_chance_ends_no_branch():
 def test_a_miss_while_the_generator_was_late_is_tried_again():
     left = iter(range(4))
 
-    def attempt(rate):
+    def attempt(rate, search):
         late = 300 < rate < 500 and next(left, None) is not None
-        trial = robot(900)(rate)
+        trial = robot(900)(rate, search)
         return msgspec.structs.replace(trial, meets=trial.meets and not late, cpu_share=0.99 if late else 0.2)
 
     (search,) = search_again(1, (50, 50_000), attempt)
@@ -70,5 +71,5 @@ def test_what_lies_beyond_the_limits_is_not_guessed():
 
 def test_the_end_of_the_time_ends_the_searches():
     left = iter(range(4))
-    searches = search_again(3, (50, 400), lambda rate: robot(170)(rate) if next(left, None) is not None else None)
+    searches = search_again(3, (50, 400), lambda *each: robot(170)(*each) if next(left, None) is not None else None)
     assert searches == []
