@@ -300,6 +300,8 @@ def _run_and_repeat(robot: RobotUnderTest, teller: Progress, remarks: list[str],
             robot.is_at_rest = False
             robot.begin_span("repetitions")
             look_again(run, robot.connection, robot.rest)
+            robot.begin_span("tidying up")
+            robot.tidy_up()
             robot.is_at_rest = True
             robot.finish()
     except (Exception, SystemExit) as error:  # noqa: BLE001 - as above

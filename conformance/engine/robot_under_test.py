@@ -44,6 +44,7 @@ from conformance.verdict.run import Run
 _DOES: Final = {
     "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to", "lists": "lists",
 }  # fmt: skip
+_TIDY_S: Final = 10.0  # longest time for deleting what the run created, and writing back what it changed
 #: Requirements that expect the web API's value, and observe ROS's.
 _SEEN_ON_ROS: Final = frozenset(
     f"{ROS}/{name}"
@@ -382,6 +383,11 @@ class RobotUnderTest:
         """Stop the device if the run may have moved it; ``run.stop_undelivered`` says why it may still move."""
         if self.rest is not None:
             stop_device(self.rest, self._tell)
+
+    def tidy_up(self) -> None:
+        """Delete what the run created and write back what it changed; stop a device that this may have moved."""
+        if self.log is not None and self.rest is not None and self.log.tidy_up(self.rest, _TIDY_S):
+            self.stop()
 
     def finish(self) -> None:
         """Notice if the last request was one too many, and stop the device if it could not be stopped before."""

@@ -11,6 +11,8 @@ _JUDGED = {
     "noise": "not significant",
     "none": "inconclusive",
 }
+_SHOWN = ("p50", "p90", "p95", "p99", "max")
+_TIMES = "service p50      p90      p95      p99      max  response p99   (ms)"  # heads the columns of these
 #: When a request failed that the counts do not hold.
 _WHEN = {"preflight": ", before the run", "warmup": ", in the warm-up", "step": ", in the search for the knee"}
 
@@ -29,18 +31,13 @@ def _times(entry: dict[str, Any]) -> str:
 def summary(document: dict[str, Any]) -> str:
     """Return a table of the series, the comparisons of medians, the service levels, and last the headline."""
     wide = max([9, *(len(entry["operation"]) for entry in document["series"])])
-    lines = [
-        (
-            f"{'operation':{wide}}  interface  client     count  errors  service p50      p90      p95      p99      max"
-            "  response p99   (ms)"
-        )
-    ]
+    lines = [f"{'operation':{wide}}  interface  client     count  errors  {_TIMES}"]
     for entry in document["series"]:
         service, response = entry["service_ms"], entry["response_ms"]
         lines.append(
             f"{entry['operation']:{wide}}  {entry['interface']:10} {entry['client']:6} {entry['count']:9} "
             f"{entry['errors']:7}     "
-            f"{' '.join(_ms(service[name]) for name in ('p50', 'p90', 'p95', 'p99', 'max'))}      {_ms(response['p99'])}"
+            f"{' '.join(_ms(service[name]) for name in _SHOWN)}      {_ms(response['p99'])}"
         )
     lines += _counts(document["counts"], document["plan"], in_stages=bool(document["stages"]))
     lines += _stages(document["stages"])

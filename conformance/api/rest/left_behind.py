@@ -1,24 +1,36 @@
-"""The state in which a run left a described device: things that it created, changed, deleted and started last."""
+"""The state in which a run left a described device: things that it created, changed, deleted and started last.
+
+At its end, a run deletes what it created, and writes back what it changed, as far as the description allows that.
+"""
 
 from __future__ import annotations
 
+import json
+import time
 from collections import defaultdict
 from collections.abc import Iterable
+from contextlib import suppress
 from http import HTTPStatus
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote, urlsplit
 
+from conformance.api.rest.applicable import allows
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import IDS
 from conformance.documents.json_text import read_json
-from conformance.documents.openapi import Operation, is_json
-from conformance.transport.exchange import Exchange
+from conformance.documents.openapi import Operation, is_json, matching
+from conformance.documents.representation import flat
+from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError
 from conformance.transport.reach import is_same, joined, path_of
 from conformance.verdict.finding import few_of
+
+if TYPE_CHECKING:
+    from conformance.api.rest.interface import RestInterface
 
 # _NAMED: ids, paths and operations that a line of the summary names; the result has all. _ID: characters of an id.
 _NAMED: Final = 3
 _ID: Final = 60
+_WANTS_CONDITION: Final = frozenset({HTTPStatus.PRECONDITION_FAILED, HTTPStatus.PRECONDITION_REQUIRED})
 _GONE: Final = frozenset({HTTPStatus.NOT_FOUND, HTTPStatus.GONE})
 
 
@@ -34,6 +46,7 @@ class LeftBehind:
         self._base_url = base_url
         self._collections = {collection_of(operation.template) for operation in operations} - {""}
         self._created: dict[str, tuple[str, str]] = {}
+        self._new: set[str] = set()
         self._changed: dict[str, tuple[str, bytes | None]] = {}
         self._deleted: dict[str, str] = {}
         self._read: dict[str, bytes] = {}
@@ -59,7 +72,9 @@ class LeftBehind:
                 self._deleted[path] = operation.label
         elif made:
             self._created[made] = operation.label, unquote(made.rstrip("/").rpartition("/")[2])
-        elif operation.method in {"PUT", "PATCH"}:
+            if answer.status == HTTPStatus.CREATED:
+                self._new.add(made)
+        elif operation.method in {"PUT", "PATCH"} and path not in self._created:
             before = self._read.pop(path, None)
             self._changed.setdefault(path, (operation.label, before))
 
@@ -88,6 +103,29 @@ class LeftBehind:
         id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
         return "" if id_ is None else f"{path.rstrip('/')}/{id_}{'/' if path.endswith('/') else ''}"
 
+    def tidy_up(self, api: RestInterface, longest_s: float) -> bool:
+        """Delete what the run created, the newest first, and write back what it changed; return whether it wrote.
+
+        Sends what may be called and moves nothing. What was created with another status than 201 may have existed.
+
+        Args:
+            api: the device's REST interface, whose exchanges are followed.
+            longest_s: after this time it ends with the request that it has begun, s.
+        """
+        until, wrote, last = time.monotonic() + longest_s, False, dict(self._last)
+        with suppress(NoAnswerError, NotPermittedError):
+            for path in reversed([path for path in self._created if path in self._new]):
+                if time.monotonic() < until and path in self._created:
+                    _send(api, "DELETE", path)
+            for path, (_, before) in self._changed.items():
+                read = _send(api, "GET", path) if before is not None and time.monotonic() < until else None
+                if read is not None and read.response.ok and read.response.body != before:
+                    sent = (_send(api, method, path, before) for method in ("PUT", "PATCH"))
+                    wrote |= any(exchange is not None and exchange.response.ok for exchange in sent)
+                    _send(api, "GET", path)
+        self._last = last
+        return wrote
+
     def document(self) -> dict[str, Any]:
         """Return the things left behind, for result.json, with lines for readers; empty if there are none."""
         created: dict[str, list[str]] = defaultdict(list)
@@ -104,7 +142,7 @@ class LeftBehind:
         last = [{"operation": label, "status": status} for label, status in reversed(self._last.items())]
         if not last:
             return {}
-        said = {*created, *changed.values(), *deleted}
+        said = {*created, *deleted, *(label for label, _ in self._changed.values())}
         lines = (
             ("created and not deleted", [_things(label, ids) for label, ids in created.items()]),
             ("changed", [f"{path[:_ID]} by {label.partition(' ')[0]}" for path, label in changed.items()]),
@@ -121,6 +159,35 @@ class LeftBehind:
             "deleted": [{"operation": label, "ids": ids} for label, ids in deleted.items()],
             "last": last,
         }
+
+
+def _send(api: RestInterface, method: str, path: str, was: bytes | None = None) -> Exchange | None:
+    """Send a request, again with an If-Match if the device wants one; None if the description does not allow it.
+
+    Args:
+        api: the device's REST interface.
+        method: of the request.
+        path: below the base URL.
+        was: what a read of the thing said; its members that the operation takes are the request's body.
+    """
+    operation = matching(api.run.contract, method, path)
+    if operation is None or operation.motion or not allows(api, operation):
+        return None
+    headers: tuple[tuple[str, str], ...] = ()
+    body = b""
+    if was is not None:
+        media_type = next(filter(is_json, operation.bodies), "")
+        value = read_json(was).value
+        if not isinstance(value, dict) or not media_type:
+            return None
+        taken = flat(operation.bodies[media_type].schema).get("properties", {})
+        kept = {name: one for name, one in value.items() if name in taken and not flat(taken[name]).get("readOnly")}
+        headers, body = (("Content-Type", media_type),), json.dumps(kept).encode()
+    sent = api.client.send(method, path, headers=headers, body=body)
+    if sent.response.status in _WANTS_CONDITION and (read := _send(api, "GET", path)) is not None:
+        tag = read.response.header("etag") or ""
+        return api.client.send(method, path, headers=(*headers, ("If-Match", tag)), body=body)
+    return sent
 
 
 def _things(label: str, ids: list[str]) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import parse_qsl
 
 from conformance.api.call_rules import CallRules
@@ -22,6 +22,9 @@ from conformance.documents.openapi import Operation, is_json, matching, operatio
 from conformance.documents.wsdl_pack import label_in, services_of
 from conformance.transport.exchange import Exchange, Listener, Request, Unanswered
 from conformance.verdict.finding import Finding
+
+if TYPE_CHECKING:
+    from conformance.api.rest.interface import RestInterface
 
 _OK, _REDIRECT = 200, 300
 # _READ: bytes of a body that are searched for members of its schema. _ERRORS: first status of an error.
@@ -78,6 +81,10 @@ class OperationLog(Listener):
             self._look_into(operation, record, exchange)
             if self._services is None or self._is_success(exchange):
                 self._left.follow(operation, exchange)
+
+    def tidy_up(self, api: RestInterface, longest_s: float) -> bool:
+        """Delete what the run created, and write back what it changed, for so long at most; return whether it wrote."""
+        return self._services is None and self._left.tidy_up(api, longest_s)
 
     def by_hand(self, exchange: Exchange) -> None:
         """Count the response to a request over a raw socket, and note what that has changed."""

@@ -6,6 +6,7 @@ from driven_device import driven
 from small_device import REFUSED, answers, contract_of, described, error, reading
 
 from conformance.api.rest.interface import RestInterface
+from conformance.api.rest.operation_log import OperationLog
 from conformance.scenarios.other_exchanges import OtherExchanges, others
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError
 from conformance.transport.client import Connection, HttpClient
@@ -151,3 +152,16 @@ def test_what_is_missing_or_there_again_is_read_once_more_after_a_wait(tmp_path,
     busy = {f"GET /tubes/{number}" for number in deleted if number % 3 == 1}
     assert again == (busy if broken else set())
     assert tubes.sent.count("GET /tubes/2") == (2 if broken or 2 in deleted else 1)
+
+
+def test_what_a_run_created_is_deleted_at_its_end_the_newest_first(tmp_path):
+    tubes = _Tubes(broken=False)
+    document, routes = tubes.served()
+    with driven(document, routes, tmp_path) as (api, _, _):
+        log = OperationLog(api.run.contract, api.client.base_url)
+        api.client.connection.listeners.append(log)
+        for _ in range(3):
+            api.client.send("POST", "/tubes")
+        assert not log.tidy_up(api, 10), "nothing was changed"
+    assert tubes.sent == ["DELETE /tubes/3", "DELETE /tubes/2", "DELETE /tubes/1"]
+    assert tubes.there == {}
