@@ -1,4 +1,4 @@
-"""Entries of lists without an address of their own, such as notes: a list shows what was created, and nothing else."""
+"""Entries that only their list shows, such as notes: what was created, changed or deleted there, and nothing else."""
 
 from __future__ import annotations
 
@@ -6,11 +6,19 @@ from collections import defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
+from urllib.parse import unquote
 
 from conformance.api.rest.listing import Listing, Page, listing_of, members_of, page_of
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, differences, doubt_of_life, parts_of
+from conformance.api.rest.things import (
+    collection_of,
+    differences,
+    doubt_of_life,
+    doubt_of_write,
+    identifier_of,
+    parts_of,
+)
 from conformance.api.rest.values import IDS
 from conformance.checkers.lists import is_cut
 from conformance.checkers.occasion import Occasion
@@ -26,12 +34,21 @@ _MOST: Final = 200
 _PLACES: Final = frozenset({"position", "seq", "sequence", "order", "index", "rank", "number", "place"})
 # Shorter texts may be in a list by chance.
 _TELLING: Final = 5
+# How much later than its response a device may change or delete an entry, s.
+_SETTLES_S: Final = 2.5
 
 
 class _Entry(NamedTuple):
-    """An entry that a POST has created, or has not: what it sent, and when that was answered."""
+    """An entry that a request has created or changed, or has not.
+
+    Attributes:
+        sent: what it sent, or what the entry showed before it was deleted.
+        operation: of the request; label: that, and how it was answered.
+        at_s: when it was answered, s of the monotonic clock.
+    """
 
     sent: dict[str, Any]
+    operation: Operation
     label: str
     at_s: float
 
@@ -47,7 +64,7 @@ class Entries:
         operations = operations_of(contract) if contract.openapi_path else ()
         own = {collection_of(operation.template) for operation in operations if operation.method == "GET"}
         creates = {one.template.rstrip("/"): one for one in operations if one.method == "POST"}
-        # By path template: the creation of each list whose entries have no address of their own.
+        # By path template: the creation of each list whose entries no other operation reads.
         self._creates: dict[str, Operation] = {
             template: creates[template]
             for operation in operations
@@ -55,35 +72,63 @@ class Entries:
             if listing_of(operation) is not None and template not in own
         }
         self._collections = collections_of(operations)
-        # By path: entries by their identifiers until a list has shown them; all identifiers that creations gave; those
-        # in the last whole list; and creations that were refused since then.
+        # By path template of a list: an operation that changes or deletes an entry.
+        self._items = {name: one for one in operations if (name := collection_of(one.template)) in self._creates}
+        # By path: entries by their identifiers until a list has shown them; those that were deleted; all identifiers
+        # that creations gave; the entries in the last whole list; creations and changes that were refused since then.
         self._made: dict[str, dict[str, _Entry]] = defaultdict(dict)
+        self._gone: dict[str, dict[str, _Entry]] = defaultdict(dict)
         self._given: dict[str, set[str]] = defaultdict(set)
-        self._listed: dict[str, set[str]] = {}
+        self._listed: dict[str, dict[str, dict[str, Any]]] = {}
         self._refused: dict[str, list[_Entry]] = defaultdict(list)
+        self._unchanged: dict[str, dict[str, list[_Entry]]] = defaultdict(lambda: defaultdict(list))
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
         operation, request = occasion.operation, occasion.request
         path = occasion.context.target.partition("?")[0].rstrip("/")
         create = self._creates.get(operation.template.rstrip("/")) if operation is not None else None
-        if request.method == "POST" and create is not None:
+        collection = collection_of(operation.template) if operation is not None else ""
+        if operation is not None and collection in self._items and request.method in {"PUT", "PATCH", "DELETE"}:
+            above, _, last = path.rpartition("/")
+            self._note_change(occasion, operation, above, unquote(last).casefold())
+        elif request.method == "POST" and create is not None:
             self._note(occasion, create, path)
         elif request.method not in SAFE and not refuses(occasion.response.status, operation):
             # It may have changed, created or deleted entries, or what they are below.
-            self._made.clear()
-            self._listed.clear()
+            for memory in (self._made, self._gone, self._listed, self._unchanged):
+                memory.clear()
         elif request.method == "GET" and operation is not None and create is not None:
             listing, page = listing_of(operation), page_of(occasion.response, operation)
             if listing is not None and page is not None and _is_whole(occasion, listing, page):
                 yield from self._judge(occasion, create, page, path)
 
+    def _note_change(self, occasion: Occasion, operation: Operation, path: str, id_: str) -> None:
+        """Note that an entry was changed or deleted, or was not."""
+        status, sent = occasion.response.status, read_json(occasion.request.body).value
+        body = sent if isinstance(sent, dict) else {}
+        entry = _Entry(body, operation, f"{operation.label} with status {status}", occasion.response.received_s)
+        if refuses(status, operation):
+            self._unchanged[path][id_].append(entry)
+            return
+        self._unchanged[path].pop(id_, None)
+        earlier, was = self._made[path].pop(id_, None), self._listed.get(path, {}).pop(id_, {})
+        self._gone[path].pop(id_, None)
+        self._given[path].add(id_)
+        if not occasion.response.ok or status == HTTPStatus.ACCEPTED:
+            self._listed.pop(path, None)
+        elif operation.method == "DELETE":
+            self._gone[path][id_] = entry._replace(sent=was)
+        elif body and occasion.is_valid and is_json(occasion.request.media_type):
+            kept = {} if earlier is None or operation.method == "PUT" else earlier.sent
+            self._made[path][id_] = entry._replace(sent={**kept, **body})
+
     def _note(self, occasion: Occasion, create: Operation, path: str) -> None:
         """Note an entry that was created, or refused."""
         response, sent = occasion.response, read_json(occasion.request.body).value
         body = sent if isinstance(sent, dict) else {}
-        entry = _Entry(body, f"{create.label} with status {response.status}", response.received_s)
-        id_ = _id_of(read_json(response.body).value) if is_json(response.media_type) else ""
+        entry = _Entry(body, create, f"{create.label} with status {response.status}", response.received_s)
+        id_ = self._id_of(read_json(response.body).value, create) if is_json(response.media_type) else ""
         if refuses(response.status, create):
             self._refused[path] = [*self._refused[path], entry][-_MOST:]
         elif response.status != HTTPStatus.CREATED or not id_:
@@ -95,27 +140,69 @@ class Entries:
 
     def _judge(self, occasion: Occasion, create: Operation, page: Page, path: str) -> Iterator[Case]:
         """Judge a whole list."""
-        items = {_id_of(item): members_of(item) for item in page.items}
+        items = {self._id_of(item, create): members_of(item) for item in page.items}
         made = {id_: one for id_, one in self._made[path].items() if one.at_s <= occasion.sent_s}
         first_s = min((one.at_s for id_, one in made.items() if id_ in items), default=float("inf"))
         for id_, entry in made.items():
             # An older one is still there: the list does not keep the newest only.
             doubt = "" if entry.at_s > first_s else "it may keep only the newest entries, or for a time of its own"
-            expected, cause = f"the entry {id_} that {entry.label} created", f"{create.label} listed"
+            expected, cause = f"the entry {id_} of {entry.label}", f"{entry.operation.label} listed"
             requirement, doubt = "description/created-is-there", doubt_of_life(create) or doubt
             yield occasion.case(requirement, id_ in items, expected, "a list without it", cause=cause, doubt=doubt)
             if id_ in items:
-                schema = next(iter(create.bodies.values())).schema
-                # Later entries move those behind them, and a list may show only the beginning of a text.
-                sent = {name: one for name, one in entry.sent.items() if plain_name(name) not in _PLACES}
-                sent = {name: one for name, one in sent.items() if not _begins(one, items[id_].get(plain_name(name)))}
-                wrong = next(differences(sent, items[id_], schema, create.shape, self._collections), "")
-                expected, cause = f"the entry {id_} as {entry.label} wrote it", f"{create.label} entry"
-                doubt = "a list may show its entries in short"
+                wrong, is_short = self._difference(entry, items[id_])
+                expected, cause = f"the entry {id_} as {entry.label} wrote it", f"{entry.operation.label} entry"
+                doubt = doubt_of_write(entry.operation) or ("a list may show its entries in short" if is_short else "")
+                if wrong and entry.operation is not create and occasion.sent_s - entry.at_s <= _SETTLES_S:
+                    continue  # a device may change it a moment later
                 yield occasion.case("description/written-is-read", not wrong, expected, wrong, cause=cause, doubt=doubt)
                 del self._made[path][id_]
+        for id_, entry in list(self._gone[path].items()):
+            # A list may show what was deleted for a moment, or marked, or in another state.
+            now, is_late = items.get(id_), occasion.sent_s - entry.at_s > _SETTLES_S
+            if now is None or (is_late and now == entry.sent):
+                expected, cause = f"a list without {id_} after {entry.label}", f"{entry.operation.label} listed"
+                found = "a list with it as it was"
+                yield occasion.case("description/deleted-is-gone", now is None, expected, found, cause=cause)
+            if now is None or is_late:
+                del self._gone[path][id_]
+        yield from self._judge_unchanged(occasion, create, items, path)
         yield from self._judge_refused(occasion, create, items, path)
-        self._listed[path] = set(items)
+        self._listed[path] = items
+
+    def _difference(self, entry: _Entry, item: dict[str, Any]) -> tuple[str, bool]:
+        """Return what an entry shows in another way than it was written, and whether it may be written in short."""
+        schema = next(iter(entry.operation.bodies.values())).schema
+        shape, wrong, is_short = entry.operation.shape, "", False
+        for name, value in entry.sent.items():
+            # Later entries move those behind them, and a list may show only the beginning of a text.
+            if plain_name(name) not in _PLACES and not _begins(value, item.get(plain_name(name))) and not wrong:
+                wrong = next(differences({name: value}, item, schema, shape, self._collections), "")
+                is_short = not isinstance(value, int | float)
+        return wrong, is_short
+
+    def _judge_unchanged(
+        self, occasion: Occasion, create: Operation, items: dict[str, dict[str, Any]], path: str
+    ) -> Iterator[Case]:
+        """Judge whether entries are as they were after changes and deletions that were refused."""
+        for id_, refused in self._unchanged.pop(path, {}).items():
+            was, now = self._listed.get(path, {}).get(id_), items.get(id_)
+            for entry in refused if was else ():
+                names = {plain_name(name): one for name, one in entry.sent.items()}
+                kept = [name for name, one in names.items() if was and was.get(name) != one == (now or {}).get(name)]
+                done = bool(kept) or (now is None and entry.operation.method == "DELETE")
+                expected, cause = f"the entry {id_} as before {entry.label}", f"{entry.operation.label} refused"
+                found = f"{clip(names[kept[0]])} as {kept[0]}" if kept else "a list without it"
+                doubt = "" if kept else doubt_of_life(create)
+                yield occasion.case("description/refused-keeps", not done, expected, found, cause=cause, doubt=doubt)
+
+    def _id_of(self, value: Any, create: Operation) -> str:
+        """Return the identifier of an entry; empty if it has none."""
+        item, members = self._items.get(create.template.rstrip("/")), members_of(value)
+        found = identifier_of(members, item) if item is not None else ""
+        return found or next(
+            (str(members[name]).casefold() for name in IDS if isinstance(members.get(name), str | int)), ""
+        )
 
     def _judge_refused(
         self, occasion: Occasion, create: Operation, items: dict[str, dict[str, Any]], path: str
@@ -124,7 +211,8 @@ class Entries:
         parts = parts_of(next(iter(create.bodies.values())).schema) if create.bodies else {}
         free = {name for name, part in parts.items() if is_free_text(part)}
         before, refused = self._listed.get(path), self._refused.pop(path, [])
-        new = [item for id_, item in items.items() if before is not None and id_ not in before | self._given[path]]
+        known = self._given[path].union(before or ())
+        new = [item for id_, item in items.items() if before is not None and id_ not in known]
         for entry in refused if before is not None else ():
             texts = {plain_name(name): entry.sent[name] for name in free & entry.sent.keys()}
             texts = {name: one for name, one in texts.items() if isinstance(one, str) and len(one) >= _TELLING}
@@ -133,12 +221,6 @@ class Entries:
                 expected, cause = f"a list without what {entry.label} asked for", f"{create.label} refused"
                 found = f"a new entry with {clip(next(iter(texts.values())))}" if there else ""
                 yield occasion.case("description/refused-keeps", not there, expected, found, cause=cause)
-
-
-def _id_of(value: Any) -> str:
-    """Return the identifier of an entry; empty if it has none."""
-    item = members_of(value)
-    return next((str(item[name]) for name in IDS if isinstance(item.get(name), str | int)), "")
 
 
 def _begins(value: Any, seen: Any) -> bool:

@@ -29,6 +29,8 @@ _MARKS = {"pass": "pass", "fail": "FAIL", "inconclusive": "inconclusive", "not-c
 # A device that is judged by its own description conforms to no contract.
 _SHOWN_CURL = 2000
 _SHOWN_BLOCKED = 5
+# The word of the pages for the verdict "skip".
+_UNTESTED = "not tested"
 # _IN_FULL: findings of one requirement that are printed in full; each further one gets a line of _LINE characters.
 _IN_FULL = 5
 _LINE = 160
@@ -76,11 +78,17 @@ def print_summary(outcome: Certification) -> None:
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
         click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
+    _print_counts(document)
+
+
+def _print_counts(document: Mapping[str, Any]) -> None:
+    """Print in what state the device was left, and last the verdict with the numbers of requirements."""
     not_claimed = "not judged" if "api" in document else "not-claimed"
     counts = Counter(requirement["verdict"] for requirement in document["requirements"])
     counts[not_claimed], counts["inconclusive"] = counts["not-claimed"], counts["error"]
     # In the order of the pages, and with the words of the classes.
-    order = ("fail", "inconclusive", "warn", "skip", "pass", not_claimed)
+    counts[_UNTESTED] = counts["skip"]
+    order = ("fail", "inconclusive", "warn", _UNTESTED, "pass", not_claimed)
     told = ", ".join(f"{counts[value]} {value}" for value in order if counts[value])
     if "api" in document:
         _print_unshown(document["api"]["operations"])
@@ -92,6 +100,10 @@ def print_summary(outcome: Certification) -> None:
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{count_of(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
+    if counts[_UNTESTED] and "api" in document:
+        click.echo(
+            "not tested: this run could not try it, and the report says why; not judged: nothing called shows it"
+        )
 
 
 def _print_answers(found: Sequence[Mapping[str, str]]) -> None:

@@ -228,6 +228,7 @@ class RobotUnderTest:
             self.permission.may_call_ports(self.rest.client.base_url)
             self.log = OperationLog(self.run.contract, self.rest.client.base_url)
             self.connection.listeners.append(self.log)
+            self.rest.left = None if SOAP in self.run.contract.classes else self.log.left
             self.run.judge.concerned = lambda request: sorted(self.log.labels_of(request)) if self.log else ()
             if self.run.ros and self.run.statement.ros_map is not None:
                 self.ros_ends = RosEnds(self.run.statement.ros_map, self.run.judge.concerned)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Container
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
-from conformance.api.rest.inputs import usual_inputs, whole_body
+from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits, other_texts
 from conformance.api.rest.things import collection_of, id_member
@@ -19,6 +19,9 @@ from conformance.scenarios.special_bodies import with_owned
 from conformance.scenarios.survey import Probe, Surveyor
 from conformance.transport.exchange import Exchange, Outgoing
 from conformance.transport.reach import is_same, joined, path_of
+
+#: Statuses by which a device may say that it has no room for another thing.
+FULL: Final = frozenset({409, 507})
 
 
 def created_path(
@@ -32,7 +35,6 @@ def created_path(
         read: operation that reads it.
         statuses: of a creation that counts. With 202, a thing may come later, or end by itself.
     """
-    made: Probe | None = None
     usual = usual_inputs(create, surveyor.values)[:2]
     body = with_texts(create, usual[0].body)
     # Create it with all members, so that each can be written and removed.
@@ -40,13 +42,34 @@ def created_path(
     whole = whole if isinstance(whole, dict) else usual[0].body
     whole = with_texts(create, whole) or whole
     owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
-    for inputs in (*(replace(usual[0], body=item) for item in (owned, body) if item), *usual):
-        made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
-        if made.ok:
-            break
+    tried = [*(replace(usual[0], body=item) for item in (owned, body) if item), *usual]
+    made = _first_taken(surveyor, create, tried)
+    if (
+        made is not None
+        and made.status in FULL
+        and made.exchange is not None
+        and makes_room(surveyor.api, made.exchange)
+    ):
+        made = _first_taken(surveyor, create, tried)
     if made is None or made.exchange is None or made.status not in statuses:
         return ""
     return location_of(surveyor.api, read, made.exchange)
+
+
+def _first_taken(surveyor: Surveyor, create: Operation, tried: list[Inputs]) -> Probe | None:
+    """Return the first of several creations that is accepted, or the last one."""
+    made: Probe | None = None
+    for inputs in tried:
+        made = surveyor.send(create, Variation(Kind.AGAIN, "", "", inputs))
+        if made.ok:
+            break
+    return made
+
+
+def makes_room(api: RestInterface, refused: Exchange) -> bool:
+    """Return whether things that the run has created were deleted, so that a refused creation may succeed now."""
+    path = refused.request.url.removeprefix(api.client.base_url).partition("?")[0]
+    return api.left is not None and api.left.make_room(api, path)
 
 
 def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:

@@ -29,6 +29,7 @@ from conformance.documents.openapi import Operation, is_json, operations_of, res
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
 from conformance.scenarios.creating import created_path, with_texts
+from conformance.scenarios.entries import change_entries
 from conformance.scenarios.list_queries import choosing
 from conformance.scenarios.lists import Paged, pages_below
 from conformance.scenarios.living import ABSENT
@@ -98,6 +99,7 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 thing.delete(delete, operations.get(("GET", collection_of(path))))
     with api.run.limit.lift(), suppress(NoAnswerError):
         post_files(surveyor, operations)
+        change_entries(surveyor, operations)
     return surveyor.trace
 
 

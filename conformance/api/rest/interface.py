@@ -45,6 +45,7 @@ class RestInterface:
         server: the Server field of the first response that had one; empty: none had.
         is_shut_out: whether the device has refused the suite for too many wrong credentials.
         driven: by which values the run has named what it may have moved; None: the pack knows how it stops.
+        left: what the run has created and changed on a described device; None: nobody follows that.
         is_recorded: whether the present exchange is recorded by a scenario, whose rules judge it.
     """
 
@@ -65,6 +66,7 @@ class RestInterface:
     stop_device: Callable[[], str] | None = None
     preparation: Any = None
     values: Any = None
+    left: Any = None
     looked: list[Exchange] = field(default_factory=list)
     server: str = ""
     is_recorded: bool = False

@@ -55,12 +55,15 @@ class OperationLog(Listener):
     Args:
         contract: the description.
         base_url: URL below which the operations are.
+
+    Attributes:
+        left: what the run has created and changed so far.
     """
 
     def __init__(self, contract: Contract, base_url: str) -> None:
         self._contract, self._base_url = contract, base_url
         self._services = services_of(contract)
-        self._left = LeftBehind(operations_of(contract), base_url)
+        self.left = LeftBehind(operations_of(contract), base_url)
         self._records: dict[str, _Record] = {item.label: _Record() for item in operations_of(contract)}
         self._branches = {
             (item.label, status, name): {f"{status}{branch}" for branch in branches_of(schema)}
@@ -80,11 +83,11 @@ class OperationLog(Listener):
             record.slowest_ms = max(record.slowest_ms, exchange.response.elapsed_ms)
             self._look_into(operation, record, exchange)
             if self._services is None or self._is_success(exchange):
-                self._left.follow(operation, exchange)
+                self.left.follow(operation, exchange)
 
     def tidy_up(self, api: RestInterface, longest_s: float) -> bool:
         """Delete what the run created, and write back what it changed, for so long at most; return whether it wrote."""
-        return self._services is None and self._left.tidy_up(api, longest_s)
+        return self._services is None and self.left.tidy_up(api, longest_s)
 
     def by_hand(self, exchange: Exchange) -> None:
         """Count the response to a request over a raw socket, and note what that has changed."""
@@ -93,7 +96,7 @@ class OperationLog(Listener):
             record = self._records[operation.label]
             record.sent += 1
             record.statuses[exchange.response.status] += 1
-            self._left.follow(operation, exchange)
+            self.left.follow(operation, exchange)
 
     def on_no_response(self, request: Unanswered) -> None:
         """Count a request without a response."""
@@ -166,7 +169,7 @@ class OperationLog(Listener):
             "title": str(info.get("title", "")),
             "version": str(info.get("version", "")),
             "operations": rows,
-            **({"left_behind": left} if (left := self._left.document()) else {}),
+            **({"left_behind": left} if (left := self.left.document()) else {}),
             "coverage": {
                 "operations": [len(called), len(operations)],
                 "parameters": [

@@ -1,4 +1,4 @@
-"""Lists whose entries have no address of their own: they show what was created, and nothing that was refused."""
+"""Entries that only their list shows: what was created, changed or deleted there, and nothing that was refused."""
 
 import json
 
@@ -22,7 +22,23 @@ _PATHS = {
         },
     }
 }
-_THERE, _READ, _KEPT = (f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps"))
+_MARK = {"type": "object", "properties": {"x": {"type": "number"}}}
+_MARKED = {"type": "object", "properties": {"id": {"type": "integer"}, **_MARK["properties"]}}
+_WRITES = {"requestBody": {"required": True, "content": {"application/json": {"schema": _MARK}}}}
+_PATHS |= {
+    "/marks": {
+        "get": {"responses": {"200": answers({"type": "array", "items": _MARKED})}},
+        "post": {**_WRITES, "responses": {"201": answers(_MARKED)}},
+    },
+    "/marks/{mark_id}": {
+        "parameters": [{"name": "mark_id", "in": "path", "required": True, "schema": {"type": "integer"}}],
+        "patch": {**_WRITES, "responses": {"200": answers(_MARKED), "409": REFUSED}},
+        "delete": {"responses": {"204": {"description": "gone"}, "409": REFUSED}},
+    },
+}
+_THERE, _READ, _KEPT, _GONE = (
+    f"description/{name}" for name in ("created-is-there", "written-is-read", "refused-keeps", "deleted-is-gone")
+)
 
 
 @pytest.fixture(name="contract", scope="module")
@@ -48,11 +64,24 @@ def _broken(contract, steps):
         answer = json.dumps(came).encode() if came is not None else b""
         response = Response(status, kind if answer else (), answer, 1.0, received_s=float(number))
         for case in checkers(Exchange(request, response)):
-            if not case.holds and case.requirement in {_THERE, _READ, _KEPT}:
+            if not case.holds and case.requirement in {_THERE, _READ, _KEPT, _GONE}:
                 broken[case.requirement] = bool(case.doubt)
     return broken
 
 
+def _marks(**marks):
+    return "GET", "/marks", None, 200, [{"id": int(name[1:]), "x": x} for name, x in marks.items()]
+
+
+def _patched(x, status=200):
+    return "PATCH", "/marks/1", {"x": x}, status, {"id": 1, "x": x} if status == 200 else None
+
+
+def _deleted(status=204):
+    return "DELETE", "/marks/1", None, status, None
+
+
+_MARK_MADE = ("POST", "/marks", {"x": 5}, 201, {"id": 1, "x": 5})
 _NEWER = [_made("n1", "text of n1"), _made("n2", "text of n2")]
 _WRONG = {
     "the newer one of two is lost": ([*_NEWER, _listed("n1")], {_THERE: False}),
@@ -62,6 +91,11 @@ _WRONG = {
         [_listed("n0"), _made("n1", "refused", 406), _listed("n0", "n1", n1="refused")],
         {_KEPT: False},
     ),
+    "another number": ([_MARK_MADE, _marks(m1=0)], {_READ: False}),
+    "a change that is lost": ([_marks(m1=5), _patched(7), *[_marks(m1=5)] * 3], {_READ: False}),
+    "a refused change that was stored": ([_marks(m1=5), _patched(7, 409), _marks(m1=7)], {_KEPT: False}),
+    "a refused deletion that was done": ([_marks(m1=5), _deleted(409), _marks()], {_KEPT: False}),
+    "what was deleted stays": ([_marks(m1=5), _deleted(), *[_marks(m1=5)] * 3], {_GONE: False}),
 }
 _RIGHT = {
     "all are there": [*_NEWER, _listed("n2", "n1")],
@@ -70,6 +104,12 @@ _RIGHT = {
         _listed("n0"), _made("n1", "refused", 406), _made("n1", "refused"), _listed("n0", "n1", n1="refused"),
     ],
     "another client's entry": [_listed("n0"), _made("n1", "refused", 406), _listed("n0", "n9", n9="another text")],
+    "a change, and one that is refused": [_marks(m1=5), _patched(7), _marks(m1=7), _patched(9, 409), _marks(m1=7)],
+    "a refused change, and then the same one": [_marks(m1=5), _patched(7, 409), _patched(7), _marks(m1=7)],
+    "a change, and the same one that is refused": [_marks(m1=5), _patched(7), _patched(7, 409), _marks(m1=7)],
+    "a change that is done a moment later": [_marks(m1=5), _patched(7), _marks(m1=5), _marks(m1=7)],
+    "a deletion that is done a moment later": [_marks(m1=5, m2=1), _deleted(), _marks(m1=5, m2=1), _marks(m2=1)],
+    "a number that is given again": [_MARK_MADE, _deleted(), _MARK_MADE, _marks(m1=5)],
     "a list of which nothing is known before": [_made("n1", "refused", 406), _listed("n1", n1="refused")],
 }  # fmt: skip
 

@@ -1,0 +1,107 @@
+"""Create, change and delete entries that only their list shows, and read the list after each of these requests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import islice
+from typing import Any, Final
+from urllib.parse import quote
+
+from conformance.api.rest.inputs import request_of, usual_inputs
+from conformance.api.rest.listing import Listing, listing_of, page_of
+from conformance.api.rest.samples import fits
+from conformance.api.rest.things import collection_of, id_member
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation
+from conformance.documents.representation import flat
+from conformance.scenarios.creating import FULL, makes_room
+from conformance.scenarios.survey import Surveyor
+from conformance.scenarios.writing import Writer
+from conformance.transport.exchange import Exchange
+
+# Lists that are tried. Below: entries that are created in each. _LIMIT: items of a page without a declared maximum.
+_LISTS: Final = 4
+_ENTRIES: Final = 2
+_LIMIT: Final = 100
+_CHANGES: Final = ("PATCH", "PUT")
+
+
+def change_entries(surveyor: Surveyor, operations: Mapping[tuple[str, str], Operation]) -> None:
+    """Write to lists whose entries no operation reads by themselves.
+
+    Args:
+        surveyor: sends the requests.
+        operations: those that may be called, by method and path.
+    """
+    read = {collection_of(template) for method, template in operations if method == "GET"}
+    lists = (
+        (create, lister, listing)
+        for (method, template), create in operations.items()
+        if method == "POST" and template not in read
+        if (lister := operations.get(("GET", template))) is not None and (listing := listing_of(lister)) is not None
+    )
+    for create, lister, listing in islice(lists, _LISTS):
+        of_entry = {
+            method: operation
+            for (method, template), operation in operations.items()
+            if collection_of(template) == create.template.rstrip("/")
+        }
+        _Entries(Writer(surveyor.api, surveyor.values), create, lister, listing, of_entry).write()
+
+
+class _Entries:
+    """A list, and what changes its entries."""
+
+    def __init__(
+        self, writer: Writer, create: Operation, lister: Operation, listing: Listing, of_entry: Mapping[str, Operation]
+    ) -> None:
+        self._writer, self._create, self._lister, self._of_entry = writer, create, lister, of_entry
+        usual = request_of(lister, usual_inputs(lister, writer.values)[0])
+        self._path = usual.target.partition("?")[0]
+        most = flat(listing.limit.schema).get("maximum", _LIMIT) if listing.limit is not None else None
+        is_fit = listing.limit is not None and fits(listing.limit.schema, most)
+        self._query = {listing.limit.name: most} if listing.limit is not None and is_fit else {}
+
+    def write(self) -> None:
+        """Create two entries, change and delete one of them, and read the list each time."""
+        self._read()
+        paths = [self._made(turn) for turn in range(1, _ENTRIES + 1)]
+        self._read()
+        path = next(filter(None, paths), "")
+        for turn, method in enumerate(_CHANGES if path else (), _ENTRIES + 1):
+            change = self._of_entry.get(method)
+            for body in self._writer.bodies(change, turn)[:1] if change is not None else ():
+                before = self._read()
+                if change is not None and self._writer.conditional(change, self._lister, path, body).response.ok:
+                    self._until_other(before)
+        delete = self._of_entry.get("DELETE")
+        if delete is not None and path:
+            before = self._read()
+            if self._writer.send(delete, path).response.ok:
+                self._until_other(before)
+
+    def _made(self, turn: int) -> str:
+        """Create an entry; return the path by which it is changed, or an empty text."""
+        body = next(iter(self._writer.bodies(self._create, turn)), None)
+        made = self._writer.send(self._create, self._path, body)
+        if made.response.status in FULL and makes_room(self._writer.api, made):
+            made = self._writer.send(self._create, self._path, body)
+        elif not made.response.ok and body is not None:
+            made = self._writer.send(self._create, self._path)
+        item = next(iter(self._of_entry.values()), None)
+        id_: Any = id_member(read_json(made.response.body).value, item)[1] if item is not None else None
+        end = "/" if item is not None and item.template.endswith("/") else ""
+        return f"{self._path.rstrip('/')}/{quote(str(id_), safe='')}{end}" if made.response.ok and id_ else ""
+
+    def _read(self) -> Exchange:
+        return self._writer.send(self._lister, self._path, query=self._query)
+
+    def _until_other(self, before: Exchange) -> None:
+        """Read the list until it differs from what it was, or for a few seconds."""
+        old = page_of(before.response, self._lister)
+        self._writer.until(
+            self._read,
+            lambda exchange: (
+                (new := page_of(exchange.response, self._lister)) is None or old is None or new.items != old.items
+            ),
+        )
