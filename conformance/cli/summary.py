@@ -96,6 +96,8 @@ def _print_counts(document: Mapping[str, Any]) -> None:
         called, described = document["api"]["coverage"]["operations"]
         told = f"{called} of {described} operations called; {told}"
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
+    if stale := document.get("stale"):
+        accepted += f", but the baseline expects {few_of(stale, _SHOWN_BLOCKED)} to fail, so the exit code is 1"
     click.echo(
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{count_of(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
@@ -188,6 +190,8 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     head = f"{_word(requirement, failure)} {requirement['id']} ({requirement['level']}, {requirement['source']})"
     click.echo(f"\n{cause['number']}. {head}")
+    if accepted := requirement.get("expected_failure"):
+        click.echo(wrap(inert(f"accepted by the baseline until {accepted['expires']}: {accepted['reason']}"), "  "))
     # The others are in the report and in roaas explain.
     click.echo(wrap(_SENTENCE.split(requirement["text"], maxsplit=1)[0], "  "))
     click.echo(wrap(inert(cause["text"]), "  "))

@@ -44,6 +44,10 @@ _FEWEST: Final = 3
 _AT_ONCE: Final = 325
 # First requests, which measure the device's response time even if it has no reads.
 _FIRST: Final = 12
+# _ON_THINGS: requests to what the device keeps, if it can be changed; _EACH_ON_THINGS: for each operation. Below: how
+# long the run then waits for late changes, s.
+_ON_THINGS, _EACH_ON_THINGS = 250, 25
+_WAITS_S: Final = 6.0
 # _OWN_MS: the suite's own time for a request. _DRAWN_MS: for one drawn by Hypothesis, ms. Below: for its start, s.
 _OWN_MS: Final = 0.5
 _DRAWN_MS: Final = 5.5
@@ -59,17 +63,19 @@ class Estimate:
         drawn: how many of them Hypothesis draws.
         at_once: how many of them are sent by several clients at once.
         slow: claimed classes whose time depends on how fast the device moves or its graph responds; not included.
+        waits_s: how long it waits for late changes, s.
     """
 
     requests: int
     drawn: int = 0
     at_once: int = 0
     slow: tuple[str, ...] = ()
+    waits_s: float = 0.0
 
     def seconds(self, usual_ms: float) -> float:
         """Return how long the run takes where the device needs so many milliseconds for an answer, s."""
         in_turn = self.requests - self.at_once * (1 - 1 / _READS)
-        return _START_S + (in_turn * (usual_ms + _OWN_MS) + self.drawn * _DRAWN_MS) / 1000
+        return _START_S + self.waits_s + (in_turn * (usual_ms + _OWN_MS) + self.drawn * _DRAWN_MS) / 1000
 
     def text(self, usual_ms: float | None = None) -> str:
         """Return the estimate as a sentence; without a time if the time of an answer is not known."""
@@ -94,18 +100,20 @@ def estimate(run: Run, operations: Sequence[Operation]) -> Estimate:
     effort = run.effort
     if SOAP in run.contract.classes:
         return Estimate(_FIRST + len(operations) * requests_of(effort))
-    surveyed = covering = fuzzed = 0
+    surveyed, covering, fuzzed, waits_s = 0, 0, 0, 0.0
     if {"description", "robustness"} & set(run.claims):
         reads = [operation for operation in operations if operation.method == "GET"]
         surveyed = sum(_survey_count(operation, effort, run.seed) for operation in operations) + TIMED_AGAIN * len(
             reads
         )
         surveyed += max(FEWEST_REPEATS, effort.cases(REPEATS)) if reads else 0
+        if len(reads) < len(operations):
+            surveyed, waits_s = surveyed + _ON_THINGS + _EACH_ON_THINGS * len(operations), _WAITS_S
         generated = [_generated_counts(operation, effort) for operation in operations]
         covering, fuzzed = sum(pair[0] for pair in generated), sum(pair[1] for pair in generated)
     http, at_once = _http(operations, effort) if "http" in run.claims else (0, 0)
     slow = tuple(name for name in (MOTION, ROS) if name in run.claims)
-    return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow)
+    return Estimate(_FIRST + surveyed + covering + fuzzed + http, fuzzed, at_once, slow, waits_s)
 
 
 def _survey_count(operation: Operation, effort: Effort, seed: int) -> int:

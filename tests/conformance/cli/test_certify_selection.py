@@ -76,7 +76,8 @@ def test_a_baseline_is_written_asked_for_reasons_and_told_when_it_is_stale(devic
     day = "expires = 2999-12-31"
     text = re.sub("expires = .*", day, text.replace('reason = ""', 'reason = "ticket 7"'))
     known.write_text(text, encoding="utf-8")
-    assert certified(device, tmp_path, "--class", "description", "--baseline", known).exit_code == 0
+    accepted = certified(device, tmp_path, "--class", "description", "--baseline", known)
+    assert (accepted.exit_code, "until 2999-12-31: ticket 7" in accepted.text) == (0, True), accepted.text
     known.write_text(re.sub("operations = .*", 'operations = ["GET /other"]', text), encoding="utf-8")
     elsewhere = certified(device, tmp_path, "--class", "description", "--baseline", known)
     assert (elsewhere.exit_code, "its baseline entry does not name GET /" in elsewhere.text) == (1, True), (
@@ -89,6 +90,7 @@ def test_a_baseline_is_written_asked_for_reasons_and_told_when_it_is_stale(devic
     assert stale.exit_code == 1
     assert stale.result["stale"] == [passing]
     assert f"The baseline expects {passing} to fail, and it passes: delete the entry." in stale.text
+    assert f"but the baseline expects {passing} to fail, so the exit code is 1" in stale.text
 
 
 def on_terminal(command, columns):
