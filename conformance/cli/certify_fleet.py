@@ -37,13 +37,7 @@ def certify_fleet(path: Path, options: CertifyOptions) -> CommandResult:
         click.UsageError: the file is invalid, or an option is given that applies to a single robot.
     """
     from conformance.fleet.member_run import MemberRun  # noqa: PLC0415 - --help needs no asyncio
-    from conformance.fleet.result import (  # noqa: PLC0415
-        ROBOTS_FOLDER,
-        FleetRun,
-        exit_code,
-        fleet_document,
-        write_fleet,
-    )
+    from conformance.fleet.result import ROBOTS_FOLDER, FleetRun, exit_code, fleet_document, write_fleet  # noqa: PLC0415
 
     shared = _shared_options()
     try:

@@ -135,11 +135,7 @@ def chosen_of_api(contract: Contract, base_url: str, options: dict[str, Any]) ->
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import (  # noqa: PLC0415 - see selftest.py
-        compose,
-        kinds_in_requests,
-        sample,
-    )
+    from proof.selftest.generated.adversary import compose, kinds_in_requests, sample  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.described import described_mutants  # noqa: PLC0415 - see selftest.py
 
     called, patterns = set(callable_operations(contract, options)), options["patterns"] or ("*",)
@@ -206,11 +202,7 @@ def chosen_mutants(contract: Contract, options: dict[str, Any]) -> tuple[list[Ge
     Raises:
         click.UsageError: no mutant has such a name.
     """
-    from proof.selftest.generated.adversary import (  # noqa: PLC0415 - see selftest.py
-        compose,
-        kinds_in_requests,
-        sample,
-    )
+    from proof.selftest.generated.adversary import compose, kinds_in_requests, sample  # noqa: PLC0415 - see selftest.py
     from proof.selftest.generated.catalogue import generated_mutants, open_place  # noqa: PLC0415 - as above
 
     patterns = options["patterns"] or ("*",)
