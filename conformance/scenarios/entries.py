@@ -65,7 +65,7 @@ class _Entries:
     def write(self) -> None:
         """Create two entries, change and delete one of them, and read the list each time."""
         self._read()
-        paths = [self._made(turn) for turn in range(1, _ENTRIES + 1)]
+        paths = [self._create_one(turn) for turn in range(1, _ENTRIES + 1)]
         self._read()
         path = next(filter(None, paths), "")
         for turn, method in enumerate(_CHANGES if path else (), _ENTRIES + 1):
@@ -80,7 +80,7 @@ class _Entries:
             if self._writer.send(delete, path).response.ok:
                 self._until_other(before)
 
-    def _made(self, turn: int) -> str:
+    def _create_one(self, turn: int) -> str:
         """Create an entry; return the path by which it is changed, or an empty text."""
         body = next(iter(self._writer.bodies(self._create, turn)), None)
         made = self._writer.send(self._create, self._path, body)
