@@ -153,8 +153,6 @@ class Feeder(Device):
             self.settings.update(values)
             self.due.remove((at, values))
         told = dict(self.settings)
-        if "stale at times" in self.faults and self.reads % 9 == 0:
-            told["Mode"] = "even" if told["Mode"] != "even" else "slow"
         if "fails at times" in self.faults and self.reads % 8 == 0:
             return None
         if "latin" in self.faults and not told["Label"].isascii():
@@ -162,7 +160,7 @@ class Feeder(Device):
         if "escaped twice" in self.faults:
             told["Label"] = escape(told["Label"])
         if self.style == "drifts":
-            told["Rate"] = str(float(told["Rate"]) + 0.003 * (self.reads % 5))
+            told["Rate"] = str(min(8.0, float(told["Rate"]) + 0.003 * (self.reads % 5)))
         return "".join(f"<c:{key}>{escape(text)}</c:{key}>" for key, text in told.items())
 
     def _SetSettings(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
@@ -202,8 +200,7 @@ class Feeder(Device):
         number = sent["Bin"]
         if number not in self.bins:
             return None
-        told = next(iter(self.bins)) if "always the first bin" in self.faults else number
-        return f"<c:Bin>{number}</c:Bin><c:Weight>{self.bins[told]}</c:Weight>"
+        return f"<c:Bin>{number}</c:Bin><c:Weight>{self.bins[number]}</c:Weight>"
 
     def _SetBin(self, sent: dict[str, str]) -> str | None:  # noqa: N802 - as the operation is called
         if sent["Bin"] not in self.bins:

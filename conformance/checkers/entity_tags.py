@@ -1,14 +1,16 @@
 """Entity tags, conditions and ranges: one tag names one content, and 304 and 206 need a condition (RFC 9110 13, 14)."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
+from conformance.api.rest.patches import same
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import plain_name
 from conformance.transport.exchange import SAFE_METHODS, Response
 from conformance.verdict.evidence import Case
 
@@ -35,6 +37,13 @@ _MOST, _LARGEST = 4000, 65_536
 
 #: Header fields of a request that choose a representation.
 Fields = tuple[tuple[str, str], ...]
+#: Phrases in a description which say that a write with another revision than the present one is refused.
+GUARDED: Final = re.compile(
+    r"\b(?:revision|version|etag)\b[^.]*\b(?:not|differ\w*|other|stale|older?|match\w*)\b[^.]*\b(?:409|412|conflict|refus\w+)",
+    re.IGNORECASE,
+)
+#: Members with the revision of a thing.
+REVISION: Final = re.compile(r"(?:revision|version|etag)$")
 
 
 class _Condition(NamedTuple):
@@ -392,3 +401,15 @@ def _range(occasion: Occasion, asked: dict[str, str]) -> Case:
         "another status than 206, or a part that was asked for, and the header field Content-Range that fits it",
         f"status 206 with {len(answer.body)} bytes and Content-Range: {answer.header('content-range')}",
     )
+
+
+def judge_revision(
+    read: Occasion, write: Occasion, sent: Mapping[str, Any], before: Mapping[str, Any]
+) -> Iterator[Case]:
+    """Judge whether a write with another revision than the present one is refused, if the description says so."""
+    operation = write.operation
+    for name in sent.keys() & before.keys() if operation is not None and GUARDED.search(operation.text) else ():
+        if operation is not None and REVISION.search(plain_name(name)):
+            expected = f"a refusal, as {name} was {clip(before[name])}, and not {clip(sent[name])}"
+            found, cause = f"status {write.response.status}", f"{operation.label} {name} stale"
+            yield read.case("description/states", same(sent[name], before[name]), expected, found, cause=cause)

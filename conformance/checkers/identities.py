@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final
-from urllib.parse import unquote, urlsplit
+from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.things import collection_of, identifier_of, object_in
@@ -39,6 +39,8 @@ class Identities:
         # By collection: identifiers in its list. Below: identifiers under which their own item was read.
         self._listed: dict[str, set[str]] = defaultdict(set)
         self._own: dict[str, set[str]] = defaultdict(set)
+        # By operation and parameter: values that a response has shown as they were asked for.
+        self._shown: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._items: dict[str, Operation] | None = None
         self._count = 0
 
@@ -49,7 +51,7 @@ class Identities:
         if self._items is None:
             found = [one for one in operations_of(occasion.contract) if one.method == "GET"]
             self._items = {collection_of(one.template): one for one in found if collection_of(one.template)}
-        if not self._items or operation is None or not answer.ok or method in SAFE - {"GET"}:
+        if operation is None or not answer.ok or method in SAFE - {"GET"}:
             return
         path = occasion.context.target.partition("?")[0].rstrip("/")
         above, _, last = path.rpartition("/")
@@ -59,6 +61,7 @@ class Identities:
             self._own[above].discard(id_)
         if method != "GET" or answer.cut or not is_json(answer.media_type):
             return
+        yield from self._parameters(occasion, operation)
         item = self._items.get(operation.template.rstrip("/"))
         if item is not None:
             items = items_of(read_json(answer.body).value) or []
@@ -69,6 +72,18 @@ class Identities:
         if collection_of(operation.template):
             yield from self._item(occasion, operation, above, id_)
             yield from self._located(occasion, operation, above, id_)
+
+    def _parameters(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
+        """Judge whether a response shows the parameters that were asked for, if it has shown both values before."""
+        pairs, value = dict(parse_qsl(urlsplit(occasion.request.url).query)), read_json(occasion.response.body).value
+        names = [one.name for one in operation.parameter("query") if one.required and one.name in pairs]
+        for name in names if isinstance(value, dict) else ():
+            sent, told, shown = pairs[name], str(value.get(name)), self._shown[operation.label, name]
+            if sent == told and len(shown) < _REMEMBERED:
+                shown.add(sent)
+            if {sent, told} <= shown:
+                expected, cause = f"{name} {sent}, which was asked for", f"{operation.label} {name}"
+                yield occasion.case("description/own-identifier", sent == told, expected, f"{name} {told}", cause=cause)
 
     def _item(self, occasion: Occasion, operation: Operation, above: str, id_: str) -> Iterator[Case]:
         own, known = self._own[above], self._listed[above]

@@ -26,10 +26,13 @@ from conformance.api.rest.things import (
     doubt_of_life,
     id_member,
     identifier_of,
+    is_devices,
     is_marked_deleted,
     is_shared,
     object_in,
+    parts_for,
     parts_of,
+    says_exactly,
 )
 from conformance.checkers.occasion import Occasion
 from conformance.checkers.writes import DEFAULTED
@@ -59,6 +62,7 @@ _SHOWN: Final = 200
 _FOR_EVER: Final = re.compile(r"id|uuid|guid|serial|serialnumber|created(?:at|on|time|date)?|creation(?:time|date)")
 _TELLING: Final = 5
 _READ: Final = "written-is-read"
+_NOTHING: Final[tuple[Any, ...]] = (None, "", 0, False, [], {})
 _GONE: Final = "deleted-is-gone"
 # Phrases in a description which say that a response shows what was there before the request.
 _EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
@@ -169,6 +173,9 @@ class Memory:
         self._made: set[str] = set()
         self._gone: set[str] = set()
         self._back: dict[str, list[Case]] = defaultdict(list)
+        # By template and member: paths of things that lack it though it was sent; below, members that some thing has.
+        self._lacking: dict[tuple[str, str], set[str]] = defaultdict(set)
+        self._has: dict[str, set[str]] = defaultdict(set)
         self._acts = 0
         # How long a value stayed the same, s: of things by template, of members by template and name.
         self._lasted: dict[tuple[str, str], dict[str, float]] = defaultdict(lambda: defaultdict(float))
@@ -466,6 +473,9 @@ class Memory:
         """Judge whether the members of a thing read as they were written."""
         value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         now = object_in(value, {plain_name(name) for name in thing.written})
+        if now:
+            self._has[item.template] |= {name for name, one in now.items() if one not in _NOTHING}
+            yield from self._lacks(occasion, item, thing, now)
         for name, (wanted, operation) in thing.written.items() if now else ():
             schema = operation.bodies[next(iter(operation.bodies))].schema
             other = next(differences({name: wanted}, now, schema, item.shape, self._collections), "")
@@ -484,6 +494,19 @@ class Memory:
                     expected, cause = f"what {operation.label} wrote, {when}", f"{operation.label} {name}"
                     case = self._case(_READ, occasion, expected, other, cause=cause)
                     yield from self._differs(kept, age_s, str(now.get(name))[:_SHOWN], case)
+
+    def _lacks(self, occasion: Occasion, item: Operation, thing: _Thing, now: dict[str, Any]) -> Iterator[Case]:
+        """Judge whether members that two things were given are there, as the description of the read has them."""
+        for name, (wanted, operation) in thing.written.items():
+            part = parts_for(item.shape or {}, thing.written).get(name)
+            is_open = is_shared(name) or not (name in self._has[item.template] or says_exactly(part))
+            if part is None or wanted in _NOTHING or is_open or is_devices(name, part, self._collections):
+                continue
+            lacking, is_there = self._lacking[item.template, name], now.get(name) is not None
+            lacking |= set() if is_there or wanted == flat(part).get("default") else {thing.path}
+            if is_there or len(lacking) >= _SEEN:
+                expected, cause = f"{clip(wanted)} as {name}, as it was written", f"{operation.label} {name} there"
+                yield occasion.case(f"description/{_READ}", is_there, expected, f"no {name}", cause=cause)
 
     def _told(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
         """Judge whether the response to a write shows what was sent, as the next read does; once may be chance."""
@@ -568,10 +591,8 @@ def _is_below(path: str, other: str) -> bool:
 
 def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
     """Return the object that a request has written; None if the content is no object, or not allowed."""
-    is_first = occasion.request.media_type == next(iter(operation.bodies), None)
-    is_first = is_first and len(occasion.request.body) <= _MOST_OCTETS
-    value = read_json(occasion.request.body).value if is_first and is_json(occasion.request.media_type) else None
-    if not isinstance(value, dict) or not occasion.is_valid:
+    is_first, value = occasion.request.media_type == next(iter(operation.bodies), None), _sent_of(occasion)
+    if not (is_first and value and occasion.is_valid):
         return None
     response = occasion.response
     answer = read_json(response.body).value if is_json(response.media_type) else None

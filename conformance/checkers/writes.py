@@ -31,7 +31,9 @@ from conformance.api.rest.things import (
     left_out_of,
     object_in,
     parts_of,
+    says_exactly,
 )
+from conformance.checkers.entity_tags import judge_revision
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -276,6 +278,7 @@ class Writes:
                 yield from self._judge_merge(occasion, item, change)
             if not write.is_valid:
                 return
+            yield from judge_revision(occasion, write, change.sent_value, change.before)
             yield from _entries(occasion, change)
             yield from self._judge_stamp(occasion, item, change)
             yield from self._values(occasion, item, change)
@@ -401,10 +404,11 @@ class Writes:
                     wrong, doubt = f"{clip(now)} as {name}" if len(self._doubts[key]) >= _SEEN else "", _COARSE
             elif isinstance(value, int) and isinstance(now, int) and abs(value) > _EXACT:
                 wrong = f"{now} as {name}" if now != value and abs(abs(now) - abs(value)) <= abs(value) >> 52 else ""
-            elif part.get("format") in {"date", "date-time"} and not same(now, was) and is_moved(value, now):
+            elif not same(now, was) and _is_other(part, value, now):
                 wrong = f"{now} as {name}"
             elif isinstance(value, str) and isinstance(now, str) and is_free_text(part):
-                wrong = f"{clip(now)} as {name}" if _is_altered(value, now) else ""
+                is_lost = _is_altered(value, now) or (says_exactly(part) and value != now)
+                wrong = f"{clip(now)} as {name}" if is_lost else ""
                 doubt = _LINES if value.splitlines() == now.splitlines() else ""
             elif isinstance(value, list) and isinstance(now, list) and not same(now, was):
                 wrong = self._items(name, value, now, part)
@@ -568,6 +572,15 @@ def _is_rounded(value: Any, now: Any) -> bool:
     if isinstance(value, bool) or isinstance(now, bool) or not (is_number(value) and is_number(now)):
         return False
     return not math.isclose(value, now, rel_tol=_EQUAL) and math.isclose(value, now, rel_tol=_CLOSE)
+
+
+def _is_other(part: Schema, value: Any, now: Any) -> bool:
+    """Return whether a moment or an exact code reads as another one, or XML's NaN as a number, which no limit does."""
+    if "number" in kinds_of(part):
+        return bool(value == "NaN" and is_number(now))
+    is_code = isinstance(value, str) and isinstance(now, str) and says_exactly(part) and not is_free_text(part)
+    is_time = part.get("format") in {"date", "date-time"}
+    return is_moved(value, now) if is_time else is_code and value != now
 
 
 def _is_altered(value: str, now: str) -> bool:

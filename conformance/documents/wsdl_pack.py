@@ -113,9 +113,9 @@ def with_messages(found: Wsdl, values: Mapping[str, Sequence[Any]]) -> dict[str,
         item |= {"description": operation.documentation, "responses": {"400": {}} if operation.faults else {}}
         sent, told = (found.types.shape(tag) if tag else None for tag in (operation.request, operation.response))
         if sent is not None:
-            item["requestBody"] = {"content": {"application/json": {"schema": schema_of(sent, given=values)}}}
+            item["requestBody"] = {"content": {"application/json": {"schema": schema_of(sent, given=values, branch=0)}}}
         if told is not None:
-            content = {"application/json": {"schema": schema_of(told, given={})}}
+            content = {"application/json": {"schema": schema_of(told, given={}, branch=0)}}
             item["responses"]["200"] = {"description": "", "content": content}
     return document
 

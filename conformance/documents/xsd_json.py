@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
@@ -19,8 +20,9 @@ _DEEPEST: Final = 6
 # Formats of JSON Schema by the built-in type of XML Schema that has them.
 _FORMATS: Final = {
     "dateTime": "date-time", "date": "date", "time": "time", "duration": "duration", "anyURI": "uri",
-    "base64Binary": "byte",
 }  # fmt: skip
+# Octets that are sent as base64, at most: as many as a type declares, or as any device takes.
+_DECLARED_OCTETS, _ANY_OCTETS = 33_001, 4_354
 # Types whose values have no blank, and a regular expression for such values.
 _TOKENS: Final = frozenset({"NMTOKEN", "NCName", "Name", "ID", "IDREF", "language"})
 _NAME_LIKE: Final = r"[A-Za-z][A-Za-z0-9]*"
@@ -37,11 +39,10 @@ def value_of(element: etree._Element | None, declared: Element | None) -> Any:
         return _scalar_of(kind if isinstance(kind, Simple) else kind.text or Simple("string"), text_of(element))
     found: dict[str, Any] = {} if kind.text is None else {"value": _scalar_of(kind.text, text_of(element))}
     types = {name: simple for name, simple, _ in kind.attributes}
-    found |= {
-        local(str(name)): _scalar_of(types[str(name)], str(text))
-        for name, text in element.attrib.items()
-        if name in types
-    }
+    # What is left out has its default (XML Schema Part 1, 3.2.1).
+    texts = {name: simple.default for name, simple in types.items() if simple.default}
+    texts |= {str(name): str(text) for name, text in element.attrib.items()}
+    found |= {local(name): _scalar_of(types[name], text) for name, text in texts.items() if name in types}
     found |= {local(part.tag): [] for part in declared.children if part.maximum != 1}
     parts = {part.tag: part for part in declared.children}
     for child in elements(element):
@@ -55,6 +56,8 @@ def _scalar_of(simple: Simple, text: str) -> Any:
     kind = _kind(simple)
     if simple.many:
         return [scalar(part, kind) for part in text.split()]
+    if simple.builtin == "base64Binary":
+        return "".join(text.split())
     return scalar(text, kind) if kind != "string" else text if simple.builtin in STRINGS else text.strip()
 
 
@@ -64,13 +67,16 @@ def _kind(simple: Simple) -> str:
     return "integer" if simple.builtin in INTEGERS else "number" if simple.builtin in NUMBERS else "string"
 
 
-def schema_of(declared: Element, depth: int = 0, given: Mapping[str, Sequence[Any]] | None = None) -> dict[str, Any]:
+def schema_of(
+    declared: Element, depth: int = 0, given: Mapping[str, Sequence[Any]] | None = None, branch: int | None = None
+) -> dict[str, Any]:
     """Return the JSON Schema of an element's content.
 
     Args:
         declared: the element.
         depth: how deep it is.
         given: values of members by name; then texts have a default, and attributes are called ``@name``, as in a map.
+        branch: of each choice, in rotation; None: all of them, as optional.
     """
     kind, at, text = declared.type, "" if given is None else "@", "value" if given is None else "#text"
     own: dict[str, Any] = {"description": declared.documentation} if declared.documentation else {}
@@ -83,10 +89,11 @@ def schema_of(declared: Element, depth: int = 0, given: Mapping[str, Sequence[An
             for name, simple, _ in kind.attributes
         }
         parts |= {text: _simple_schema(kind.text)} if kind.text is not None else {}
-        children = list(_first_branches(kind.content))
+        children = list(_children(kind.content, branch))
         for child in children:
-            part = schema_of(child, depth + 1, given)
-            many = {"type": "array", "items": part, "minItems": child.minimum}
+            part = schema_of(child, depth + 1, given, branch)
+            said = {"description": child.documentation} if child.documentation else {}
+            many = {"type": "array", "items": part, "minItems": child.minimum, **said}
             many |= {} if child.maximum is None else {"maxItems": child.maximum}
             parts[local(child.tag)] = part if child.maximum == 1 else many
         needed = [f"{at}{local(name)}" for name, _, needs in kind.attributes if needs]
@@ -103,10 +110,15 @@ def _default_of(tag: str, simple: Simple, given: Mapping[str, Sequence[Any]] | N
     return {"default": next(iter(given.get(local(tag), ())), plain(simple))}
 
 
-def _first_branches(group: Group | None) -> Iterator[Element]:
-    """Yield the elements of a group, of a choice those of its first branch."""
-    for item in group.items[: 1 if group.model == "choice" else None] if group is not None else ():
-        yield from [item] if isinstance(item, Element) else _first_branches(item)
+def _children(group: Group | None, branch: int | None) -> Iterator[Element]:
+    """Yield the elements of a group, of a choice those of one branch; those of all branches need not be there."""
+    items = group.items if group is not None else ()
+    is_choice = group is not None and group.model == "choice" and len(items) > 1
+    if is_choice and branch is not None:
+        items = items[branch % len(items) :][:1]
+    for item in items:
+        found = [item] if isinstance(item, Element) else _children(item, branch)
+        yield from (replace(one, minimum=0) if is_choice and branch is None else one for one in found)
 
 
 def _simple_schema(simple: Simple) -> dict[str, Any]:
@@ -115,13 +127,25 @@ def _simple_schema(simple: Simple) -> dict[str, Any]:
         schema["enum"] = [_scalar_of(replace(simple, many=False), text) for text in simple.enumeration]
     bounds = {"minimum": simple.minimum, "maximum": simple.maximum} if schema["type"] != "string" else {}
     schema |= {name: number_of(bound) for name, bound in bounds.items() if bound is not None}
+    # The usual values of a format need no pattern.
     patterns = simple.patterns or ((_NAME_LIKE,) if simple.builtin in _TOKENS else ())
+    patterns = () if simple.builtin in _FORMATS else patterns
     schema |= {"pattern": f"^(?:{patterns[0]})$"} if patterns else {}
     schema |= {"multipleOf": 10**-simple.digits} if simple.digits and schema["type"] == "number" else {}
     lengths = {"minLength": simple.min_length, "maxLength": simple.max_length}
-    schema |= {name: length for name, length in lengths.items() if length is not None and not simple.many}
+    is_text = not simple.many and simple.builtin != "base64Binary"
+    schema |= {name: length for name, length in lengths.items() if length is not None and is_text}
     schema |= {"format": _FORMATS[simple.builtin]} if simple.builtin in _FORMATS else {}
+    schema |= _octets_schema(simple.max_length) if simple.builtin == "base64Binary" else {}
     return {"type": "array", "items": schema} if simple.many else schema
+
+
+def _octets_schema(most: int | None) -> dict[str, Any]:
+    """Return the schema of octets as base64, with examples: many octets, and few."""
+    count = min(most or _ANY_OCTETS, _DECLARED_OCTETS)
+    made = [(bytes(range(256)) * (count // 256 + 1))[:size] for size in (count, min(count, 4))]
+    examples = [b64encode(octets).decode() for octets in made]
+    return {"pattern": "^(?:[A-Za-z0-9+/]{4})*[A-Za-z0-9+/=]*$", "description": "kept exactly", "examples": examples}
 
 
 def number_of(bound: Any) -> int | float:

@@ -13,12 +13,11 @@ from conformance.api.soap.resources import resources_of
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import SoapCheckers, answers_of
-from conformance.checkers.soap_memory import SoapMemory, SoapThings
+from conformance.checkers.soap_memory import SoapThings
 from conformance.commandline.given_files import read_json, read_octets
 from conformance.commandline.help_pages import inert
 from conformance.contract.classes import Interface
 from conformance.contract.generic import generic_ledger
-from conformance.documents.wsdl_pack import services_of
 from conformance.engine.certification import draw_verdicts
 from conformance.engine.planning import collect_checks
 from conformance.engine.robot_under_test import RobotUnderTest
@@ -130,8 +129,8 @@ def _listeners(robot: RobotUnderTest, target: Mapping[str, Any]) -> Iterator[Lis
         checkers.append(RestCheckers(run.contract, api.client.base_url, [service.endpoint for service in services]))
     if services:
         checkers.append(SoapCheckers({service.endpoint: answers_of(service.contract) for service in services}))
-    if (found := services_of(run.contract)) is not None and (resources := resources_of(run.contract)) is not None:
-        checkers += [SoapMemory(found), SoapThings(resources)]
+    if (resources := resources_of(run.contract)) is not None:
+        checkers.append(SoapThings(resources))
     yield CheckerListener(run.judge, checkers)
 
 

@@ -18,10 +18,9 @@ from conformance.api.soap.resources import resources_of
 from conformance.api.soap.service import SoapService
 from conformance.checkers.rest import RestCheckers
 from conformance.checkers.soap import PASSIVE, SoapCheckers, answers_of
-from conformance.checkers.soap_memory import SoapMemory, SoapThings
+from conformance.checkers.soap_memory import SoapThings
 from conformance.documents.openapi import operations_of
 from conformance.documents.wsdl import Wsdl
-from conformance.documents.wsdl_pack import services_of
 from conformance.scenarios.motion.binding import binding_of
 from conformance.scenarios.motion.mapped import MappedDevice
 from conformance.scenarios.other_exchanges import OtherExchanges
@@ -66,8 +65,8 @@ def _attach_checkers(
     if services and not run.contract.ledger.keys().isdisjoint(PASSIVE):
         answers = {service.endpoint: answers_of(*_descriptions(service)) for service in services}
         checkers.append(SoapCheckers(answers))
-    if (found := services_of(run.contract)) is not None and (resources := resources_of(run.contract)) is not None:
-        checkers += [SoapMemory(found), SoapThings(resources)]
+    if (resources := resources_of(run.contract)) is not None:
+        checkers.append(SoapThings(resources))
     listeners.append(CheckerListener(run.judge, checkers))
     connection.listeners.extend(listeners)
     for exchange in api.looked if api is not None else ():

@@ -32,13 +32,15 @@ _LATER: Final = timedelta(hours=1)
 _FAR: Final = timedelta(hours=11)
 
 
-def queries_of(listing: Listing, page: Page, most: int) -> Iterator[dict[str, Any]]:
-    """Yield values of filters and of the sort, every second one with a limit."""
+def queries_of(
+    listing: Listing, page: Page, most: int, whole: dict[str, Any] | None = None
+) -> Iterator[dict[str, Any]]:
+    """Yield values of filters and of the sort, every second one with a limit; ``whole``: a limit that cuts nothing."""
     rows: list[dict[str, Any]] = []
     for name, parameter in listing.filters.items():
         rows += [{parameter.name: value} for value in choices_of(parameter, name, page)[:most]]
     rows += _together(listing, page)
-    whole = whole_query(listing, page)
+    whole = whole or whole_query(listing, page)
     for bound in listing.bounds:
         there = {
             members_of(item).get(bound.member) for item in page.items if members_of(item).get(bound.member) is not None
@@ -154,5 +156,5 @@ def choices_of(parameter: Parameter, name: str, page: Page) -> list[Any]:
         there = [members_of(item).get(name) for item in page.items]
         found = list(dict.fromkeys(item for item in there if isinstance(item, str | int) and item != ""))[:2]
     # Of several values, the last ones may be lost.
-    lists = [[value] for value in found] + ([found[:2]] if len(found) > 1 else [])
+    lists = ([found[:2]] if len(found) > 1 else []) + [[value] for value in found]
     return [item for item in (lists if is_list else found) if fitting(parameter, item)]

@@ -179,7 +179,7 @@ def vary_lists(api: RestInterface, values: Values) -> None:
             if page is not None and page.items:
                 reader.send_invalid()
                 doubted = list[dict[str, Any]]()
-                for query in queries_of(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES)):
+                for query in queries_of(listing, page, _VALUES.get(api.run.effort.name, _MOST_VALUES), whole):
                     if time.monotonic() < until and _is_doubted(listing, reader.part(query), query):
                         doubted.append(query)
                 _refuse_creations(api, values, listing)

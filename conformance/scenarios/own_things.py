@@ -21,11 +21,13 @@ from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
+from conformance.checkers.entity_tags import GUARDED, REVISION
 from conformance.checkers.memory import ending_with
 from conformance.checkers.totals import is_left
 from conformance.documents.files import file_of, keeps_octets
 from conformance.documents.json_text import clip
 from conformance.documents.openapi import Operation, is_json, operations_of, resources_of
+from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
 from conformance.scenarios.creating import created_path, with_texts
@@ -37,7 +39,7 @@ from conformance.scenarios.neighbours import NO_TAG, read_parts
 from conformance.scenarios.posted_files import FILES, post_files
 from conformance.scenarios.scenario import scenario
 from conformance.scenarios.singletons import is_changeable, is_free
-from conformance.scenarios.special_bodies import is_list_of_changes, special_bodies
+from conformance.scenarios.special_bodies import by_format, is_list_of_changes, special_bodies
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.whole_list import read_numbers
@@ -52,7 +54,7 @@ _STANDARD: Final = ("GET", "PUT", "POST", "DELETE", "PATCH")
 _SETTLES_S, _PAUSE_S = 3.2, 0.4
 # _NEITHER: a list of entity tags that no content has.
 _NEITHER: Final = f'{NO_TAG}, "roaas-nor-this"'
-_GONE_PLACE: Final = "path of what was deleted"
+_GONE_PLACE, _STALE = "path of what was deleted", "earlier revision in the body"
 _OCTETS, _TEXT = "application/octet-stream", "text/plain"
 # How a client sends content of unknown length (RFC 9112 7.1).
 _IN_CHUNKS: Final = ("Transfer-Encoding", "chunked")
@@ -126,6 +128,7 @@ class _Thing:
     target: str
     tag: str = ""
     last: Exchange | None = None
+    revisions: set[str] = field(default_factory=set)
     # Whether the run has created it.
     is_own: bool = True
     # Existing files below it.
@@ -143,12 +146,21 @@ class _Thing:
         probe = self.send(self.read, None, *fields, place=place)
         if probe.ok and probe.exchange is not None:
             self.last, self.tag = probe.exchange, probe.exchange.response.header("etag") or ""
+            self.revisions |= {str(one) for name, one in self._members().items() if REVISION.search(plain_name(name))}
         return probe
+
+    def _as_of_now(self, body: Any) -> Any:
+        """Return a body with the present revision, where it has an earlier one."""
+        now = self._members() if isinstance(body, dict) else {}
+        now = {name: one for name, one in now.items() if str(body.get(name)) in self.revisions}
+        return (
+            {**body, **{name: one for name, one in now.items() if REVISION.search(plain_name(name))}} if now else body
+        )
 
     def send(self, operation: Operation, body: Any, *fields: tuple[str, str], place: str = "") -> Probe:
         """Send an operation to it, with its usual body or another one."""
         inputs = usual_inputs(operation, self.surveyor.values)[0]
-        inputs = inputs if body is None else replace(inputs, body=body)
+        inputs = inputs if body is None else replace(inputs, body=body if place == _STALE else self._as_of_now(body))
         request = request_of(operation, inputs)
         given = {name.lower() for name, _ in fields}
         headers = (*(pair for pair in request.headers if pair[0].lower() not in given), *fields)
@@ -183,6 +195,9 @@ class _Thing:
             self._at_once(change, bodies)
             alone = self._singly(change, bodies, whole_last=bool(self.tag and change is changes[0]))
             refused = self._write_each(change, bodies, alone, is_first=change is changes[0])
+            if GUARDED.search(change.text) and len(self.revisions) > 1:
+                self.send(change, bodies[0], *self._current(), place=_STALE)
+                self.get()
             taken = [body for body in bodies[:-1] if body not in refused]
             if change.method == "PATCH" and refused and taken:
                 # A device may store the part of a body that it would take alone.
@@ -190,7 +205,7 @@ class _Thing:
                 self.get()
             waits = True
             # Special bodies show what is written in other formats.
-            formats = _by_format(change)
+            formats = by_format(change)
             for own in formats[1:] if self.tag else ():
                 self._send_refusable(own, list(islice(self._special(own), 1)))
             for one, body in ((own, body) for own in formats for body in self._special(own)):
@@ -572,12 +587,6 @@ class _Thing:
             if is_last or page is None or id_ not in {identifier_of(item, self.read) for item in page.items}:
                 return
             time.sleep(_PAUSE_S)
-
-
-def _by_format(change: Operation) -> list[Operation]:
-    """Return a write with each of its JSON formats alone; the first one, whatever it is, comes first."""
-    own = [(name, body) for place, (name, body) in enumerate(change.bodies.items()) if not place or is_json(name)]
-    return [replace(change, bodies={name: body}) for name, body in own]
 
 
 def _fits(change: Operation, tags: str) -> bool:

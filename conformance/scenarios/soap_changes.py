@@ -1,6 +1,6 @@
 """Change values over SOAP, read them back, with refused requests in between, and restore them.
 
-What comes of it is judged by the checkers of every exchange (checkers/soap_memory), and by the rules of the survey.
+What comes of it is judged by the checkers of every exchange (`checkers.soap_memory`), and by the rules of the survey.
 """
 
 from __future__ import annotations
@@ -39,25 +39,24 @@ from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.transport.exchange import Outgoing
 from conformance.transport.parallel import MOST_CLIENTS, Addressed, send_together
 
-# _STEP_S: pause between reads while a value is awaited, s. _LASTS_S: how long it has to stay, s.
-_STEP_S: Final = 0.1
-_LASTS_S: Final = SETTLES_S + 0.4
+# _STEP_S: pause between reads while a value is awaited, s. _LATE_S: after it each write must show, s.
+_STEP_S, _LATE_S = 0.1, 3.2
 # Longest time for all changes of one operation, s.
 _BUDGET_S: Final = 12.0
-# Changes of one operation: _TURNS at quick and at other efforts. _REFUSALS: refused messages.
-_TURNS: Final = (6, 16)
-_REFUSALS: Final = 3
-# _LASTING: values after the first that must stay; two, because a third may be read in place of one. _THINGS: things
-# that are created.
-_LASTING: Final = 2
-_THINGS: Final = 3
+# _REFUSALS: refused messages. _THINGS: things that are written beside each other.
+_REFUSALS, _THINGS = 3, 3
 # _READS: successive reads of each operation. _ROUNDS: rounds of simultaneous reads. Both at quick and at other efforts.
 # _FEW: reads and changes of things that `soap_things` reads and changes.
 _READS: Final = (18, 60)
 _FEW: Final = 5
 _ROUNDS: Final = (6, 30)
-# Number of the change whose text is beyond ASCII.
-_BEYOND_ASCII: Final = 3
+# Encodings of messages, with their kind, what they are written in, and the number of a change whose text is beyond
+# ASCII. XML 1.0, 2.2: UTF-16 is no choice; 4.1: any character may be a reference.
+_ENCODED: Final = (
+    ("utf-16", Kind.VARIED, "utf-16", 3),
+    ("iso-8859-1", Kind.TRIED, "iso-8859-1", 3),
+    ("utf-8", Kind.VARIED, "ascii", 4),
+)
 # Longest text that is sent because its type allows it, characters.
 _LONGEST: Final = 1_000
 # Header blocks that a device has to ignore (SOAP 1.1, 4.2.2 and 4.2.3; SOAP 1.2 Part 1, 2.2 to 2.4).
@@ -91,7 +90,7 @@ class _Changes:
     def find(self) -> None:
         """Call each operation that reads, changes, creates or removes once, to know a message that it accepts."""
         for act in in_order(self.caller.acts.values(), self.caller.asks):
-            if act.role in {Role.OTHER, Role.ENDS}:
+            if act.role in {Role.OTHER, Role.ENDS} or self.caller.is_repeated(act):
                 continue
             with suppress(NotPossibleError):
                 if act.role is Role.REMOVES:
@@ -113,54 +112,28 @@ class _Changes:
         return [(act, declared, node) for act, declared, node in self.acts if act.role is role and declared and node]
 
     def write(self, act: Act, declared: Element, node: Node) -> Iterator[None]:
-        """Write other values repeatedly, read them, and restore the first ones."""
+        """Write other values, refused ones, and values in other forms; read each, and restore the first ones."""
         readers = [one for one in self.acts if one[0].shows(act)]
         # What a list shows of one thing is compared by `soap_things`.
         readers = [one for one in readers if one[0].needs] or readers
         if not readers:
             return
-        until, began = time.monotonic() + _BUDGET_S, self._read(readers, node)
-        keys = {name for one, _, _ in readers for name in one.sent}
-        forms = _forms_of(declared, node)
-        turns, refusals, whole, leaves = min(_TURNS[not self._is_quick], self._reads(act)), 0, *forms[0]
-        made = whole
-        for turn in range(turns):
-            if time.monotonic() > until:
-                break
-            node, own = forms[turn % len(forms)]
-            free = [one for one in own if node.at(one[0]).name.lower() not in keys]
-            made = _with_others(node, free, turn)
-            if not self.caller.ask(act, made, "a message with other values").is_success:
-                # Some members may not be changed: find those that may, one by one.
-                tried = [(one, self.caller.ask(act, _with_others(node, [one], turn), "another value")) for one in free]
-                keys |= {node.at(one[0]).name.lower() for one, probe in tried if not probe.is_success}
-                free = [one for one, probe in tried if probe.is_success]
-                if not free:
-                    break
-                made = _with_others(node, free, turn)
-                self.caller.ask(act, made, "a message with other values")
-            sent = self._wait(readers, made, free)
-            if sent and 0 < turn <= _LASTING:
-                # If the value is back at the second read, it had not ended: the first read failed.
-                time.sleep(_LASTS_S)
-                # What reads something else must not change it.
-                others = [one for one in self.acts if one[0].role is Role.READS and one[0].port is act.port]
-                self._read([one for one in others if one not in readers and turn == _LASTING], made)
-                self._read(readers, made, times=2)
-            elif sent and turn and refusals < _REFUSALS:
-                # An effect of a refusal shows soon; other values have stayed for longer by now.
-                self._refuse(act, declared, _with_others(made, free, turn + 1), refusals)
-                refusals += 1
-                self._read(readers, made, times=2)
-            left_s = time.monotonic()
-            yield
-            until += time.monotonic() - left_s
-        self._read(readers, made, times=self._reads(act))
-        node, free = whole, [one for one in leaves if whole.at(one[0]).name.lower() not in keys]
+        began, keys = self._read(readers, node), {name for one, _, _ in readers for name in one.sent}
+        leaves = [leaf for leaf in simple_leaves(declared, node) if leaf[0]]
+        free = [one for one in leaves if node.at(one[0]).name.lower() not in keys]
+        if not self.caller.ask(act, _with_others(node, free, 0), "a message with other values").is_success:
+            # Some members may not be changed: find those that may, one by one.
+            tried = [(one, self.caller.ask(act, _with_others(node, [one], 0), "another value")) for one in free]
+            free = [one for one, probe in tried if probe.is_success]
+        self._read(readers, node)
+        for turn in range(_REFUSALS if free else 0):
+            self._refuse(act, declared, _with_others(node, free, turn + 1), turn)
+            self._read(readers, node, times=2)
+        yield
         for says, kind, other, octets, charset in self._forms(act, node, free) if free else ():
-            plain = self.caller.ask(act, other, "a message with other values")
-            if plain.is_success and self._wait(readers, other, free):
+            if self.caller.ask(act, other, "a message with other values").is_success:
                 self.caller.ask(act, node, "the first values")
+                self._read(readers, node)
                 self.caller.send(act, kind, says, octets, charset)
                 self._wait(readers, other, free)
         self._others(act, node, free, readers)
@@ -170,11 +143,10 @@ class _Changes:
 
     def _forms(self, act: Act, node: Node, free: _Leaves) -> Iterator[tuple[str, Kind, Node, bytes, str]]:
         """Yield messages in other forms: what is special, its kind, the plain message, its octets, their encoding."""
-        made = _with_others(node, free, _BEYOND_ASCII)
-        whole = self.caller.messages.whole(act.port, act.operation, made)
-        for charset, kind in (("utf-16", Kind.VARIED), ("iso-8859-1", Kind.TRIED)):  # XML 1.0, 2.2: UTF-16 is no choice
-            head = f'<?xml version="1.0" encoding="{charset}"?>'
-            octets = (head + whole.serialize().decode()).encode(charset, "xmlcharrefreplace")
+        for charset, kind, coded, turn in _ENCODED:
+            made = _with_others(node, free, turn)
+            whole = self.caller.messages.whole(act.port, act.operation, made).serialize().decode()
+            octets = f'<?xml version="1.0" encoding="{charset}"?>{whole}'.encode(coded, "xmlcharrefreplace")
             yield f"a message in {charset}", kind, made, octets, charset
         made = _with_others(node, free, 1)
         yield "texts: cdata", Kind.VARIED, made, self._style(act, made, XmlStyle(text="cdata")), "utf-8"
@@ -230,19 +202,22 @@ class _Changes:
                 if act.keeps and says.startswith("a message without"):
                     self._wait(readers, node, free)
 
-    def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> bool:
-        """Read until a written value is read, or the time for it is over; return whether any was."""
+    def _wait(self, readers: list[_Message], made: Node, free: _Leaves) -> None:
+        """Read until the written values are read, or the time for it is over."""
         until = time.monotonic() + SETTLES_S
         while True:
-            told = {name: texts[0] for name, texts in self._read(readers, made).items() if len(texts) == 1}
-            texts = [(simple, made.at(path).text, told.get(made.at(path).name.lower())) for path, simple in free]
-            seen = [is_alike(simple, text, got) for simple, text, got in texts if got is not None]
-            if all(seen) or time.monotonic() > until:
+            is_shown = self._is_shown(self._read(readers, made), made, free)
+            if is_shown or time.monotonic() > until:
                 break
             time.sleep(_STEP_S)
-        if not all(seen):
+        if not is_shown:
             self._read(readers, made, times=2)
-        return any(seen)
+
+    @staticmethod
+    def _is_shown(told: dict[str, list[str]], made: Node, free: _Leaves) -> bool:
+        """Return whether what was read has each value that was written, as far as it has such values."""
+        texts = [(simple, made.at(path).text, told.get(made.at(path).name.lower(), [])) for path, simple in free]
+        return all(is_alike(simple, text, got[0]) for simple, text, got in texts if len(got) == 1)
 
     def _read(self, readers: list[_Message], written: Node, times: int = 1) -> dict[str, list[str]]:
         """Read the values that a message concerns; return them by name."""
@@ -284,12 +259,14 @@ class _Changes:
         things = [thing for thing, values in told if values]
         if len(things) > 1:
             written = [_with_others(thing, free, turn) for turn, thing in enumerate(things, 1)]
+            shown = list[bool]()
             for made in written:
                 self.caller.ask(act, made, "a message for another thing")
-            for wait_s in (0.0, SETTLES_S):
-                time.sleep(wait_s)
-                for made in written:
-                    self._read(readers, made)
+                shown.append(self._is_shown(self._read(readers, made), made, free))
+            # What is not there yet may come later.
+            time.sleep(0 if all(shown) else _LATE_S)
+            for made in written:
+                self._read(readers, made, times=2)
             # Several clients read different things at the same moment: each must get its own.
             asked = [(one, _with_values_of(message, made)) for made in written for one, _, message in readers]
             clients = [self._address(*asked[number % len(asked)]) for number in range(MOST_CLIENTS)]
@@ -454,17 +431,6 @@ def _with_values_of(node: Node | None, written: Node) -> Node | None:
         if node and (text := names.get(node.at(path).name.lower())) and not node.at(path).children:
             node = with_text(node, path, text)
     return node
-
-
-def _forms_of(declared: Element, node: Node) -> list[tuple[Node, _Leaves]]:
-    """Return a message, and the same one in which nothing is there twice, each with its values."""
-    return [(one, [leaf for leaf in simple_leaves(declared, one) if leaf[0]]) for one in (node, _once(node))]
-
-
-def _once(node: Node) -> Node:
-    """Return a message in which nothing is there twice."""
-    children = {child.tag: _once(child) for child in node.children[::-1]}
-    return replace(node, children=tuple(children.values())[::-1])
 
 
 def _with_others(node: Node, free: _Leaves, turn: int) -> Node:

@@ -181,6 +181,11 @@ class Caller:
         acts = {act.label: act for act in acts_of(found) if act.label not in left_out}
         return cls(api, messages, acts, left_out=list(left_out.items()))
 
+    def is_repeated(self, act: Act) -> bool:
+        """Return whether, at quick, another version of SOAP leads to the same operation, which was called by that."""
+        first = next(one for one in self.acts.values() if one.operation.name == act.operation.name)
+        return self.api.run.effort.name == "quick" and first.port.is_12 != act.port.is_12
+
     def asks(self, operation: SoapOperation) -> int:
         """Return how many values the message of an operation has that only the device can know."""
         try:
@@ -329,7 +334,9 @@ def _groups(caller: Caller, act: Act) -> Iterator[None]:
         )
     ]
     types = caller.messages.found.types
-    near = list(invalid_ones(facets(declared, node), types)) if declared and node else []
+    near = (
+        list(invalid_ones(facets(declared, node), types)) if declared and node and not caller.is_repeated(act) else []
+    )
     for wrong in (*invalid_ones(drawn, types), *effort.subsample(near, _MOST)):
         if time.monotonic() < until and act.label not in caller.lost:
             caller.ask(act, wrong.made[0], wrong.what, Kind.INVALID)

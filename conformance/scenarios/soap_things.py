@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 from urllib.parse import unquote
 
 from conformance.api.call_rules import CallRules, Reason
@@ -19,12 +19,14 @@ from conformance.api.rest.values import Values
 from conformance.api.soap.resources import BASE, Place, Resources, SoapExchange, resources_of
 from conformance.api.soap.roles import Role
 from conformance.documents.openapi import Operation, is_json, matching, operations_of
+from conformance.documents.xsd_json import schema_of
 from conformance.documents.xsd_shapes import NoElementError
 from conformance.scenarios.described_messages import fields_of, target_of
 from conformance.scenarios.ending import Deletion, begin_and_end, look_at_ended, used_things
 from conformance.scenarios.lifecycles import lifecycles
 from conformance.scenarios.lists import Paged, lists_of, pages_of_lists, vary_lists
 from conformance.scenarios.living import Life
+from conformance.scenarios.own_things import own_things
 from conformance.scenarios.scenario import NotPossibleError, partial_trace, scenario
 from conformance.scenarios.soap_survey import Caller, Kind, SoapProbe, usual_message
 from conformance.scenarios.stage import Leaves, Need, Stage
@@ -58,6 +60,14 @@ class _Rules(CallRules):
         return Reason.ALLOWED if operation.label in self.called else Reason.NEVER
 
 
+def _head(place: Place) -> str:
+    return place.template.partition("/{")[0]
+
+
+def _schema_by(place: Place, branch: int) -> dict[str, Any]:
+    return schema_of(place.request, branch=branch) if place.request is not None else {}
+
+
 @dataclass
 class _OverSoap(RestInterface):
     """A SOAP device as one with resources: what is sent to them goes out as messages.
@@ -74,19 +84,27 @@ class _OverSoap(RestInterface):
         self.device = Device(self.run)
 
     @classmethod
-    def of(cls, caller: Caller, resources: Resources) -> _OverSoap:
-        """Return the interface to the operations that may be called."""
+    def of(cls, caller: Caller, branch: int = 0) -> _OverSoap:
+        """Return the interface to the operations that may be called, with a branch of each choice.
+
+        With another than the first one, it has only the things whose requests have choices.
+        """
+        resources = Resources(caller.api.run.contract, caller.messages.found, branch)
         run = copy(caller.api.run)
         run.contract = resources.contract
         made = cls(run, caller.api.client, caller=caller, resources=resources)
         places = [place for place in resources.places.values() if place.act.label in caller.acts]
+        if branch:
+            heads = {
+                _head(place) for place in places if place.request and _schema_by(place, 0) != _schema_by(place, branch)
+            }
+            places = [place for place in places if _head(place) in heads]
         made_in = {place.template for place in places if place.method == "POST"}
-        # Only what the suite has created is ended; `soap_changes` writes settings, with pauses.
+        # Only what the suite has created is ended.
         called = {
             f"{place.method} {place.template}"
             for place in places
-            if (place.act.role is not Role.ENDS or place.template.partition("/{")[0] in made_in)
-            and (place.act.role is not Role.WRITES or place.key)
+            if place.act.role is not Role.ENDS or _head(place) in made_in
         }
         called |= {f"GET {item}" for item, one in resources.lists.items() if f"GET {one.template}" in called}
         made.call_rules = _Rules(called=frozenset(called))
@@ -145,7 +163,7 @@ def soap_things(api: RestInterface) -> Things:
     if resources is None:
         raise NotPossibleError("the device has no WSDL")
     values = Values(api.run.statement.values, collections_of(operations_of(resources.contract)))
-    device = _OverSoap.of(caller, resources)
+    device = _OverSoap.of(caller)
     for act in caller.acts.values():
         with suppress(NotPossibleError):  # the survey names what a message lacks
             if not act.needs and act.role is Role.READS:
@@ -161,9 +179,13 @@ def soap_things(api: RestInterface) -> Things:
         with suppress(NotPossibleError):
             lives += lifecycles.play(device, values)
         with suppress(NotPossibleError):
+            lives += lifecycles.play(_OverSoap.of(caller, 1), values)
+        with suppress(NotPossibleError):
             deletions += used_things.play(device, values)
         with suppress(NotPossibleError):
             look_at_ended(device, values, begin_and_end(device, values))
+        with suppress(NotPossibleError):
+            own_things.play(device, values)
         made = list(_fill(Writer(device, values)))
         with suppress(NotPossibleError):
             vary_lists(device, values)

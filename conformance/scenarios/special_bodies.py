@@ -18,7 +18,7 @@ from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.checkers.writes import GONE
 from conformance.documents.json_schema import Schema, is_number, kinds_of
-from conformance.documents.openapi import Operation
+from conformance.documents.openapi import Operation, is_json
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.scenarios.singletons import is_harmless
@@ -116,6 +116,12 @@ def _rich(parts: dict[str, Any], there: dict[str, Any], collections: frozenset[s
         if not owned and made[_KEYS[0]] != made[_KEYS[1]] and fits(given, value):
             found[name] = value
     return found
+
+
+def by_format(change: Operation) -> list[Operation]:
+    """Return a write with each of its JSON formats alone; the first one, whatever it is, comes first."""
+    own = [(name, body) for place, (name, body) in enumerate(change.bodies.items()) if not place or is_json(name)]
+    return [replace(change, bodies={name: body}) for name, body in own]
 
 
 def _in_lines(changed: dict[str, Any], parts: dict[str, Any]) -> list[dict[str, Any]]:

@@ -32,8 +32,9 @@ _STATES: Final = ("status", "state", "lifecycle", "phase")
 _ALIVE: Final = frozenset({"active", "isactive", "alive"})
 # Words of a description: for a text or number that is stored as it is.
 _EXACTLY: Final = re.compile(
-    r"\b(?:exactly|verbatim|case[- ]sensitive|(?:kept|stored|returned) as (?:sent|written|given)"
-    r"|(?:any|all) (?:fraction|digits)|(?:not|never) rounded|full precision)\b",
+    r"\b(?:exactly|exact (?:\w+ )?values?|verbatim|case[- ]sensitive|character by character|keeps? the instant"
+    r"|as (?:(?:it|they) (?:was|were|is|are) )?(?:sent|written|given)|(?:any|all) (?:fraction|digits)"
+    r"|(?:not|never) rounded|(?:full|double) precision)\b",
     re.IGNORECASE,
 )
 # Words of a description: for a DELETE after which nothing is there, for one that ends or hides a thing, and for things
@@ -47,7 +48,8 @@ _LATE: Final = re.compile(
     r"\bdraft|\bpublish|\bstaged?\b|\bcandidate\b|takes? effect|\bin(?:to)? (?:force|effect)\b|\bmeasured?\b|\bactual"
     r"|(?:next|after (?:a|the)) (?:re)?(?:start|boot|cycle)\b", re.IGNORECASE
 )  # fmt: skip
-_CONVERTED: Final = re.compile(
+#: Words of a description: the device changes what is written.
+CONVERTED: Final = re.compile(
     r"\b(?:round|truncat|cut\b|shorten|clamp|snap|normali[sz]|adjust|convert|trim|steps? of|nearest|first \d+ char"
     r"|(?:upper|lower)[ -]?case|capital)", re.IGNORECASE
 )  # fmt: skip
@@ -69,6 +71,7 @@ _ITEMS, _MANY = 2, 12
 _PART: Final = 0.375
 _ELSEWHERE: Final = "-05:00"
 _NEAR: Final = {"rel_tol": 0.02, "abs_tol": 0.01}
+_EQUAL: Final = {"rel_tol": 1e-15}
 _SECOND: Final = 1.0
 
 
@@ -220,6 +223,8 @@ def _others(schema: Schema, value: Any, turn: int, collections: frozenset[str]) 
         # A device in one time zone has clients in others.
         dated = dated.replace("Z", _ELSEWHERE) if form == "date-time" and turn % 2 else dated
         found = [dated] if form else [f"roaas {turn}", f"r{turn}"]
+    elif not found and isinstance(value, str) and given.get("examples"):
+        found = list(given["examples"])
     elif not found and isinstance(value, str) and turn % 2:
         # A pattern need not tell all that a device demands, so it is only tried in every second turn.
         digit = re.sub(r"\d(?=\D*$)", lambda last: str((int(last[0]) + turn) % 10), value)
@@ -237,7 +242,7 @@ def differences(
     normalized (case, space, rounding) are left out.
     """
     parts = members_in(schema, sent)
-    shared = _parts(answer or {}, sent)
+    shared = parts_for(answer or {}, sent)
     for name, value in sent.items():
         part, other = parts.get(name), seen.get(name)
         if part is None or name not in seen or is_devices(name, part, collections):
@@ -258,10 +263,10 @@ def differences(
 
 def _is_converted(part: Any) -> bool:
     """Return whether the description of a member says that the device changes what is written."""
-    return isinstance(part, dict) and bool(_CONVERTED.search(str(flat(part).get("description"))))
+    return isinstance(part, dict) and bool(CONVERTED.search(str(flat(part).get("description"))))
 
 
-def _says_exactly(part: Any) -> bool:
+def says_exactly(part: Any) -> bool:
     """Return whether the description of a member says that it is stored as it is."""
     return isinstance(part, dict) and bool(_EXACTLY.search(str(flat(part).get("description", ""))))
 
@@ -320,7 +325,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         name: answer[name]
         for name, value in sent.items()
         if isinstance(answer.get(name), str | int | float) and not isinstance(value, bool)
-        if "enum" not in flat(parts.get(name, {})) and not _says_exactly(parts.get(name))
+        if "enum" not in flat(parts.get(name, {})) and not says_exactly(parts.get(name))
         if answer[name] not in (value, before.get(name)) and not is_moved(value, answer[name])
         if not (_BOUNDED & flat(parts.get(name, {})).keys() and str(value).startswith(str(answer[name])))
     }
@@ -334,7 +339,7 @@ def parts_of(schema: Schema | None) -> dict[str, Any]:
     return inner[0] if len(outer) == 1 and inner and inner[0] else outer
 
 
-def _parts(schema: Schema, names: Collection[str]) -> dict[str, Any]:
+def parts_for(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     """Return the properties of the part of a response's schema that has the most of these names."""
     outer = flat(schema).get("properties", {})
     inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]
@@ -365,19 +370,20 @@ def _alike(value: Any, other: Any, schema: Schema) -> bool:  # noqa: PLR0911 - o
     if is_number(value):
         try:
             is_exact = isinstance(value, int) and "number" not in kinds_of(schema)
-            near = {} if is_exact or _says_exactly(schema) else _NEAR
+            near = _EQUAL if is_exact or says_exactly(schema) else _NEAR
             step: Any = schema.get("multipleOf", 0)
-            near = {"abs_tol": step / 2} if near and is_number(step) and step > 0 else near
+            near = {"abs_tol": step / 2} if near is _NEAR and is_number(step) and step > 0 else near
             return math.isclose(value, float(other), **near)
         except (TypeError, ValueError):
             return other is not None
     if isinstance(value, str) and str(schema.get("format", "")) not in _COMPARED:
         return True
-    if isinstance(value, str) and _says_exactly(schema):
+    is_exact = isinstance(value, str) and says_exactly(schema)
+    if schema.get("format") == "date-time" and isinstance(value, str) and isinstance(other, str):
+        one, two, most_s = _instant(value), _instant(other), 0.0 if is_exact else _SECOND
+        return one is None or two is None or abs((one - two).total_seconds()) <= most_s
+    if is_exact:
         return bool(value == other)
-    if schema.get("format") == "date-time" and isinstance(other, str):
-        one, two = _instant(value), _instant(other)
-        return one is None or two is None or abs((one - two).total_seconds()) <= _SECOND
     return _letters(value) == _letters(other)
 
 

@@ -54,14 +54,18 @@ def _some(item: Element | Group, form: int, *, optional: bool, alone: bool = Fal
     return _ordinary(item, form, optional=optional) * min(count, _MOST)
 
 
-def message_of(element: Element, values: Mapping[str, str]) -> Node:
-    """Return a message of given values (text by the local name of its element), in the order of the schema.
+def message_of(element: Element, values: Mapping[str, str | list[str]]) -> Node:
+    """Return a message of given values (by the local name of the element), in the order of the schema.
 
     Elements without a value are left out, and so are those that would be empty.
     """
-    children = [message_of(child, values) for child in element.children]
+    given = values.get(local(element.tag), "")
+    children = list[Node]()
+    for child in element.children:
+        many = values.get(local(child.tag))
+        children += [Node(child.tag, text) for text in many] if isinstance(many, list) else [message_of(child, values)]
     kept = [child for child in children if child.children or child.name in values]
-    return Node(element.tag, values.get(local(element.tag), ""), tuple(kept))
+    return Node(element.tag, given if isinstance(given, str) else "", tuple(kept))
 
 
 def variants(element: Element, base: Node, fixed: frozenset[tuple[int, ...]] = frozenset()) -> SearchStrategy[Node]:

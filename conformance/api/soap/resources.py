@@ -124,9 +124,10 @@ class Resources:
     Args:
         contract: the pack with the WSDL.
         found: what the WSDL describes.
+        branch: of each choice in a request, in rotation; None: all of them, as optional.
     """
 
-    def __init__(self, contract: Contract, found: Wsdl) -> None:
+    def __init__(self, contract: Contract, found: Wsdl, branch: int | None = None) -> None:
         self._types = found.types
         #: Operations that list the things of a template that no operation reads one by one.
         self.lists: dict[str, Place] = {}
@@ -149,7 +150,7 @@ class Resources:
             if ports.setdefault((act.port.envelope, act.operation.request), act.port.name) != act.port.name:
                 place = replace(place, template=f"/{act.port.name.lower()}{place.template}")
             self.places[urlsplit(act.port.url).path, act.operation.request] = place
-            documented.setdefault(place.template, {})[place.method.lower()] = _openapi_of(place)
+            documented.setdefault(place.template, {})[place.method.lower()] = _openapi_of(place, branch)
         for place in self.places.values():
             if (
                 place.id
@@ -185,7 +186,7 @@ class Resources:
         is_list = act.role is Role.READS and any(_repeats(response))
         is_made = act.role is Role.CREATES or (act.role is Role.OTHER and act.makes and noun in self._names)
         if is_list or is_made:
-            id_ = self._names.get(noun, "") if is_list and not act.sent else ""
+            id_ = self._names.get(noun, "") if is_list and not act.needs else ""
             return Place(act, method, f"/{noun}s", request, response, id=id_)
         name = act.noun if act.role in {Role.READS, Role.WRITES} else act.operation.name.lower()
         return Place(act, "POST" if act.role is Role.REMOVES else method, f"/{name}", request, response)
@@ -229,7 +230,8 @@ class Resources:
         if page is None or len(page.items) > _ITEMS:
             return
         there = {str(item.get(self.lists[template].id, "")): item for item in page.items if isinstance(item, dict)}
-        for id_ in (*there, *(known - there.keys() if _is_whole(page) else ())):
+        is_whole = self._lists_all(template, page)
+        for id_ in (*there, *(known - there.keys() if is_whole else ())):
             yield self.item_of(seen, template, id_, there.get(id_))
         known |= there.keys()
 
@@ -238,9 +240,13 @@ class Resources:
         request = replace(seen.request, url=f"{BASE}{re.sub(_IN_PATH, lambda _: quote(id_, safe=''), template)}")
         found = replace(seen.response, octets=json.dumps(item).encode())
         page = page_of(seen.response)
-        status = _ABSENT if page is not None and _is_whole(page) else _FAILED
+        status = _ABSENT if page is not None and self._lists_all(template, page) else _FAILED
         found = found if item is not None else replace(found, status=status, headers=(), octets=b"")
         return SoapExchange(request, found, own=seen.own)
+
+    def _lists_all(self, template: str, page: Page) -> bool:
+        """Return whether a page has all things; a list with filters may leave some out until it is asked for them."""
+        return _is_whole(page) and not self.lists[template].act.sent
 
     def in_soap(self, found: Case) -> Case:
         """Return a case of a resource as one of the operation, with its exchange and the names of operations."""
@@ -250,7 +256,9 @@ class Resources:
         called = matching(self.contract, sent.method, sent.url.removeprefix(BASE).partition("?")[0])
         expected, observed = self._text_in_soap(found.expected), self._text_in_soap(found.observed)
         subject = called.id if called is not None else ""
-        doubt = found.doubt or ("a device may limit a number" if _NUMBER.fullmatch(observed) else "")
+        # What was read as it was written is no limit.
+        is_limit = _NUMBER.fullmatch(observed) and "as it was read before" not in expected
+        doubt = found.doubt or ("a device may limit a number" if is_limit else "")
         doubt = doubt or ("it may have several forms" if _FORMS.fullmatch(observed) else "")
         doubt = doubt or ("a device may take equal values for one thing" if _TWICE in expected else "")
         doubt = doubt or ("its values may stand for nothing" if _is_unnamed(found) else "")
@@ -280,9 +288,13 @@ class Resources:
         if whole is None:
             raise ValueError("no schema declares its request")
         if place.is_query:
-            if len(dict(pairs := parse_qsl(query, keep_blank_values=True))) < len(pairs):
-                raise ValueError("a parameter is there twice")
-            return message_of(whole, {**dict(pairs), **id_})
+            pairs, fields = parse_qsl(query, keep_blank_values=True), dict(place.fields())
+            given: dict[str, str | list[str]] = dict(pairs)
+            for name, _ in pairs if len(given) < len(pairs) else ():
+                given[name] = [text for other, text in pairs if other == name]
+                if name in fields and fields[name].maximum == 1 != len(given[name]):
+                    raise ValueError("a parameter is there twice")
+            return message_of(whole, given | id_)
         sent = read_json(request.body).value if request.body else {}
         made = node_of(place.request, _with_attributes(place.request, sent | id_ if isinstance(sent, dict) else sent))
         for one in _wrappers(whole, place.request)[::-1]:
@@ -462,7 +474,7 @@ def _text(value: Any) -> str:
     return ("true" if value else "false") if isinstance(value, bool) else str(value)
 
 
-def _openapi_of(place: Place) -> dict[str, Any]:
+def _openapi_of(place: Place, branch: int | None) -> dict[str, Any]:
     """Return an operation as OpenAPI describes it."""
     act, parameters = place.act, list[dict[str, Any]]()
     names = re.findall(r"\{([^{}]*)\}", place.template)
@@ -494,7 +506,7 @@ def _openapi_of(place: Place) -> dict[str, Any]:
         "responses": responses,
     }
     if not place.is_query and place.request is not None:
-        body = schema_of(place.request)
+        body = schema_of(place.request, branch=branch)
         body["properties"] = {name: one for name, one in body.get("properties", {}).items() if name != place.key}
         body["required"] = [name for name in body.get("required", ()) if name != place.key]
         found["requestBody"] = {"required": True, "content": {_JSON: {"schema": body}}}

@@ -17,7 +17,6 @@ from conformance.documents.wsdl_pack import services_of
 from conformance.documents.xml import ENVELOPE, clark, elements, local, text_of
 from conformance.rules.description import test_lives, test_resources
 from conformance.rules.soap.own_state import entries, probes_left
-from conformance.scenarios.living import Life
 from conformance.scenarios.rule import Note, Outcome, Rule, rule
 from conformance.scenarios.soap_changes import soap_changes
 from conformance.scenarios.soap_survey import Kind, NotSoapError, SoapProbe, soap_survey, wsdl_faults
@@ -389,9 +388,7 @@ def _of_things(name: str, of: Rule, part: str = "lives") -> Rule:
 
     def judge_things(trace: Things, run: Run) -> Iterator[Outcome]:
         resources = resources_of(run.contract)
-        # A device may limit a setting; `checkers.soap_memory` judges those.
-        own = tuple(one for one in getattr(trace, part) if not isinstance(one, Life) or one.create)
-        for outcome in of.judge(own):
+        for outcome in of.judge(getattr(trace, part)):
             yield resources.in_soap(outcome) if resources is not None and isinstance(outcome, Case) else outcome
 
     return rule(f"soap/{name}", on=(soap_things,))(judge_things)
