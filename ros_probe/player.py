@@ -4,7 +4,8 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
 
 - `describe` (type): the fields of a type. `complete` (type, value): the value with its defaults.
 - `publish` (topic, type, values, gap_s, repeat_s, reliability, durability): publish; the first time, become a
-  publisher. Without values, only that. The last value is repeated every repeat_s until the next command. Answers
+  publisher. Without values, only that. The last value is repeated every repeat_s until the next command. A publisher
+  that is transient_local is a participant of its own, so that its first message is older than its readers. Answers
   `sent`: when each was handed to ROS; `subscribers`; `best_effort`: whether one of them may lose messages.
 - `listen` (topic, type): subscribe, as reliably as the publishers that are there, and answer how many that are.
 - `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
@@ -63,8 +64,7 @@ class Player:
     """
 
     def __init__(self, domain_id: int, name: str) -> None:
-        self._context = Context()
-        rclpy.init(args=[], context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self._domain_id, self._context = domain_id, _join(domain_id)
         # What is heard is dated by a thread that does nothing else; who serves may wait.
         self._node, self._name = self._made(name), name
         self._servant: Node | None = None
@@ -72,6 +72,8 @@ class Player:
         self._ends = threading.Event()
         self._spin(SingleThreadedExecutor(context=self._context), self._node)
         self._entities: dict[str, Any] = {}
+        # Nodes of latched publishers, by topic.
+        self._latched: dict[str, Node] = {}
         self._steps: dict[str, _Steps] = {}
         self._timers: dict[str, Any] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
@@ -104,12 +106,14 @@ class Player:
         self._ends.set()
         for executor in self._executors:
             executor.shutdown(timeout_sec=1)
+        for topic in list(self._latched):
+            self._forget(topic)
         for node in filter(None, (self._servant, self._node)):
             node.destroy_node()
         self._context.try_shutdown()
 
-    def _made(self, name: str) -> Node:
-        return Node(name, context=self._context, start_parameter_services=False, enable_rosout=False)
+    def _made(self, name: str, context: Context | None = None) -> Node:
+        return Node(name, context=context or self._context, start_parameter_services=False, enable_rosout=False)
 
     def _spin(self, executor: Executor, node: Node) -> None:
         def spin() -> None:
@@ -156,7 +160,10 @@ class Player:
                 reliability=ReliabilityPolicy[reliability.upper()],
                 durability=DurabilityPolicy[durability.upper()],
             )
-            self._entities[key] = self._node.create_publisher(type_of(type), topic, qos)
+            if durability == "transient_local":
+                # A participant of its own, which nobody has found when the first message is there.
+                self._latched[topic] = self._made(f"{self._name}_latched", _join(self._domain_id))
+            self._entities[key] = self._latched.get(topic, self._node).create_publisher(type_of(type), topic, qos)
         publisher, sent = self._entities[key], []
         self._stop_repeating(topic)
         for number, message in enumerate(messages):
@@ -238,6 +245,10 @@ class Player:
 
     def _forget(self, name: str) -> dict[str, Any]:
         self._stop_repeating(name)
+        if (latched := self._latched.pop(name, None)) is not None:
+            del self._entities[f"publish {name}"]
+            latched.destroy_node()
+            latched.context.try_shutdown()
         found = [self._entities.pop(key) for key in (name, f"publish {name}") if key in self._entities]
         for item in found:
             # In rclpy, each entity has its own way out; an action server is one of several entities.
@@ -259,14 +270,21 @@ class Player:
             }
             for name, types in node.get_topic_names_and_types()
         }
+        own = {f"/{self._name}{part}" for part in ("", "_server", "_latched")}
         nodes = [f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces()]
-        own = {f"/{self._name}", f"/{self._name}_server"}
         return {
             "topics": topics,
             "services": dict(node.get_service_names_and_types()),
             "actions": dict(get_action_names_and_types(node)),
             "nodes": [name for name in nodes if name not in own],
         }
+
+
+def _join(domain_id: int) -> Context:
+    """Return a new context, whose nodes are a participant of their own."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+    return context
 
 
 class _Steps:

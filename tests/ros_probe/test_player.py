@@ -73,6 +73,19 @@ def test_values_of_each_primitive_type_arrive_to_the_bit_in_order(players):
     assert empty[2]["int64_values"] == []
 
 
+def test_a_latched_message_is_older_than_its_readers(players):
+    robot, other = players
+    latched = {"topic": "/map", "type": "std_msgs/msg/String", "durability": "transient_local"}
+    other.tell("listen", topic="/map", type=latched["type"])
+    assert robot.tell("publish", **latched, values=[{"data": "first"}])["subscribers"] == 0
+    _matched(robot, other, "/map", latched["type"])
+    robot.tell("publish", **latched, values=[{"data": "second"}])
+    # The player listens without latching, so the first message is none of those that it gets.
+    assert [value["data"] for _, _, value in other.heard("/map")] == ["second"]
+    robot.tell("forget", name="/map")
+    assert robot.tell("graph")["topics"]["/map"]["subscribers"] == 1
+
+
 def test_a_large_image_arrives(players):
     robot, other = players
     kind = "sensor_msgs/msg/Image"
