@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, Final
 from urllib.parse import unquote
@@ -78,6 +79,7 @@ class Operation:
         reads: whether it only reads, whatever its method (x-roaas-reads).
         created: whether it updates a thing that another operation creates (x-roaas-created).
         text: what its summary and its description say.
+        guessed: what a read without a declared content may show, by what is written there; nothing is judged by it.
     """
 
     id: str
@@ -97,6 +99,7 @@ class Operation:
     reads: bool = False
     created: bool = False
     text: str = ""
+    guessed: Schema | None = None
 
     @cached_property
     def label(self) -> str:
@@ -126,13 +129,13 @@ class Operation:
 
     @cached_property
     def shape(self) -> Schema | None:
-        """The schema of its successful response's body, or None."""
+        """The schema of its successful response's body, or what that probably shows, or None."""
         for status, content in self.responses.items():
             if status.startswith("2"):
                 for media_type, schema in content.items():
                     if is_json(media_type):
-                        return schema
-        return None
+                        return schema or self.guessed or schema
+        return None if self.formats else self.guessed
 
     def parameter(self, where: str) -> tuple[Parameter, ...]:
         """Return the parameters of one kind: path, query, header or cookie."""
@@ -183,7 +186,27 @@ def read_operations(document: Schema, *, closed: bool = False) -> list[Operation
             _operation(path, method, {"security": security, **given}, shared, closed=closed)
             for method, given in methods_of(whole).items()
         ]
-    return found
+    return [_guess(operation, found) for operation in found]
+
+
+def _guess(operation: Operation, operations: Iterable[Operation]) -> Operation:
+    """Return a read whose content the description does not declare with what it shows by what is written there.
+
+    Frameworks such as FastAPI declare `{}` for a function without an annotated response.
+    """
+    if operation.method != "GET" or operation.shape:
+        return operation
+    path = operation.template.rstrip("/")
+    above, _, last = path.rpartition("/")
+    wanted = [("PUT", path), ("PATCH", path), *([("POST", above)] if last.startswith("{") else [])]
+    bodies = {(one.method, one.template.rstrip("/")): one.bodies for one in operations}
+    own, created = (
+        next((body.schema for key in keys for name, body in bodies.get(key, {}).items() if is_json(name)), None)
+        for keys in (wanted, [("POST", path)])
+    )
+    if created is not None and any(template.startswith(f"{path}/{{") for _, template in bodies):
+        return replace(operation, guessed={"type": "array", "items": created})
+    return replace(operation, guessed=own)
 
 
 def methods_of(item: Schema) -> dict[str, Any]:

@@ -183,3 +183,27 @@ components:
     names = [item.name for item in operation.parameters]
     kept = ["accept", "X-Trace"]
     assert names == (["AUTHORIZATION", "Accept", "content-type", *kept] if "swagger" in version else kept)
+
+
+def test_a_read_without_declared_content_shows_what_is_written_there():
+    target = {"type": "object", "properties": {"x": {"type": "number"}}}
+    takes = {"requestBody": {"content": {"application/json": {"schema": target}}}, "responses": {"201": {}}}
+    shows = {"responses": {"200": {"description": "", "content": {"application/json": {"schema": {}}}}}}
+    text = {"responses": {"200": {"description": "", "content": {"text/plain": {}}}}}
+    paths = {
+        "/targets": {"get": shows, "post": takes},
+        "/targets/{id}": {"get": {"responses": {"200": {"description": ""}}}, "delete": {"responses": {"204": {}}}},
+        "/limits": {"get": shows, "put": takes},
+        "/search": {"get": shows, "post": takes},
+        "/name": {"get": text, "put": takes},
+    }
+    found = {one.label: one for one in read_operations({"openapi": "3.1.0", "paths": paths})}
+    shapes = {label: one.shape for label, one in found.items() if label.startswith("GET")}
+    assert shapes == {
+        "GET /targets": {"type": "array", "items": target},
+        "GET /targets/{id}": target,
+        "GET /limits": target,
+        "GET /search": {},
+        "GET /name": None,
+    }
+    assert found["GET /targets"].responses["200"]["application/json"] == {}, "nothing is judged by it"
