@@ -3,9 +3,9 @@
 Each command is an object with "do"; each gets one answer. Times are of CLOCK_MONOTONIC, ns. Values are as in values.py.
 
 - `describe` (type): the fields of a type. `complete` (type, value): the value with its defaults.
-- `publish` (topic, type, values, gap_s, repeat_s, reliability, durability): publish; the first time, become a
-  publisher. Without values, only that. The last value is repeated every repeat_s until the next command. A publisher
-  that is transient_local is a participant of its own, so that its first message is older than its readers. Answers
+- `publish` (topic, type, values, gap_s, repeat_s, reliability, durability, apart): publish; the first time, become a
+  publisher. Without values, only that. The last value is repeated every repeat_s until the next command. With
+  `apart`, the publisher is a participant of its own, so that its first message is older than its readers. Answers
   `sent`: when each was handed to ROS; `subscribers`; `best_effort`: whether one of them may lose messages.
 - `listen` (topic, type): subscribe, as reliably as the publishers that are there, and answer how many that are.
 - `heard` (name, count, within_s): what came to a topic, service or action since the last call, each `[time, what,
@@ -72,8 +72,8 @@ class Player:
         self._ends = threading.Event()
         self._spin(SingleThreadedExecutor(context=self._context), self._node)
         self._entities: dict[str, Any] = {}
-        # Nodes of latched publishers, by topic.
-        self._latched: dict[str, Node] = {}
+        # Nodes of publishers that are participants of their own, by topic.
+        self._apart: dict[str, Node] = {}
         self._steps: dict[str, _Steps] = {}
         self._timers: dict[str, Any] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
@@ -106,7 +106,7 @@ class Player:
         self._ends.set()
         for executor in self._executors:
             executor.shutdown(timeout_sec=1)
-        for topic in list(self._latched):
+        for topic in list(self._apart):
             self._forget(topic)
         for node in filter(None, (self._servant, self._node)):
             node.destroy_node()
@@ -151,6 +151,8 @@ class Player:
         reliability: str = "reliable",
         durability: str = "volatile",
         depth: int = 100,
+        *,
+        apart: bool = False,
     ) -> dict[str, Any]:
         messages = [message_of(type, value) for value in values]
         key = f"publish {topic}"
@@ -160,10 +162,9 @@ class Player:
                 reliability=ReliabilityPolicy[reliability.upper()],
                 durability=DurabilityPolicy[durability.upper()],
             )
-            if durability == "transient_local":
-                # A participant of its own, which nobody has found when the first message is there.
-                self._latched[topic] = self._made(f"{self._name}_latched", _join(self._domain_id))
-            self._entities[key] = self._latched.get(topic, self._node).create_publisher(type_of(type), topic, qos)
+            if apart:
+                self._apart[topic] = self._made(f"{self._name}_apart", _join(self._domain_id))
+            self._entities[key] = self._apart.get(topic, self._node).create_publisher(type_of(type), topic, qos)
         publisher, sent = self._entities[key], []
         self._stop_repeating(topic)
         for number, message in enumerate(messages):
@@ -245,10 +246,10 @@ class Player:
 
     def _forget(self, name: str) -> dict[str, Any]:
         self._stop_repeating(name)
-        if (latched := self._latched.pop(name, None)) is not None:
+        if (apart := self._apart.pop(name, None)) is not None:
             del self._entities[f"publish {name}"]
-            latched.destroy_node()
-            latched.context.try_shutdown()
+            apart.destroy_node()
+            apart.context.try_shutdown()
         found = [self._entities.pop(key) for key in (name, f"publish {name}") if key in self._entities]
         for item in found:
             # In rclpy, each entity has its own way out; an action server is one of several entities.
@@ -270,7 +271,7 @@ class Player:
             }
             for name, types in node.get_topic_names_and_types()
         }
-        own = {f"/{self._name}{part}" for part in ("", "_server", "_latched")}
+        own = {f"/{self._name}{part}" for part in ("", "_server", "_apart")}
         nodes = [f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces()]
         return {
             "topics": topics,

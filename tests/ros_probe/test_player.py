@@ -75,7 +75,7 @@ def test_values_of_each_primitive_type_arrive_to_the_bit_in_order(players):
 
 def test_a_latched_message_is_older_than_its_readers(players):
     robot, other = players
-    latched = {"topic": "/map", "type": "std_msgs/msg/String", "durability": "transient_local"}
+    latched = {"topic": "/map", "type": "std_msgs/msg/String", "durability": "transient_local", "apart": True}
     other.tell("listen", topic="/map", type=latched["type"])
     assert robot.tell("publish", **latched, values=[{"data": "first"}])["subscribers"] == 0
     _matched(robot, other, "/map", latched["type"])

@@ -149,10 +149,13 @@ class _Topics:
         """Publish on all topics, and yield the gateway's response for each."""
         before = {call: content_of(self._gateway.read(call, body), body) for call, body in self._reads.items()}
         values: dict[str, Any] = {}
+        aged = {body.topic for body in self._reads.values() if body.max_age_s is not None}
         for body in self._reads.values():
             if body.topic not in values:
                 value = values[body.topic] = self._message(body.type)
-                self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, **quality)
+                # A message that comes once is older than its discovery, unless it would be too old by then.
+                apart = not (repeat_s or body.topic in aged)
+                self._gateway.robot.publish(body.topic, body.type, value, repeat_s=repeat_s, apart=apart, **quality)
         until = WALL_CLOCK.now() + max(body.within_s for body in self._reads.values()) + PATIENCE_S
         found: dict[str, Presence] = {}
         for turn in itertools.count(1):
