@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from http import HTTPStatus
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
 
@@ -17,6 +18,7 @@ from conformance.api.rest.things import (
     doubt_of_life,
     doubt_of_write,
     identifier_of,
+    may_create,
     parts_of,
 )
 from conformance.api.rest.values import IDS
@@ -43,6 +45,7 @@ class _Entry(NamedTuple):
 
     Attributes:
         sent: what it sent, or what the entry showed before it was deleted.
+        told: what the response to its creation shows.
         operation: of the request; label: that, and how it was answered.
         at_s: when it was answered, s of the monotonic clock.
     """
@@ -51,6 +54,7 @@ class _Entry(NamedTuple):
     operation: Operation
     label: str
     at_s: float
+    told: Mapping[str, Any] = MappingProxyType({})
 
 
 class Entries:
@@ -81,6 +85,7 @@ class Entries:
         self._given: dict[str, set[str]] = defaultdict(set)
         self._listed: dict[str, dict[str, dict[str, Any]]] = {}
         self._refused: dict[str, list[_Entry]] = defaultdict(list)
+        self._longest: dict[str, int] = defaultdict(int)
         self._unchanged: dict[str, dict[str, list[_Entry]]] = defaultdict(lambda: defaultdict(list))
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -93,14 +98,14 @@ class Entries:
             above, _, last = path.rpartition("/")
             self._note_change(occasion, operation, above, unquote(last).casefold())
         elif request.method == "POST" and create is not None:
-            self._note(occasion, create, path)
+            yield from self._note(occasion, create, path)
         elif request.method not in SAFE and not refuses(occasion.response.status, operation):
             # It may have changed, created or deleted entries, or what they are below.
             for memory in (self._made, self._gone, self._listed, self._unchanged):
                 memory.clear()
         elif request.method == "GET" and operation is not None and create is not None:
             listing, page = listing_of(operation), page_of(occasion.response, operation)
-            if listing is not None and page is not None and _is_whole(occasion, listing, page):
+            if listing is not None and page is not None and self._is_whole(occasion, listing, page, path):
                 yield from self._judge(occasion, create, page, path)
 
     def _note_change(self, occasion: Occasion, operation: Operation, path: str, id_: str) -> None:
@@ -123,17 +128,28 @@ class Entries:
             kept = {} if earlier is None or operation.method == "PUT" else earlier.sent
             self._made[path][id_] = entry._replace(sent={**kept, **body})
 
-    def _note(self, occasion: Occasion, create: Operation, path: str) -> None:
-        """Note an entry that was created, or refused."""
+    def _note(self, occasion: Occasion, create: Operation, path: str) -> Iterator[Case]:
+        """Note an entry that was created, or refused; judge that it has an identifier of its own."""
         response, sent = occasion.response, read_json(occasion.request.body).value
         body = sent if isinstance(sent, dict) else {}
-        entry = _Entry(body, create, f"{create.label} with status {response.status}", response.received_s)
+        told = members_of(read_json(response.body).value)
+        entry = _Entry(body, create, f"{create.label} with status {response.status}", response.received_s, told)
         id_ = self._id_of(read_json(response.body).value, create) if is_json(response.media_type) else ""
         if refuses(response.status, create):
             self._refused[path] = [*self._refused[path], entry][-_MOST:]
-        elif response.status != HTTPStatus.CREATED or not id_:
+        elif not (id_ and may_create(create, response.status)) or (
+            response.status == HTTPStatus.OK and id_ in self._listed.get(path, {id_: {}})
+        ):
             self._listed.pop(path, None)
         else:
+            there = self._listed.get(path, {}).get(id_) or members_of(getattr(self._made[path].get(id_), "sent", None))
+            if there:
+                # A device may answer a repeated creation with the thing that it has made, or take the client's name.
+                values = [str(one).casefold() for one in body.values()]
+                own = not any(differences(body, there, _schema_of(create), create.shape, self._collections))
+                expected, cause = "an identifier of its own, not that of another entry", f"{create.label} identifier"
+                holds = own or id_ in values
+                yield occasion.case("description/created-is-there", holds, expected, f"{id_} again", cause=cause)
             self._given[path].add(id_)
             if occasion.is_valid and body and len(self._made[path]) < _MOST:
                 self._made[path][id_] = entry
@@ -157,6 +173,7 @@ class Entries:
                     continue  # a device may change it a moment later
                 yield occasion.case("description/written-is-read", not wrong, expected, wrong, cause=cause, doubt=doubt)
                 del self._made[path][id_]
+        yield from self._judge_others(occasion, create, items, made, path)
         for id_, entry in list(self._gone[path].items()):
             # A list may show what was deleted for a moment, or marked, or in another state.
             now, is_late = items.get(id_), occasion.sent_s - entry.at_s > _SETTLES_S
@@ -170,15 +187,46 @@ class Entries:
         yield from self._judge_refused(occasion, create, items, path)
         self._listed[path] = items
 
+    def _judge_others(
+        self,
+        occasion: Occasion,
+        create: Operation,
+        items: dict[str, dict[str, Any]],
+        made: dict[str, _Entry],
+        path: str,
+    ) -> Iterator[Case]:
+        """Judge whether requests have created or deleted further entries."""
+        before = self._listed.get(path)
+        if before is None:
+            return
+        new = items.keys() - before.keys() - self._given[path]
+        for id_ in [id_ for id_, one in made.items() if one.operation is create and id_ in items]:
+            names = list(map(plain_name, made[id_].sent))
+            twins = [one for one in new if all(items[one].get(name) == items[id_].get(name) for name in names)]
+            expected, cause = f"one new entry by {made[id_].label}", f"{create.label} once"
+            found = f"{id_} and {', '.join(twins)}, which are alike"
+            yield occasion.case("description/created-is-there", not twins, expected, found, cause=cause)
+        deleted = next(iter(self._gone[path].values()), None)
+        lost = [id_ for id_ in before if id_ in self._given[path] - items.keys() - self._gone[path].keys()]
+        if deleted is not None and not made:
+            # A device may work off a queue from its beginning.
+            is_first = len(lost) == 1 and lost[0] == next(iter(before))
+            doubt = doubt_of_life(create) or ("the first one may have ended by itself" if is_first else "")
+            expected, cause = f"all entries but the one of {deleted.label}", f"{deleted.operation.label} others"
+            found = f"a list without {', '.join(lost[:3])}"
+            yield occasion.case("description/created-is-there", not lost, expected, found, cause=cause, doubt=doubt)
+
     def _difference(self, entry: _Entry, item: dict[str, Any]) -> tuple[str, bool]:
         """Return what an entry shows in another way than it was written, and whether it may be written in short."""
-        schema = next(iter(entry.operation.bodies.values())).schema
+        schema = _schema_of(entry.operation)
         shape, wrong, is_short = entry.operation.shape, "", False
         for name, value in entry.sent.items():
-            # Later entries move those behind them, and a list may show only the beginning of a text.
-            if plain_name(name) not in _PLACES and not _begins(value, item.get(plain_name(name))) and not wrong:
+            # Later entries move those behind them. A list may show only the beginning of a text, but no creation may.
+            plain = plain_name(name)
+            is_short_here = _begins(value, item.get(plain)) and entry.told.get(plain, value) == value
+            if plain not in _PLACES and not is_short_here and not wrong:
                 wrong = next(differences({name: value}, item, schema, shape, self._collections), "")
-                is_short = not isinstance(value, int | float)
+                is_short = not isinstance(value, int | float) and entry.told.get(plain, value) == value
         return wrong, is_short
 
     def _judge_unchanged(
@@ -195,6 +243,18 @@ class Entries:
                 found = f"{clip(names[kept[0]])} as {kept[0]}" if kept else "a list without it"
                 doubt = "" if kept else doubt_of_life(create)
                 yield occasion.case("description/refused-keeps", not done, expected, found, cause=cause, doubt=doubt)
+
+    def _is_whole(self, occasion: Occasion, listing: Listing, page: Page, path: str) -> bool:
+        """Return whether a response shows the whole list."""
+        sent, count = listing.query_texts(occasion.context.target), len(page.items)
+        limit = {listing.limit.name} if listing.limit is not None else set()
+        if sent is None or not sent.keys() <= limit:
+            return False
+        # A list that has shown more items was not cut at fewer, if nothing says so.
+        is_said = page.goes_on or max(page.totals.values(), default=0) > count or 0 < listing.most(sent) <= count
+        has_shown_more = count < self._longest[path] and not is_said
+        self._longest[path] = max(self._longest[path], count)
+        return has_shown_more or not is_cut(listing, page, sent)
 
     def _id_of(self, value: Any, create: Operation) -> str:
         """Return the identifier of an entry; empty if it has none."""
@@ -223,13 +283,15 @@ class Entries:
                 yield occasion.case("description/refused-keeps", not there, expected, found, cause=cause)
 
 
+def _schema_of(operation: Operation) -> dict[str, Any]:
+    return next(iter(operation.bodies.values())).schema
+
+
 def _begins(value: Any, seen: Any) -> bool:
     """Return whether a text in a list is the beginning of the one that was sent."""
-    return isinstance(value, str) and isinstance(seen, str) and value != seen and value.startswith(seen.rstrip(".… "))
-
-
-def _is_whole(occasion: Occasion, listing: Listing, page: Page) -> bool:
-    """Return whether a response shows the whole list."""
-    sent = listing.query_texts(occasion.context.target)
-    limit = {listing.limit.name} if listing.limit is not None else set()
-    return sent is not None and sent.keys() <= limit and not is_cut(listing, page, sent)
+    return (
+        isinstance(value, str)
+        and isinstance(seen, str)
+        and seen not in {"", value}
+        and value.startswith(seen.rstrip(".… "))
+    )

@@ -89,6 +89,9 @@ class Lists:
         # Values that lists from a level on had since the last change, and how often two such lists were apart.
         self._shown: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(dict)
         self._apart: dict[tuple[str, str], int] = defaultdict(int)
+        # By operation and other parameters: limits with which a list without pages had too few items, until it is long
+        # again.
+        self._cut: dict[object, dict[int, Case]] = defaultdict(dict)
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -98,6 +101,7 @@ class Lists:
             self._whole.clear()
             self._missed.clear()
             self._shown.clear()
+            self._cut.clear()
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
@@ -109,6 +113,7 @@ class Lists:
         yield from self._cursor(occasion, listing, page, sent)
         if not (listing.operation.parameters or page.totals):
             return
+        yield from self._judge_cut(occasion, listing, page, sent)
         yield from self._limit(occasion, listing, page, sent)
         yield from self._filters(occasion, listing, page, sent)
         yield from self._bounds(occasion, listing, page, sent)
@@ -149,6 +154,22 @@ class Lists:
         own = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         there = [one for one, item in own.items() if name in item and item[name] is value]
         return [one for one in there if hash((listing.operation.label, one, name, str(value))) in self._seen]
+
+    def _judge_cut(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+        """Judge that a limit takes away only what is beyond it, where no parameter or link leads to the rest."""
+        most, count, places = listing.most(sent), len(page.items), (listing.offset, listing.page, listing.cursor)
+        if listing.limit is None or most <= 0 or page.goes_on or any(places):
+            return
+        key = listing.operation.label, frozenset(pair for pair in sent.items() if pair[0] != listing.limit.name)
+        longest, few = self._longest[key], self._cut[key]
+        if count < min(most, longest):
+            expected = f"{min(most, longest)} of {longest} items, as no parameter leads to the rest"
+            found, cause = f"{count} items", f"{listing.operation.label} cut"
+            few[most] = occasion.case("description/list-limit", False, expected, found, cause=cause)  # noqa: FBT003
+        elif count == longest and len(few) > 1:
+            # The list is as long as before, and two limits have shortened it too much.
+            yield from few.values()
+            few.clear()
 
     def _limit(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge that there are no more items than the parameter allows; 0 may mean all.

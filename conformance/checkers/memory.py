@@ -64,8 +64,6 @@ _TELLING: Final = 5
 _READ: Final = "written-is-read"
 _NOTHING: Final[tuple[Any, ...]] = (None, "", 0, False, [], {})
 _GONE: Final = "deleted-is-gone"
-# Phrases in a description which say that a response shows what was there before the request.
-_EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
 # Phrases in a description which say that an identifier is never used again. Below: phrases for things that outlive
 # another.
 _NEVER_AGAIN: Final = re.compile(
@@ -97,7 +95,6 @@ class _Thing:
         body: hash of that of the POST that created it; 0: there was none.
         replaced: whether an equal one was created later, which may be there in its place.
         written: what it has to read, by member, with the operation that wrote it.
-        told: the last write, until a read has shown what it did.
         shown: the members that were read as written, with how much had been sent by then that may change something.
         differs: how often a member was read in another way.
     """
@@ -115,7 +112,6 @@ class _Thing:
     body: int = 0
     replaced: bool = False
     written: dict[str, tuple[Any, Operation]] = field(default_factory=dict)
-    told: Occasion | None = None
     shown: dict[str, int] = field(default_factory=dict)
     differs: dict[str, int] = field(default_factory=lambda: defaultdict(int))
 
@@ -161,9 +157,6 @@ class Memory:
         self._last: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
         # By operation and member: values in responses to creations that differ from the declared default.
         self._undefaulted: dict[tuple[str, str], Any] = {}
-        # By operation and member: writes whose response shows another value than the next read; below, late members.
-        self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
-        self._late: set[tuple[str, str]] = set()
         # Templates of things that end by themselves, because an identifier came again.
         self._ends: set[str] = set()
         self._deletable = {template for method, template in methods if method == "DELETE"}
@@ -263,7 +256,6 @@ class Memory:
             for name, value in body.items():
                 thing.written[name] = value, operation
                 thing.shown.pop(name, None)
-            thing.told = occasion
         self._things[path.casefold()] = thing
 
     def _again(self, occasion: Occasion, delete: Operation, before: _Thing | None) -> Iterator[Case]:
@@ -311,7 +303,7 @@ class Memory:
             written = {name: (value, operation) for name, value in body.items()}
             self._made.add(target)
             thing = _Thing.of(target, occasion.exchange, made=True)
-            thing.written, thing.body, thing.told = written, hash(occasion.request.body), occasion if body else None
+            thing.written, thing.body = written, hash(occasion.request.body)
             for one in self._things.values():
                 one.replaced |= one.body == thing.body and one.path.rpartition("/")[0] == path
             self._things[target.casefold()] = thing
@@ -409,9 +401,6 @@ class Memory:
             lost = self._lost.pop(item.template, []) if item.template in self._deletable else []
             yield from (replace(case, doubt=doubt_of_life(item)) for made_s, case in lost if made_s > thing.changed_s)
             self._lost[item.template] += [one for one in lost if one[0] <= thing.changed_s]
-            if thing.told is not None:
-                yield from self._told(occasion, item, thing.told)
-                thing.told = None
             yield from self._compare(occasion, item, thing, age_s)
 
     def _judge_deleted(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
@@ -507,30 +496,6 @@ class Memory:
             if is_there or len(lacking) >= _SEEN:
                 expected, cause = f"{clip(wanted)} as {name}, as it was written", f"{operation.label} {name} there"
                 yield occasion.case(f"description/{_READ}", is_there, expected, f"no {name}", cause=cause)
-
-    def _told(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
-        """Judge whether the response to a write shows what was sent, as the next read does; once may be chance."""
-        operation, answer = write.operation, write.response
-        if operation is None or not is_json(answer.media_type) or _EARLIER.search(operation.text):
-            return
-        own, shape, sent = parts_of(operation.shape), parts_of(item.shape), _sent_of(write)
-        schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
-        told = object_in(read_json(answer.body).value, names)
-        now = object_in(read_json(occasion.response.body).value, names)
-        for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
-            seen, key = {name: now[name]}, (operation.label, name)
-            if flat(own[name]) != flat(shape[name]) or is_shared(name):
-                continue
-            if any(differences({name: sent[name]}, seen, schema, item.shape, self._collections)):
-                self._late.add(key)
-            if key in self._late:
-                continue
-            other = next(differences(seen, told, schema, item.shape, self._collections), "")
-            self._untrue[key] |= {write.request.body} if other else set()
-            if not other or len(self._untrue[key]) >= _SEEN:
-                expected = f"{clip(now[name])} as {name}, as it was sent and as the next GET shows it"
-                cause, doubt = f"{operation.label} {name} told", "the response may show the state before the request"
-                yield write.case(f"description/{_READ}", not other, expected, other, cause=cause, doubt=doubt)
 
     @staticmethod
     def _case(name: str, occasion: Occasion, expected: str, found: str = "", *, cause: str, doubt: str = "") -> Case:

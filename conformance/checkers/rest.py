@@ -8,6 +8,7 @@ from typing import Final
 from conformance.api.rest.request_context import RequestContext
 from conformance.api.rest.things import doubt_of_write
 from conformance.checkers import declared, fields, problem, texts
+from conformance.checkers.answers import Answers
 from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
 from conformance.checkers.contents import Contents
@@ -48,11 +49,11 @@ class Histories:
     def __init__(self, contract: Contract) -> None:
         self._contract = contract
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
-        self._untouched = Untouched(contract)
+        self._untouched, self._answers = Untouched(contract), Answers(contract)
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract), Entries(contract),
+            self._untouched, Sublists(contract), Entries(contract), self._answers,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
@@ -61,6 +62,7 @@ class Histories:
         self._writes.forget()
         self._changes.forget()
         self._untouched.forget()
+        self._answers.forget()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""

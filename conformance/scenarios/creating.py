@@ -6,12 +6,12 @@ import re
 from collections.abc import Container
 from dataclasses import replace
 from typing import Any, Final
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits, other_texts
-from conformance.api.rest.things import collection_of, id_member
+from conformance.api.rest.things import collection_of, id_member, may_create
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -42,6 +42,7 @@ def created_path(
     whole = whole if isinstance(whole, dict) else usual[0].body
     whole = with_texts(create, whole) or whole
     owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
+    known = {str(one) for one in surveyor.values.known_ids(read, read.parameter("path")[-1])}
     tried = [*(replace(usual[0], body=item) for item in (owned, body) if item), *usual]
     made = _first_taken(surveyor, create, tried)
     if (
@@ -51,9 +52,12 @@ def created_path(
         and makes_room(surveyor.api, made.exchange)
     ):
         made = _first_taken(surveyor, create, tried)
-    if made is None or made.exchange is None or made.status not in statuses:
+    if made is None or made.exchange is None or not (made.status in statuses or may_create(create, made.status)):
         return ""
-    return location_of(surveyor.api, read, made.exchange)
+    path = location_of(surveyor.api, read, made.exchange)
+    # What is answered 200 may have been there.
+    is_new = made.status in statuses or unquote(path.rstrip("/").rpartition("/")[2]) not in known
+    return path if is_new else ""
 
 
 def _first_taken(surveyor: Surveyor, create: Operation, tried: list[Inputs]) -> Probe | None:

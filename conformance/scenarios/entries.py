@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import islice
 from typing import Any, Final
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 from conformance.api.rest.inputs import request_of, usual_inputs
 from conformance.api.rest.listing import Listing, listing_of, page_of
 from conformance.api.rest.samples import fits
-from conformance.api.rest.things import collection_of, id_member
+from conformance.api.rest.things import collection_of, id_member, identifier_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
@@ -65,24 +65,25 @@ class _Entries:
     def write(self) -> None:
         """Create two entries, change and delete one of them, and read the list each time."""
         self._read()
-        paths = [self._create_one(turn) for turn in range(1, _ENTRIES + 1)]
+        paths = [self._create_one(turn) for turn in range(_ENTRIES)]
         self._read()
-        path = next(filter(None, paths), "")
+        path = next(filter(None, reversed(paths)), "")
         for turn, method in enumerate(_CHANGES if path else (), _ENTRIES + 1):
             change = self._of_entry.get(method)
             for body in self._writer.bodies(change, turn)[:1] if change is not None else ():
-                before = self._read()
+                old = page_of(self._read().response, self._lister)
                 if change is not None and self._writer.conditional(change, self._lister, path, body).response.ok:
-                    self._until_other(before)
+                    self._read_until(lambda items: old is None or items != old.items)  # noqa: B023 - called at once
         delete = self._of_entry.get("DELETE")
         if delete is not None and path:
-            before = self._read()
+            self._read()
+            id_ = unquote(path.rstrip("/").rpartition("/")[2]).casefold()
             if self._writer.send(delete, path).response.ok:
-                self._until_other(before)
+                self._read_until(lambda items: id_ not in {identifier_of(one, delete) for one in items})
 
     def _create_one(self, turn: int) -> str:
-        """Create an entry; return the path by which it is changed, or an empty text."""
-        body = next(iter(self._writer.bodies(self._create, turn)), None)
+        """Create an entry, another one each turn; return the path by which it is changed, or an empty text."""
+        body = next(islice(self._writer.bodies(self._create, 1), turn, None), None)
         made = self._writer.send(self._create, self._path, body)
         if made.response.status in FULL and makes_room(self._writer.api, made):
             made = self._writer.send(self._create, self._path, body)
@@ -96,12 +97,11 @@ class _Entries:
     def _read(self) -> Exchange:
         return self._writer.send(self._lister, self._path, query=self._query)
 
-    def _until_other(self, before: Exchange) -> None:
-        """Read the list until it differs from what it was, or for a few seconds."""
-        old = page_of(before.response, self._lister)
-        self._writer.until(
-            self._read,
-            lambda exchange: (
-                (new := page_of(exchange.response, self._lister)) is None or old is None or new.items != old.items
-            ),
-        )
+    def _read_until(self, holds: Callable[[tuple[Any, ...]], bool]) -> None:
+        """Read the list until its items meet a condition, or for a few seconds."""
+
+        def is_done(exchange: Exchange) -> bool:
+            page = page_of(exchange.response, self._lister)
+            return page is None or holds(page.items)
+
+        self._writer.until(self._read, is_done)

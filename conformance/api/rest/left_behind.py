@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import unquote, urlsplit
 
 from conformance.api.rest.applicable import allows
-from conformance.api.rest.things import collection_of
+from conformance.api.rest.listing import items_of
+from conformance.api.rest.things import collection_of, may_create
 from conformance.api.rest.values import IDS
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, matching
@@ -72,7 +73,11 @@ class LeftBehind:
                 self._deleted[path] = operation.label
         elif made:
             self._created[made] = operation.label, unquote(made.rstrip("/").rpartition("/")[2])
-            if answer.status == HTTPStatus.CREATED:
+            known = self._read.get(path.rstrip("/"), self._read.get(path))
+            items = None if known is None else items_of(read_json(known).value)
+            ids = {str(one.get(name)) for one in items or () if isinstance(one, dict) for name in IDS}
+            is_new = items is not None and may_create(operation, answer.status) and self._created[made][1] not in ids
+            if answer.status == HTTPStatus.CREATED or is_new:
                 self._new.add(made)
         elif operation.method in {"PUT", "PATCH"} and path not in self._created:
             before = self._read.pop(path, None)
@@ -112,7 +117,7 @@ class LeftBehind:
     def tidy_up(self, api: RestInterface, longest_s: float) -> bool:
         """Delete what the run created, the newest first, and write back what it changed; return whether it wrote.
 
-        Sends what may be called and moves nothing. What was created with another status than 201 may have existed.
+        Sends what may be called and moves nothing. What was answered 200 and may have been there is left.
 
         Args:
             api: the device's REST interface, whose exchanges are followed.

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
+from http import HTTPStatus
 from typing import Any, Final, NamedTuple, TypeGuard
 
 from conformance.api.rest.references import refers, singular
@@ -96,6 +97,15 @@ def creator_of(operations: Mapping[tuple[str, str], Operation], read: Operation)
     below = (one for one in below_others(operations, "POST", read) if "201" in one.responses)
     known = (one for one in below if members and parts_of(one.shape) == members)
     return operations.get(("POST", collection_of(read.template))) or next(known, None)
+
+
+def may_create(create: Operation, status: int) -> bool:
+    """Return whether a status says that a POST has created a thing: 201, or 200 where the description has no 201.
+
+    With 200 it may as well be a search or a login, or have found what was there.
+    """
+    is_usual = create.method == "POST" and "201" not in create.responses
+    return status == HTTPStatus.CREATED or (status == HTTPStatus.OK and is_usual)
 
 
 def path_chosen(item: Operation, turn: int) -> str:

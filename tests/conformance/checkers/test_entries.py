@@ -82,6 +82,7 @@ def _deleted(status=204):
 
 
 _MARK_MADE = ("POST", "/marks", {"x": 5}, 201, {"id": 1, "x": 5})
+_MARK_MORE = [("POST", "/marks", {"x": x}, 201, {"id": x - 4, "x": x}) for x in (6, 7)]
 _NEWER = [_made("n1", "text of n1"), _made("n2", "text of n2")]
 _WRONG = {
     "the newer one of two is lost": ([*_NEWER, _listed("n1")], {_THERE: False}),
@@ -95,6 +96,24 @@ _WRONG = {
     "a change that is lost": ([_marks(m1=5), _patched(7), *[_marks(m1=5)] * 3], {_READ: False}),
     "a refused change that was stored": ([_marks(m1=5), _patched(7, 409), _marks(m1=7)], {_KEPT: False}),
     "a refused deletion that was done": ([_marks(m1=5), _deleted(409), _marks()], {_KEPT: False}),
+    "an identifier that is there": (
+        [_MARK_MADE, ("POST", "/marks", {"x": 7}, 201, {"id": 1, "x": 7})],
+        {_THERE: False},
+    ),
+    "made twice": ([_marks(), _MARK_MADE, _marks(m1=5, m2=5)], {_THERE: False}),
+    "others are deleted too": (
+        [_MARK_MADE, *_MARK_MORE, _marks(m1=5, m2=6, m3=7), _deleted(), _marks()],
+        {_THERE: False},
+    ),
+    "another one is deleted": (
+        [_MARK_MADE, *_MARK_MORE, _marks(m1=5, m2=6, m3=7), _deleted(), *[_marks(m1=5, m2=6)] * 3],
+        {_THERE: False, _GONE: False},
+    ),
+    "a text that is cut": (
+        [("POST", "/notes", {"text": "a long text"}, 201, {"id": "n1", "text": "a lon"}), _listed("n1", n1="a lon")],
+        {_READ: False},
+    ),
+    "a text that is left empty": ([_made("n1", "text of n1"), _listed("n1", n1="")], {_READ: True}),
     "what was deleted stays": ([_marks(m1=5), _deleted(), *[_marks(m1=5)] * 3], {_GONE: False}),
 }
 _RIGHT = {
@@ -109,6 +128,8 @@ _RIGHT = {
     "a change, and the same one that is refused": [_marks(m1=5), _patched(7), _patched(7, 409), _marks(m1=7)],
     "a change that is done a moment later": [_marks(m1=5), _patched(7), _marks(m1=5), _marks(m1=7)],
     "a deletion that is done a moment later": [_marks(m1=5, m2=1), _deleted(), _marks(m1=5, m2=1), _marks(m2=1)],
+    "a creation that is answered with what is there": [_MARK_MADE, _marks(m1=5), _MARK_MADE, _marks(m1=5)],
+    "another client's equal entry, before": [_marks(m2=5), _MARK_MADE, _marks(m1=5, m2=5)],
     "a number that is given again": [_MARK_MADE, _deleted(), _MARK_MADE, _marks(m1=5)],
     "a list of which nothing is known before": [_made("n1", "refused", 406), _listed("n1", n1="refused")],
 }  # fmt: skip

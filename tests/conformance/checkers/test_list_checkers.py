@@ -49,6 +49,24 @@ def test_limits(name, schema, query, count, blamed, tmp_path):
     assert (LIMIT in seen.read(VALVES[:count], **query).broken) == blamed
 
 
+@pytest.mark.parametrize(
+    ("more", "counts", "blamed"),
+    [
+        ([], [1, 3, 8], True),
+        ([whole("offset")], [1, 3, 8], False),
+        ([], [1, 3, 7], False),
+        ([], [2, 4, 8], False),
+        ([], [2, 3, 8], False),
+    ],
+)
+def test_a_limit_takes_away_what_is_beyond_it_alone(more, counts, blamed, tmp_path):
+    seen = Seen(tmp_path, [whole("limit"), *more])
+    seen.read(VALVES * 2)
+    for limit, count in zip((2, 4, 100), counts, strict=True):
+        seen.read((VALVES * 2)[:count], limit=limit)
+    assert (LIMIT in seen.broken) == blamed
+
+
 def _served(raised):
     """Return a device whose limit is raised by a function, and which has eight items."""
 

@@ -77,7 +77,7 @@ def _put(at="/plain", status=200, *, told=None, **values):
 
 
 def _patch(at, sent, status=200, **values):
-    return "PATCH", at, sent, status, {**_FIRST, **values}
+    return "PATCH", at, sent, status, {**_FIRST, **values} if values else None
 
 
 def _op(kind, path, value=None, **more):
@@ -101,6 +101,12 @@ def _patches_between(at, counts):
     return steps
 
 
+def _told_late(*gains):
+    """Return two writes whose responses show the gain before them, and what the reads after them show."""
+    puts = [_put(**{**_WHOLE, "gain": gain}, told={"gain": 1.5}) for gain in (2.5, 3.5)]
+    return [_get(), *(one for put, gain in zip(puts, gains, strict=True) for one in (put, _get(gain=gain)))]
+
+
 _OLD, _NEW = ["2026-03-01T00:00:00Z"] * 3, [f"2026-03-01T00:16:4{second}Z" for second in (0, 2, 4)]
 _LONG, _ZONE = 2**53 + 1, {"a": 5, "b": 6}
 _EAST = "2026-02-01T12:34:56+02:00"
@@ -109,6 +115,7 @@ _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
     "a patch resets what it does not name, against its words": (_patches_between("/kept", (3, 3)), PATCH),
+    "responses that show what was before": (_told_late(2.5, 3.5), READ),
     "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
     "a JSON patch moves, and leaves what it moves": (
@@ -158,7 +165,7 @@ BROKEN = {
         [_get("/merge"), _patch("/merge", {"from": _EAST}), _get("/merge", **{"from": "2026-02-01T12:34:56Z"})], READ,
     ),
     "the time of the last change stays": (_two_changes(createdAt=_OLD, updatedAt=_OLD), READ),
-    "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}), _get("/merge")], PATCH),
+    "null keeps": ([_get("/merge"), _patch("/merge", {"note": None}, **_FIRST), _get("/merge")], PATCH),
     "null keeps, seen by another change": (
         [_get("/merge"), ("PATCH", "/merge", {"note": None, "gain": 2.5}, 204, None), _get("/merge", gain=2.5)], PATCH,
     ),
@@ -323,6 +330,10 @@ RIGHT = {
         *(_patch("/merge", {"zone": {"b": 8}}), _get("/merge", zone={"a": 4, "b": 8})),
         *(_patch("/merge", {"zone": {"b": 8}}), _get("/merge", zone={"a": 4, "b": 8})),
     ],
+    "a response that once shows what was before": [
+        _get(), _put(**{**_WHOLE, "gain": 2.5}, told={"gain": 1.5}), _get(gain=2.5),
+    ],
+    "responses that show what is in effect later": _told_late(1.5, 1.5),
     "PUT keeps what it leaves out": [_get(), _put(**{**_LEFT, "gain": 2.5}), _get(gain=2.5)],
     "plain JSON replaces an object": [_get(), _patch("/plain", {"zone": {"a": 3}}), _get(zone={"a": 3})],
     "what counts by itself": [_get(uptime=1), _get(uptime=2), _patch("/plain", {"uptime": 3}, 422), _get(uptime=3)],

@@ -1,0 +1,102 @@
+"""Responses to writes: they show what was sent, if the next read does."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator
+from http import HTTPStatus
+from typing import Any, Final
+from urllib.parse import quote
+
+from conformance.api.rest.references import collections_of
+from conformance.api.rest.statuses import refuses
+from conformance.api.rest.things import collection_of, differences, id_member, is_shared, object_in, parts_of
+from conformance.checkers.occasion import Occasion
+from conformance.contract.pack import Contract
+from conformance.documents.json_text import clip, read_json
+from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
+from conformance.documents.parameters import plain_name
+from conformance.documents.representation import flat
+from conformance.verdict.evidence import Case
+
+# Phrases in a description which say that a response shows what was there before the request.
+_EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
+# Bodies with which a response must have shown another value; one may be chance.
+_SEEN: Final = 2
+# Writes that are remembered until a read shows what they did.
+_MOST: Final = 200
+
+
+class Answers:
+    """Judges the response to each PUT, PATCH and creating POST by the next read of what was written.
+
+    Args:
+        contract: the description's.
+    """
+
+    def __init__(self, contract: Contract) -> None:
+        operations = operations_of(contract) if contract.openapi_path else ()
+        reads = [one for one in operations if one.method == "GET" and collection_of(one.template)]
+        self._items = {collection_of(one.template): one for one in reads}
+        self._collections = collections_of(operations)
+        # By path: the last write, until a read has shown what it did.
+        self._unread: dict[str, Occasion] = {}
+        # By operation and member: writes whose response shows another value than the next read; below, late members.
+        self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
+        self._late: set[tuple[str, str]] = set()
+
+    def forget(self) -> None:
+        """Forget all writes: something else may have changed what they wrote."""
+        self._unread.clear()
+
+    def __call__(self, occasion: Occasion) -> Iterator[Case]:
+        """Yield the cases of one exchange."""
+        operation, method, status = occasion.operation, occasion.request.method, occasion.response.status
+        path = occasion.context.target.partition("?")[0].rstrip("/")
+        if method == "GET" and operation is not None:
+            write = self._unread.pop(path, None)
+            if write is not None and write.response.received_s <= occasion.sent_s and occasion.response.ok:
+                yield from self._judge(occasion, operation, write)
+        elif method not in SAFE and not refuses(status, operation):
+            at = self._written(occasion, operation, path) if operation is not None else ""
+            if not at or len(self._unread) >= _MOST:
+                self._unread.clear()
+            self._unread |= {at: occasion} if at else {}
+
+    def _written(self, occasion: Occasion, operation: Operation, path: str) -> str:
+        """Return the path of what a request has written; empty if it wrote no JSON object to a thing."""
+        body, kind = read_json(occasion.request.body).value, occasion.request.media_type
+        if not (isinstance(body, dict) and body and kind == next(iter(operation.bodies), "") and occasion.is_valid):
+            return ""
+        item = self._items.get(operation.template.rstrip("/"))
+        if operation.method != "POST" or item is None or not is_json(occasion.response.media_type):
+            return path if operation.method in {"PUT", "PATCH"} else ""
+        id_ = id_member(read_json(occasion.response.body).value, item)[1]
+        return "" if id_ is None else f"{path}/{quote(str(id_), safe='')}"
+
+    def _judge(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
+        """Judge whether the response to a write shows what was sent, as the next read does."""
+        operation, answer = write.operation, write.response
+        if operation is None or not is_json(answer.media_type) or _EARLIER.search(operation.text):
+            return
+        own, shape = parts_of(operation.shape), parts_of(item.shape)
+        sent: dict[str, Any] = read_json(write.request.body).value
+        schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
+        told = object_in(read_json(answer.body).value, names)
+        now = object_in(read_json(occasion.response.body).value, names)
+        for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
+            seen, key = {name: now[name]}, (operation.label, name)
+            if flat(own[name]) != flat(shape[name]) or is_shared(name):
+                continue
+            if any(differences({name: sent[name]}, seen, schema, item.shape, self._collections)):
+                self._late.add(key)
+            if key in self._late:
+                continue
+            other = next(differences(seen, told, schema, item.shape, self._collections), "")
+            self._untrue[key] |= {write.request.body} if other else set()
+            if not other or len(self._untrue[key]) >= _SEEN:
+                expected = f"{clip(now[name])} as {name}, as it was sent and as the next GET shows it"
+                cause, is_later = f"{operation.label} told", answer.status == HTTPStatus.ACCEPTED
+                doubt = "the response may show the state before the request" if is_later else ""
+                yield write.case("description/written-is-read", not other, expected, other, cause=cause, doubt=doubt)
