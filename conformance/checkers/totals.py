@@ -217,7 +217,7 @@ class Totals:
             yield _case(part.occasion, name, "", "the number of items that are shown", holds=True)
         elif is_of_page:
             return
-        elif (shown and total < least and not _is_cap(total)) or (part.sure and total != least):
+        elif (shown and total < least and (total <= 0 or total % _CAP)) or (part.sure and total != least):
             if count.is_sure(part, self._changed_s):
                 number = f"{'' if part.sure else 'at least '}{least}"
                 expected = f"{number} as {name}, by the offset and the items that are shown"
@@ -355,10 +355,6 @@ def is_left(write: Operation, path: str) -> bool:
 def says_filtered(listing: Listing) -> set[str]:
     """Return the totals that count filtered items, by the description."""
     return {name for name, text in listing.says.items() if plain_name(name) in TOTALS and _FILTERED.search(text)}
-
-
-def _is_cap(total: int) -> bool:
-    return total > 0 and total % _CAP == 0
 
 
 def _case(occasion: Occasion, name: str, found: str, expected: str, *, holds: bool) -> Case:

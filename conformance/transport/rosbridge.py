@@ -73,7 +73,7 @@ class BridgeClient(HttpClient):
         if self._link is None or self._link.ended:
             self._link = Stream(self, "/", "websocket", within_s)
             for topic, type_ in self._publishes.items():
-                self._say(self._link, op="advertise", topic=topic, type=type_)
+                self._link.send(json.dumps({"op": "advertise", "topic": topic, "type": type_}))
         self.connection.take_slot((method, self.url(path)))
         request, began = Request(method, self.url(path), (), body), time.monotonic()
         status, came = self._carry_out(self._link, path, body, within_s)
@@ -100,7 +100,7 @@ class BridgeClient(HttpClient):
             goal = self._goals.get(name)
             if goal is None or what == "goal":
                 return (HTTPStatus.OK if goal else HTTPStatus.NOT_FOUND), json.dumps(goal).encode()
-            self._say(link, op="cancel_action_goal", id=name, action=goal["action"])
+            link.send(json.dumps({"op": "cancel_action_goal", "id": name, "action": goal["action"]}))
             return self._take_status(link, HTTPStatus.CONFLICT)
         if what not in {"publish", "call", "act"}:
             # Each subscription opens a connection of its own; here only see whether the rosbridge responds.
@@ -126,7 +126,7 @@ class BridgeClient(HttpClient):
         With ``within_s``, silence gives None, because the outcome is not known. Without it, silence gives 200.
         """
         behind = f"behind-{next(self._numbers)}"
-        self._say(link, op="call_service", id=behind, service=_BEHIND)
+        link.send(json.dumps({"op": "call_service", "id": behind, "service": _BEHIND}))
         got = self._until(
             link, lambda item: item.get("id") == behind and item.get("op") == "service_response", within_s or _BEHIND_S
         )
@@ -135,10 +135,6 @@ class BridgeClient(HttpClient):
         if wrong:
             return refused, wrong["_octets"]
         return (None if within_s and not got else HTTPStatus.OK), b""
-
-    @staticmethod
-    def _say(link: Stream, **message: Any) -> None:
-        link.send(json.dumps(message))
 
     def _until(self, link: Stream, ends: Callable[[dict[str, Any]], bool], within_s: float) -> list[dict[str, Any]]:
         """Return messages until one of them ends the wait; record the states of goals in them."""

@@ -169,7 +169,7 @@ def _compare(
     found = [
         Disagreement(place, f"{other.get(place, 'nothing')!r} as {place} in {name} and {value!r} in JSON", exchange)
         for place, value in known.items()
-        if not _same(value, other.get(place, None if value is None else ...))
+        if not (type(value) is type(there := other.get(place, None if value is None else ...)) and value == there)
     ]
     everywhere = set().union(*(shown or {} for shown in snapshots))
     found += [
@@ -178,10 +178,6 @@ def _compare(
         if place not in everywhere
     ]
     return found
-
-
-def _same(value: Any, other: Any) -> bool:
-    return type(value) is type(other) and bool(value == other)
 
 
 _DATA: Final = re.compile(r"[/+](?:x-)?(?:json|xml|yaml)\b")

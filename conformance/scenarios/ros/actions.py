@@ -146,6 +146,7 @@ class _Sender:
             Course.GOES_ON: {"gap_s": _GOES_ON_S, "refuse_cancel": True, "result": self._new("Result")},
             Course.FIRST: {},
         }
+        self._gateway.send_texts(self._call, self._body)
         for course, step in list(steps.items())[: None if self._body.cancel else 3]:
             for turn in range(TRIES):
                 goals = self._two() if course is Course.FIRST else [self._follow_goal(course, step)]

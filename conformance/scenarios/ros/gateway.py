@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final, TypeVar
 
@@ -17,11 +18,11 @@ from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
-from conformance.scenarios.ros.web import document_for, document_of
+from conformance.scenarios.ros.web import document_for, document_of, with_texts
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_calls import NAME
 from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Reads, RosMap
-from conformance.transport.exchange import Exchange, Outgoing, Response
+from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing, Response
 from conformance.transport.rosbridge import Subscription
 from conformance.transport.streams import Message, Stream
 from conformance.verdict.run import Run
@@ -166,6 +167,14 @@ class Gateway:
         if value is not None:
             document = document_for(value, self.definition(body.type + _PARTS.get(type(body), "")), body, self.ros)
         return self.binding.make(fill(call, body.values), document)
+
+    def send_texts(self, call: str, body: Body) -> None:
+        """Send an invalid request, if JSON makes one: a gateway that refuses it may treat the next one otherwise."""
+        name = body.type + _PARTS.get(type(body), "")
+        if self.binding.syntax == "JSON" and not body.fields and self.maker(self.definition(name)).has_numbers:
+            made = self.request(call, body, self.usual(name))
+            with suppress(NoAnswerError):
+                self.send(replace(made, body=with_texts(made.body, body)), body.response_s)
 
     def following(
         self, exchange: Exchange, body: Acts | Calls, template: str, content: dict[str, Any]

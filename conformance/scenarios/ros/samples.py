@@ -132,7 +132,8 @@ class Maker:
                 items: list[Any] = [self._fill(shape.item, turn, depth + 1, leaf) for _ in range(number)]
             else:
                 items = [leaf(shape, turn) for _ in range(number)]
-            found[field] = _octets(items) if shape.is_octets else items if shape.is_array else items[0]
+            octets = {"b64": base64.b64encode(bytes(items)).decode()} if shape.is_octets else None
+            found[field] = octets or (items if shape.is_array else items[0])
         return found
 
     def _count(self, shape: Shape, turn: int | None, depth: int) -> int:
@@ -226,7 +227,3 @@ def _single(value: float) -> float:
     """Return the float32 nearest to a number."""
     single: float = struct.unpack("f", struct.pack("f", value))[0]
     return single
-
-
-def _octets(items: list[int]) -> dict[str, str]:
-    return {"b64": base64.b64encode(bytes(items)).decode()}

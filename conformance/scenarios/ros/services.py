@@ -188,6 +188,7 @@ class _Caller:
         yield self._call_server(Server.MISSING, {})
         self._serve([{"answer": {}}])
         yield self._reach_server(Server.RESPONDS)
+        self._gateway.send_texts(self._call, self._body)
         yield from (self._call_answering(Server.RESPONDS, *pair) for pair in pairs)
         yield self._call_answering(Server.SLOW, *self._usual(), self._body.within_s * _SLOW)
         yield self._call_answering(Server.AFTER, *self._usual())

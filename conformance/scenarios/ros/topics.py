@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from conformance.observe.clock import WALL_CLOCK
-from conformance.scenarios.ros.definition import Definition, put_at, value_at
+from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import content_of, differences, differing, document_of, equal, is_success
+from conformance.scenarios.ros.web import content_of, differences, differing, document_of, equal, is_success, with_texts
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -397,7 +397,7 @@ class _Writer:
         if self.gateway.binding.syntax == "JSON":
             wrong |= {"a list in place of the message": b"[]", "null": b"null", "a text": b'"x"'}
             # A gateway may make a text of anything; a number of a text it may not.
-            (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = self._texts(right.body)
+            (is_wrong if is_whole and self.maker.has_numbers else wrong)[_TEXTS] = with_texts(right.body, self.body)
         every = {what: replace(right, body=body) for what, body in (wrong | is_wrong).items()}
         for what, made in every.items():
             yield from self.malformed_as(what, made, is_wrong=what in is_wrong)
@@ -430,12 +430,3 @@ class _Writer:
             if not self.gateway.robot.take_heard(self.body.publishes, 1, _SILENCE_S):
                 return True
         return False
-
-    def _texts(self, body: bytes) -> bytes:
-        def text(value: Any) -> Any:
-            if isinstance(value, dict):
-                return {name: text(one) for name, one in value.items()}
-            return [text(item) for item in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
-
-        document, at = json.loads(body), self.body.at
-        return json.dumps(put_at(document, at, text(value_at(document, at)))).encode()

@@ -112,6 +112,18 @@ def document_for(value: dict[str, Any], definition: Definition, body: Body, ros:
     return _merge(body.body, put_at({}, body.at, message))
 
 
+def with_texts(octets: bytes, body: Body) -> bytes:
+    """Return a JSON body whose message has a text in place of each number, and an object in place of each text."""
+
+    def text(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: text(item) for name, item in value.items()}
+        return [text(item) for item in value] if isinstance(value, list) else {} if isinstance(value, str) else "x"
+
+    document = json.loads(octets)
+    return json.dumps(put_at(document, body.at, text(value_at(document, body.at)))).encode()
+
+
 def _merge(one: Any, other: Any) -> Any:
     """Return an object with the members of two, where the second has precedence; the second if one is no object."""
     if isinstance(one, dict) and isinstance(other, dict) and one:

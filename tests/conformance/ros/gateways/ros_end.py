@@ -231,7 +231,8 @@ class RosEnd:
             future.set_result(empty())
             return future
         self._waiting, self._called = self._waiting + 1, time.monotonic()
-        if "call doubled" in self.faults:
+        was_refused, self._refused = self._refused, False
+        if "call doubled" in self.faults or ("doubled after a refusal" in self.faults and was_refused):
             client.call_async(request)
         _passed_on(client.call_async(request), future, lambda response: self._served(end.ros, response))
         if "call repeated" in self.faults:
@@ -247,7 +248,8 @@ class RosEnd:
             return None
         goal, accepted, name = Goal(self.faults), Future(), uuid.uuid4().hex
         self.goals[name] = goal
-        if "goal doubled" in self.faults:
+        was_refused, self._refused = self._refused, False
+        if "goal doubled" in self.faults or ("doubled after a refusal" in self.faults and was_refused):
             client.send_goal_async(request)
 
         def responded(handle: Any) -> bool:
