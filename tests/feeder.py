@@ -171,8 +171,6 @@ class Feeder(Device):
         values["Label"] = self._label(values["Label"])
         values |= {"Note": values["Note"] or self.settings["Note"]} if "nil stays" in self.faults else {}
         values |= {"Offset": "0"} if "NaN is zero" in self.faults and values["Offset"] == "NaN" else {}
-        if "burst is slow" in self.faults and values["Mode"] == "burst":
-            values["Mode"] = "slow"
         if "quiet stays" in self.faults and values["Quiet"] == "false":
             values["Quiet"] = "true"
         if "rate whole" in self.faults and self.writes > 3:

@@ -48,6 +48,8 @@ _WHILE: Final = re.compile(
 _CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
 _ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
 _AND_WHILE: Final = re.compile(r",?\s+(?:and|or)\s+(?:if|when|while|as long as)\s+", re.IGNORECASE)
+#: Phrases in a description which say that an operation is refused the second time.
+ONCE: Final = re.compile(r"\b(?:second time|twice)\b[^.;]*\b(?:409|refuse[sd]?|conflict)\b", re.IGNORECASE)
 # The subject of such a condition, and its predicate; words beside a state in that.
 _IS: Final = re.compile(r"\b(unless )?(?<!of )(it|the [\w-]+) (?:is|are) (not |no longer )?([^.;:]*)", re.IGNORECASE)
 _BESIDE: Final = re.compile(r"\b(?:already|still|currently|also|yet|now|been)\b|[`()]", re.IGNORECASE)
@@ -463,6 +465,9 @@ class Transitions:
                 }
             )
         }
+        # Operations on a thing that are refused the second time; below, paths of those that were accepted.
+        self._once = {one.label for one in operations if one.parameter("path") and ONCE.search(one.text)}
+        self._done: set[str] = set()
         # By path: members of the thing at the last read.
         self._seen: dict[str, dict[str, Any]] = {}
         self._taken: Counter[tuple[str, str]] = Counter()
@@ -476,10 +481,15 @@ class Transitions:
                 self._read(occasion, operation.template.rstrip("/"), path)
             return
         if operation is not None and occasion.context.usual:
+            if operation.label in self._once and path in self._done:
+                expected, cause = "a refusal, as it was done before", f"{operation.label} twice"
+                yield occasion.case("description/states", not occasion.response.ok, expected, cause=cause)
             for template, barred in self._barred.get(operation.label, {}).items():
                 yield from self._act(occasion, operation, barred, "/".join(path.split("/")[: template.count("/") + 1]))
         if not refuses(status, operation):
             self._seen.clear()
+            is_once = operation is not None and operation.label in self._once
+            self._done = {*self._done, path} if is_once else set()
 
     def _act(
         self, occasion: Occasion, operation: Operation, barred: dict[str, frozenset[str]], path: str

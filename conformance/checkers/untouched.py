@@ -70,7 +70,7 @@ class Untouched:
         self._count: Counter[tuple[str, str]] = Counter()
         self._changed: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
         # By path: a case that fails if two reads without a request in between show a member unchanged, by its name.
-        self._waiting: dict[str, tuple[str, Case]] = {}
+        self._waiting: dict[str, tuple[str, Any, Case]] = {}
 
     def forget(self) -> None:
         """Forget all reads: something else may have changed the resources."""
@@ -112,9 +112,9 @@ class Untouched:
             return
         label = next(iter(before.since), "")
         if not label and path in self._waiting:
-            # What goes on by itself, as a job does, changes a moment later too.
-            name, case = self._waiting.pop(path)
-            yield from [case] if same(now.get(name), before.members.get(name)) else []
+            # What goes on by itself, as a job does, changes a moment later too, and does not go back.
+            name, was, case = self._waiting.pop(path)
+            yield from [case] if any(same(now.get(name), one) for one in (before.members.get(name), was)) else []
         key = template, label
         self._count[key] += 1
         self._changed[key].update(name for name in now if not same(now[name], before.members.get(name)))
@@ -141,7 +141,7 @@ class Untouched:
         doubt = "" if self._keeps_all and label != _CONDITIONAL else "it may count requests, also refused ones"
         case = occasion.case(id_, not wrong, expected, found, cause=f"{template} {label} untouched", doubt=doubt)
         if wrong:
-            self._waiting[path] = wrong[0], case
+            self._waiting[path] = wrong[0], before.members.get(wrong[0]), case
         else:
             yield case
 

@@ -141,9 +141,9 @@ def _simple_schema(simple: Simple) -> dict[str, Any]:
 
 
 def _octets_schema(most: int | None) -> dict[str, Any]:
-    """Return the schema of octets as base64, with examples: many octets, and few."""
+    """Return the schema of octets as base64, with examples: few octets, and many, which a thing is created with."""
     count = min(most or _ANY_OCTETS, _DECLARED_OCTETS)
-    made = [(bytes(range(256)) * (count // 256 + 1))[:size] for size in (count, min(count, 4))]
+    made = [(bytes(range(256)) * (count // 256 + 1))[:size] for size in (min(count, 4), count)]
     examples = [b64encode(octets).decode() for octets in made]
     return {"pattern": "^(?:[A-Za-z0-9+/]{4})*[A-Za-z0-9+/=]*$", "description": "kept exactly", "examples": examples}
 

@@ -27,7 +27,7 @@ from conformance.api.rest.things import (
     path_chosen,
 )
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import barred_by
+from conformance.checkers.changes import ONCE, barred_by
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -213,7 +213,8 @@ class _Cycle:
     def _act_on(self, action: Operation, thing: Thing) -> None:
         """Call an operation of a thing, and read the thing until it shows the change in the response."""
         living, before, said = self.living, self.writer.send(self.read, thing.path), dict[str, Any]()
-        sent = self.writer.send(action, thing.path.rstrip("/") + action.template[len(self.item) :])
+        target = thing.path.rstrip("/") + action.template[len(self.item) :]
+        sent = self.writer.send(action, target)
         if is_refused(sent):
             living.check(thing, sent, action.label, Kind.REFUSED)
         elif sent.response.ok and before.response.ok:
@@ -235,6 +236,9 @@ class _Cycle:
             thing.state = thing.state if found.exchange.response.ok else State.UNKNOWN
             thing.kept = {} if wrong else thing.kept
         living.look(sent, action.label, thing, said)
+        if sent.response.ok and ONCE.search(action.text):
+            body = next(iter(self.writer.bodies(action, _REFUSED)), None)
+            look_refused(living, thing, action, self.writer.send(action, target, body))
         Chosen(living, self._changes, self.operations).look_after(thing, members(before, ()))
 
     def _change_barred(self, thing: Thing) -> None:

@@ -48,11 +48,11 @@ def queries_of(
         ordered = sorted(there, key=lambda item: bound.rank(str(item)) or 0)
         # The middle of several values: items lie on both sides, and one at the bound. Levels have an unknown order.
         is_level = "enum" in flat(bound.parameter.schema)
-        middle = ordered if is_level else ordered[len(ordered) // 2 : len(ordered) // 2 + 1]
+        middle = ordered if is_level else ordered[: len(ordered) - 1][len(ordered) // 2 : len(ordered) // 2 + 1]
         beyond = [_beyond(ordered[-1 if bound.is_least else 0], is_least=bound.is_least)] if ordered else []
         rows += [
             {bound.parameter.name: text, **whole}
-            for text in (*middle[: len(ordered) - 1], *beyond)
+            for text in (*middle, *beyond)
             if text is not None and fitting(bound.parameter, text)
         ]
     if listing.sort is not None:

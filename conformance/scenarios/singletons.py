@@ -43,6 +43,8 @@ _KEEPING: Final = frozenset(
         "setup",
         "limits",
         "profile",
+        "setpoint",
+        "setpoints",
     }
 )
 _MOST_VALUES, _MOST_ITEMS = 5, 10

@@ -55,7 +55,7 @@ _ROUNDS: Final = (6, 30)
 _ENCODED: Final = (
     ("utf-16", Kind.VARIED, "utf-16", 3),
     ("iso-8859-1", Kind.TRIED, "iso-8859-1", 3),
-    ("utf-8", Kind.VARIED, "ascii", 4),
+    ("utf-8", Kind.VARIED, "ascii", 5),
 )
 # Longest text that is sent because its type allows it, characters.
 _LONGEST: Final = 1_000

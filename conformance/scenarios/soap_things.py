@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
@@ -36,6 +37,8 @@ from conformance.transport.parallel import send_together
 
 # Things that lists are filtered, sorted and read in parts with.
 _LISTED: Final = 5
+# How long nothing changes before lists are compared, s.
+_QUIET_S: Final = 3.1
 _REFUSED: Final = Response(400, (), b"", 0.0)
 
 
@@ -187,6 +190,8 @@ def soap_things(api: RestInterface) -> Things:
         with suppress(NotPossibleError):
             own_things.play(device, values)
         made = list(_fill(Writer(device, values)))
+        # A total may be late after a change.
+        time.sleep(_QUIET_S if lists_of(device) else 0)
         with suppress(NotPossibleError):
             vary_lists(device, values)
         with suppress(NotPossibleError):

@@ -13,7 +13,7 @@ from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
 from conformance.api.rest.samples import TEXTS, alike_and_apart, fits, sample
-from conformance.api.rest.things import another, entry_of, is_devices, parts_of
+from conformance.api.rest.things import another, entry_of, is_devices, parts_of, says_exactly
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.checkers.writes import GONE
@@ -128,7 +128,12 @@ def _in_lines(changed: dict[str, Any], parts: dict[str, Any]) -> list[dict[str, 
     """Return a text of several lines for the member that probably has some, else for the last text."""
     texts = [name for name, one in changed.items() if isinstance(one, str) and is_free_text(parts[name])]
     longer = [name for name in texts if _LONG.search(plain_name(name))]
-    return [{name: _LINES} for name in (longer or texts)[-1:]]
+    # A text that is kept exactly has blanks at its ends too.
+    lines = [{name: f" {_LINES} " if says_exactly(parts[name]) else _LINES} for name in (longer or texts)[-1:]]
+    within = (
+        (name, one, _in_lines(one, parts_of(parts[name]))) for name, one in changed.items() if isinstance(one, dict)
+    )
+    return lines + [{name: {**one, **text}} for name, one, inner in within for text in inner][:1]
 
 
 def _empty_values(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]:
@@ -137,6 +142,7 @@ def _empty_values(parts: dict[str, Any], body: dict[str, Any]) -> dict[str, Any]
     for name, one in body.items():
         given = flat(parts.get(name, {}))
         inner = {key: one[key] for key in one if key in given.get("required", ())} if isinstance(one, dict) else one
+        inner = {**inner, **_empty_values(given.get("properties", {}), inner)} if isinstance(one, dict) else one
         candidates: tuple[Any, ...] = (None, [], {}, inner)
         empty = next((new for new in candidates if fits(given, new)), one)
         if empty != one and not is_devices(name, given, frozenset()):

@@ -337,6 +337,7 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
         if isinstance(answer.get(name), str | int | float) and not isinstance(value, bool)
         if "enum" not in flat(parts.get(name, {})) and not says_exactly(parts.get(name))
         if answer[name] not in (value, before.get(name)) and not is_moved(value, answer[name])
+        if not _is_narrowed(value, answer[name])
         if not (_BOUNDED & flat(parts.get(name, {})).keys() and str(value).startswith(str(answer[name])))
     }
     return {**sent, **told}
@@ -411,6 +412,12 @@ def _instant(text: str) -> datetime | None:
     except ValueError:
         return None
     return found if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def _is_narrowed(value: Any, now: Any) -> bool:
+    """Return whether an integer of more than 32 bits has become an end of their range, or its lower 32 bits."""
+    is_wide = isinstance(value, int) and isinstance(now, int) and not -(2**31) <= value < 2**32
+    return is_wide and (now in {-(2**31), 2**31 - 1, 2**32 - 1} or (value - now) % 2**32 == 0 != value - now)
 
 
 def is_moved(value: Any, now: Any) -> bool:

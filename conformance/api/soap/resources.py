@@ -206,10 +206,8 @@ class Resources:
             template = re.sub(_IN_PATH, lambda _: quote(id_, safe=""), template, count=1)
         if place.is_query:
             own = {name: one for name, one in _flat(sent).items() if name != place.key and one is not None}
-            pairs = [
-                (name, _text(one)) for name, some in own.items() for one in (some if isinstance(some, list) else [some])
-            ]
-            query = f"?{urlencode(pairs)}" if pairs else ""
+            pairs = {name: ",".join(map(_text, one if isinstance(one, list) else [one])) for name, one in own.items()}
+            query = f"?{urlencode(pairs, safe=',')}" if pairs else ""
         else:
             body = json.dumps({name: one for name, one in sent.items() if name != place.key}).encode()
         headers = (("Host", "things.invalid"), ("Accept", _JSON), *((("Content-Type", _JSON),) if body else ()))
@@ -288,12 +286,11 @@ class Resources:
         if whole is None:
             raise ValueError("no schema declares its request")
         if place.is_query:
-            pairs, fields = parse_qsl(query, keep_blank_values=True), dict(place.fields())
-            given: dict[str, str | list[str]] = dict(pairs)
-            for name, _ in pairs if len(given) < len(pairs) else ():
-                given[name] = [text for other, text in pairs if other == name]
-                if name in fields and fields[name].maximum == 1 != len(given[name]):
-                    raise ValueError("a parameter is there twice")
+            fields, pairs = dict(place.fields()), parse_qsl(query, keep_blank_values=True)
+            if len(dict(pairs)) < len(pairs):
+                raise ValueError("a parameter is there twice")
+            many = {name for name, one in fields.items() if one.maximum != 1}
+            given = {name: text.split(",") if name in many else text for name, text in pairs}
             return message_of(whole, given | id_)
         sent = read_json(request.body).value if request.body else {}
         made = node_of(place.request, _with_attributes(place.request, sent | id_ if isinstance(sent, dict) else sent))
@@ -488,6 +485,7 @@ def _openapi_of(place: Place, branch: int | None) -> dict[str, Any]:
             schema = schema_of(one)
             schema = schema if one.maximum == 1 else {"type": "array", "items": schema}
             given = {"name": name, "in": "query", "required": name.lower() in act.needs, "schema": schema}
+            given |= {"explode": False} if one.maximum != 1 else {}
             parameters.append({"description": one.documentation or _sentences_on(name, act), **given})
     success: dict[str, Any] = {"description": ""}
     if place.response is not None:

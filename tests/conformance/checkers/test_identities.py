@@ -162,3 +162,20 @@ def test_what_the_head_of_a_description_and_names_of_members_promise(says, steps
         found += [case for case in checkers(Exchange(request, answer)) if not case.holds]
     judged = {"description/headers", "description/created-is-there", "description/read-only"}
     assert {case.requirement for case in found} & judged == {*filter(None, [blamed])}
+
+
+@pytest.mark.parametrize(("reads", "blamed"), [("12 21 12", 0), ("1122 12", 1), ("13 11 13 23", 0)])
+def test_a_response_shows_the_parameters_that_were_asked_for(reads, blamed, tmp_path):
+    """Each read is what is asked for and what is shown; a value counts once it was shown as it was asked for."""
+    slot = {"name": "slot", "in": "query", "required": True, "schema": {"type": "integer"}}
+    answered = {"200": {"description": "", "content": {"application/json": {"schema": {}}}}}
+    pack = contract_of(
+        tmp_path, described({"/weight": {"get": {"parameters": [slot], "responses": answered}}}, "3.1.0")
+    )
+    checkers, found = RestCheckers(pack, _BASE), 0
+    for asked, shown in zip(*[iter(reads.replace(" ", ""))] * 2, strict=True):
+        request = Request("GET", f"{_BASE}/weight?slot={asked}", (("Host", "device"), ("Accept", "*/*")))
+        body = json.dumps({"slot": int(shown)}).encode()
+        cases = checkers(Exchange(request, Response(200, (("Content-Type", "application/json"),), body, 1.0)))
+        found += sum(not one.holds and one.requirement == "description/own-identifier" for one in cases)
+    assert found == blamed

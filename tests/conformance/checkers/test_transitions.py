@@ -33,6 +33,7 @@ _SAID = {
     "clean": "409 if it is running, paused already, or has goods.",
     "grease": "409 if the belt is running and nobody watches it. Refused if the motor is stopped.",
     "ship": "While a part of the belt is paused, and while the belt is archived, it is refused with 409.",
+    "seal": "Seal the belt once. The second time is refused with 409.",
     "restore": "409 if it is not archived. If it was paused, it is then paused.",
 }
 
@@ -93,6 +94,7 @@ _BROKEN = {
     "resumed from stopped": (_RESUMED * 2, _STATES),
     "two run at once": ([(f"GET {number} 200", "running") for number in (1, 2, 1)], _STATES),
     "a scrapped one that is done": ([("GET . 200", "scrapped"), ("GET . 200", "stopped")], _STATES),
+    "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
 }
 _RIGHT = {
@@ -107,6 +109,7 @@ _RIGHT = {
     "resumed from stopped once, which may have been paused just then": _RESUMED,
     "paused from stopped, which no word forbids": [("GET . 200", "stopped"), ("POST /pause 200", "paused")] * 2,
     "halted from running, beside a state that is denied": [("GET . 200", "running"), ("POST /halt 200", "stopped")] * 2,
+    "sealed again after another change": [("POST /seal 200",), ("POST /grease 200",), ("POST /seal 200",)],
     "resumed from paused": [("GET . 200", "paused"), ("POST /resume 200", "running")] * 2,
     "a count that goes on by itself from then on": [*_refused("start", 1, 2, 3)[:-1], ("GET . 200", "running", 5)],
     "a count that goes on by itself": [

@@ -24,6 +24,7 @@ _PARTS = {
     "built": {"type": "string", "readOnly": True},
     "level": {"type": "integer", "readOnly": True},
     "uptime": {"type": "integer"},
+    "version": {"type": "integer"},
     **{key: {"type": "string", "format": "date-time", "readOnly": True} for key in ("createdAt", "updatedAt")},
 }
 _SCHEMA = {"type": "object", "properties": _PARTS}
@@ -58,10 +59,14 @@ _PATHS = {
         **_item(MERGE, _SCHEMA),
         "patch": {**_item(MERGE, _SCHEMA)["patch"], "summary": "Members left out keep their value."},
     },
+    "/guarded": {
+        **_item(MERGE, _SCHEMA),
+        "put": {**_item(MERGE, _SCHEMA)["put"], "summary": "If version is not the present one, 409."},
+    },
     "/reset": {"post": {"responses": _OK}},
 }
 READ, KEPT, DEFAULTS = (f"description/{name}" for name in ("written-is-read", "refused-keeps", "defaults"))
-PATCH, OWN = "description/patch", "description/read-only"
+PATCH, OWN, STATES = "description/patch", "description/read-only", "description/states"
 _FIRST = {"gain": 1.5, "count": 7, "mode": "auto", "loud": True, "note": "a", "zone": {"a": 1, "b": 2}, "built": "2026"}
 
 _WHOLE = {name: one for name, one in _FIRST.items() if name != "built"}
@@ -114,6 +119,10 @@ _TWICE = [_op("test", "/mode", "off"), _op("replace", "/count", 9)]
 _END = [_op("replace", "/count", 9), _op("test", "/mode", "off")]
 #: Exchanges, and the requirement that they break.
 BROKEN = {
+    "an earlier version is taken": (
+        [_get("/guarded", version=2), _put("/guarded", **_WHOLE, version=1, told={"version": 3}),
+         _get("/guarded", version=3)], STATES,
+    ),
     "a patch resets what it does not name, against its words": (_patches_between("/kept", (3, 3)), PATCH),
     "responses that show what was before": (_told_late(2.5, 3.5), READ),
     "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
@@ -274,6 +283,9 @@ BROKEN = {
 }  # fmt: skip
 #: The same for right devices.
 RIGHT = {
+    "an earlier version is taken, which no description forbids": [
+        _get("/said", version=2), _put("/said", **_WHOLE, version=1, told={"version": 3}), _get("/said", version=3),
+    ],
     "a JSON patch moves": [
         _get("/steps", words=["z", "b"]),
         _patch("/steps", [_op("move", "/note", **{"from": "/words/0"})], words=["b"], note="z"),
@@ -401,7 +413,7 @@ def _broken(contract, steps):
         request = Request(method, BASE + path, tuple(fields), body)
         exchange = Exchange(request, Response(status, kind, answer, 10.0, received_s=now))
         broken |= {one.requirement for one in checkers(exchange) if not one.holds}
-    return {id_ for id_ in broken if id_ in {READ, KEPT, DEFAULTS, PATCH, OWN}}
+    return {id_ for id_ in broken if id_ in {READ, KEPT, DEFAULTS, PATCH, OWN, STATES}}
 
 
 @pytest.mark.parametrize("name", BROKEN)

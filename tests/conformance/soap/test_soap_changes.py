@@ -38,7 +38,6 @@ _FAULTS = (
     {
         "utf-16 lost": ("written-is-read", 'Label "Gr??'),
         "delete takes another": ("created-is-there", "before DeleteRecipe"),
-        "burst is slow": ("written-is-read", "as Mode instead of"),
     },
     {
         "mandatory label applied": ("refused-keeps", "as Label, and"),
