@@ -86,6 +86,8 @@ class Entries:
         self._listed: dict[str, dict[str, dict[str, Any]]] = {}
         self._refused: dict[str, list[_Entry]] = defaultdict(list)
         self._longest: dict[str, int] = defaultdict(int)
+        # All identifiers that lists have shown, whole or not.
+        self._seen: dict[str, set[str]] = {}
         self._unchanged: dict[str, dict[str, list[_Entry]]] = defaultdict(lambda: defaultdict(list))
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -105,6 +107,8 @@ class Entries:
                 memory.clear()
         elif request.method == "GET" and operation is not None and create is not None:
             listing, page = listing_of(operation), page_of(occasion.response, operation)
+            shown = {self._id_of(item, create) for item in page.items} if page is not None else set()
+            self._seen[path] = self._seen.get(path, set()) | shown
             if listing is not None and page is not None and self._is_whole(occasion, listing, page, path):
                 yield from self._judge(occasion, create, page, path)
 
@@ -138,7 +142,7 @@ class Entries:
         if refuses(response.status, create):
             self._refused[path] = [*self._refused[path], entry][-_MOST:]
         elif not (id_ and may_create(create, response.status)) or (
-            response.status == HTTPStatus.OK and id_ in self._listed.get(path, {id_: {}})
+            response.status == HTTPStatus.OK and id_ in self._seen.get(path, {id_})
         ):
             self._listed.pop(path, None)
         else:

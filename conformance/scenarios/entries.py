@@ -14,7 +14,7 @@ from conformance.api.rest.things import collection_of, id_member, identifier_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.representation import flat
-from conformance.scenarios.creating import FULL, makes_room
+from conformance.scenarios.creating import FULL, makes_room, with_texts
 from conformance.scenarios.survey import Surveyor
 from conformance.scenarios.writing import Writer
 from conformance.transport.exchange import Exchange
@@ -84,11 +84,13 @@ class _Entries:
     def _create_one(self, turn: int) -> str:
         """Create an entry, another one each turn; return the path by which it is changed, or an empty text."""
         body = next(islice(self._writer.bodies(self._create, 1), turn, None), None)
-        made = self._writer.send(self._create, self._path, body)
+        made = self._writer.send(
+            self._create, self._path, (with_texts(self._create, body) if not turn else body) or body
+        )
         if made.response.status in FULL and makes_room(self._writer.api, made):
             made = self._writer.send(self._create, self._path, body)
-        elif not made.response.ok and body is not None:
-            made = self._writer.send(self._create, self._path)
+        for other in (body, None) if body is not None else ():
+            made = made if made.response.ok else self._writer.send(self._create, self._path, other)
         item = next(iter(self._of_entry.values()), None)
         id_: Any = id_member(read_json(made.response.body).value, item)[1] if item is not None else None
         end = "/" if item is not None and item.template.endswith("/") else ""

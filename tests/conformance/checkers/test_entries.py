@@ -30,6 +30,10 @@ _PATHS |= {
         "get": {"responses": {"200": answers({"type": "array", "items": _MARKED})}},
         "post": {**_WRITES, "responses": {"201": answers(_MARKED)}},
     },
+    "/flags": {
+        "get": {"responses": {"200": answers({"type": "array", "items": _MARKED})}},
+        "post": {**_WRITES, "responses": {"200": answers(_MARKED)}},
+    },
     "/marks/{mark_id}": {
         "parameters": [{"name": "mark_id", "in": "path", "required": True, "schema": {"type": "integer"}}],
         "patch": {**_WRITES, "responses": {"200": answers(_MARKED), "409": REFUSED}},
@@ -81,6 +85,11 @@ def _deleted(status=204):
     return "DELETE", "/marks/1", None, status, None
 
 
+def _flags(**flags):
+    return "GET", "/flags", None, 200, [{"id": int(name[1:]), "x": x} for name, x in flags.items()]
+
+
+_FLAG_MADE = ("POST", "/flags", {"x": 5}, 200, {"id": 1, "x": 5})
 _MARK_MADE = ("POST", "/marks", {"x": 5}, 201, {"id": 1, "x": 5})
 _MARK_MORE = [("POST", "/marks", {"x": x}, 201, {"id": x - 4, "x": x}) for x in (6, 7)]
 _NEWER = [_made("n1", "text of n1"), _made("n2", "text of n2")]
@@ -100,6 +109,7 @@ _WRONG = {
         [_MARK_MADE, ("POST", "/marks", {"x": 7}, 201, {"id": 1, "x": 7})],
         {_THERE: False},
     ),
+    "a creation that is answered 200": ([_flags(), _FLAG_MADE, _flags(f1=0)], {_READ: False}),
     "made twice": ([_marks(), _MARK_MADE, _marks(m1=5, m2=5)], {_THERE: False}),
     "others are deleted too": (
         [_MARK_MADE, *_MARK_MORE, _marks(m1=5, m2=6, m3=7), _deleted(), _marks()],
@@ -130,6 +140,7 @@ _RIGHT = {
     "a deletion that is done a moment later": [_marks(m1=5, m2=1), _deleted(), _marks(m1=5, m2=1), _marks(m2=1)],
     "a creation that is answered with what is there": [_MARK_MADE, _marks(m1=5), _MARK_MADE, _marks(m1=5)],
     "another client's equal entry, before": [_marks(m2=5), _MARK_MADE, _marks(m1=5, m2=5)],
+    "a search that is answered 200": [_flags(f1=9), _FLAG_MADE, _flags(f1=9)],
     "a number that is given again": [_MARK_MADE, _deleted(), _MARK_MADE, _marks(m1=5)],
     "a list of which nothing is known before": [_made("n1", "refused", 406), _listed("n1", n1="refused")],
 }  # fmt: skip
