@@ -1,4 +1,4 @@
-"""Responses to writes: they show what was sent, if the next read does."""
+"""Responses to writes: they show what was sent, if the next read does, and not one value whatever is sent."""
 
 from __future__ import annotations
 
@@ -11,9 +11,18 @@ from urllib.parse import quote
 
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, differences, id_member, is_shared, object_in, parts_of
+from conformance.api.rest.things import (
+    collection_of,
+    differences,
+    id_member,
+    is_devices,
+    is_shared,
+    object_in,
+    parts_of,
+)
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
+from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
@@ -24,6 +33,8 @@ from conformance.verdict.evidence import Case
 _EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|prior)\b", re.IGNORECASE)
 # Bodies with which a response must have shown another value; one may be chance.
 _SEEN: Final = 2
+# How many different numbers must be answered by the same one.
+_NUMBERS: Final = 3
 # Writes that are remembered until a read shows what they did.
 _MOST: Final = 200
 
@@ -45,6 +56,8 @@ class Answers:
         # By operation and member: writes whose response shows another value than the next read; below, late members.
         self._untrue: dict[tuple[str, str], set[bytes]] = defaultdict(set)
         self._late: set[tuple[str, str]] = set()
+        # By operation and member: numbers that were sent, and those that the responses show.
+        self._numbers: dict[tuple[str, str], tuple[set[float], set[float]]] = defaultdict(lambda: (set(), set()))
 
     def forget(self) -> None:
         """Forget all writes: something else may have changed what they wrote."""
@@ -63,6 +76,8 @@ class Answers:
             if not at or len(self._unread) >= _MOST:
                 self._unread.clear()
             self._unread |= {at: occasion} if at else {}
+            if at and operation is not None and occasion.response.ok:
+                yield from self._judge_numbers(occasion, operation)
 
     def _written(self, occasion: Occasion, operation: Operation, path: str) -> str:
         """Return the path of what a request has written; empty if it wrote no JSON object to a thing."""
@@ -74,6 +89,26 @@ class Answers:
             return path if operation.method in {"PUT", "PATCH"} else ""
         id_ = id_member(read_json(occasion.response.body).value, item)[1]
         return "" if id_ is None else f"{path}/{quote(str(id_), safe='')}"
+
+    def _judge_numbers(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
+        """Judge whether a number is shown as it was sent; a device may limit it or round it, and say so by that."""
+        sent: dict[str, Any] = read_json(occasion.request.body).value
+        told = object_in(read_json(occasion.response.body).value, {plain_name(name) for name in sent})
+        parts = parts_of(next(iter(operation.bodies.values())).schema)
+        for name in (name for name in sent if name in parts and not is_devices(name, parts[name], self._collections)):
+            if not (_is_number(sent[name]) and _is_number(told.get(name))):
+                continue
+            asked, shown = self._numbers[operation.label, name]
+            asked.add(sent[name])
+            shown.add(told[name])
+            (only, *others), expected = shown, f"{sent[name]} as {name}, as it was sent"
+            is_stuck = not others and min(asked) < only < max(asked) and len(asked) >= _NUMBERS
+            if is_stuck or sent[name] == told[name]:
+                found = f"{told[name]}, whatever was sent from {min(asked)} to {max(asked)}"
+                cause = f"{operation.label} {name} stuck"
+                doubt = "" if "integer" in kinds_of(parts[name]) else "it may be what the device measures"
+                id_ = "description/written-is-read"
+                yield occasion.case(id_, not is_stuck, expected, found, cause=cause, doubt=doubt)
 
     def _judge(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
         """Judge whether the response to a write shows what was sent, as the next read does."""
@@ -100,3 +135,7 @@ class Answers:
                 cause, is_later = f"{operation.label} told", answer.status == HTTPStatus.ACCEPTED
                 doubt = "the response may show the state before the request" if is_later else ""
                 yield write.case("description/written-is-read", not other, expected, other, cause=cause, doubt=doubt)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

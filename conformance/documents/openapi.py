@@ -189,6 +189,10 @@ def read_operations(document: Schema, *, closed: bool = False) -> list[Operation
     return [_guess(operation, found) for operation in found]
 
 
+# Names of parameters that order or shape a list, and do not filter it.
+_ORDERING: Final = re.compile(r"sort|order|direction|format|view|fields|include|expand|embed", re.IGNORECASE)
+
+
 def _guess(operation: Operation, operations: Iterable[Operation]) -> Operation:
     """Return a read whose content the description does not declare with what it shows by what is written there.
 
@@ -200,13 +204,30 @@ def _guess(operation: Operation, operations: Iterable[Operation]) -> Operation:
     above, _, last = path.rpartition("/")
     wanted = [("PUT", path), ("PATCH", path), *([("POST", above)] if last.startswith("{") else [])]
     bodies = {(one.method, one.template.rstrip("/")): one.bodies for one in operations}
+    # A filter's name and values are those of a member that the device sets.
+    lists = (one for one in operations if one.method == "GET" and one.template.rstrip("/") in {path, above})
+    queries = (parameter for one in lists for parameter in one.parameter("query"))
+    device = {one.name: _without_null(one.schema) for one in queries if not _ORDERING.search(one.name)}
+    device = {name: schema for name, schema in device.items() if "enum" in schema}
     own, created = (
         next((body.schema for key in keys for name, body in bodies.get(key, {}).items() if is_json(name)), None)
         for keys in (wanted, [("POST", path)])
     )
     if created is not None and any(template.startswith(f"{path}/{{") for _, template in bodies):
-        return replace(operation, guessed={"type": "array", "items": created})
-    return replace(operation, guessed=own)
+        return replace(operation, guessed={"type": "array", "items": _with(created, device)})
+    return operation if own is None else replace(operation, guessed=_with(own, device))
+
+
+def _without_null(schema: Schema) -> Schema:
+    """Return a schema, or its only alternative to null."""
+    others = [one for one in schema.get("anyOf", ()) if isinstance(one, dict) and one.get("type") != "null"]
+    return others[0] if len(others) == 1 else schema
+
+
+def _with(schema: Schema, members: dict[str, Schema]) -> Schema:
+    """Return the schema of an object with further members."""
+    own = schema.get("properties")
+    return {**schema, "properties": {**members, **own}} if isinstance(own, dict) and members else schema
 
 
 def methods_of(item: Schema) -> dict[str, Any]:

@@ -238,11 +238,11 @@ class _Thing:
     def _singly(self, change: Operation, bodies: list[Any], *, whole_last: bool) -> list[Any]:
         """Return bodies of several writes: each member alone, and all together, which restores them.
 
-        The second member is written between two writes of the first one, which must leave it as it is.
+        All are written a second time in the other order, because a write must leave the others as they are.
         """
         singles, now = bodies[:-1][:_SINGLES] if change.method == "PATCH" else [], self._members()
         old = [{name: now[name] for name in singles[0] if name in now}] if len(singles) > 1 else []
-        again = [*old, *reversed(singles[: 2 * len(old)])]
+        again = [*old, *(reversed(singles) if old else ())]
         return [*bodies[:-1], *again, *bodies[-1:]] if whole_last else [*bodies[-1:], *singles, *again]
 
     def _send_refusable(self, change: Operation, bodies: Sequence[Any] = ()) -> None:

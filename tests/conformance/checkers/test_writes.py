@@ -125,6 +125,9 @@ BROKEN = {
     ),
     "a patch resets what it does not name, against its words": (_patches_between("/kept", (3, 3)), PATCH),
     "responses that show what was before": (_told_late(2.5, 3.5), READ),
+    "a number that is the same whatever is sent": (
+        [_put(**{**_WHOLE, "count": count}, told={"count": 5}) for count in (1, 5, 9)], READ,
+    ),
     "a text is cut": ([_get(), _put(note="é" * 300, told={"note": "é" * 255})], READ),
     "readOnly by PUT": ([_get(), _put(gain=2.5, built="roaas-own"), _get(gain=2.5, built="roaas-own")], OWN),
     "a JSON patch moves, and leaves what it moves": (
@@ -346,6 +349,12 @@ RIGHT = {
         _get(), _put(**{**_WHOLE, "gain": 2.5}, told={"gain": 1.5}), _get(gain=2.5),
     ],
     "responses that show what is in effect later": _told_late(1.5, 1.5),
+    "numbers above a limit that the response tells": [
+        _put(**{**_WHOLE, "count": count}, told={"count": min(count, 5)}) for count in (5, 7, 9)
+    ],
+    "numbers within limits that the response tells": [
+        _put(**{**_WHOLE, "count": count}, told={"count": min(max(count, 4), 5)}) for count in (1, 5, 9)
+    ],
     "PUT keeps what it leaves out": [_get(), _put(**{**_LEFT, "gain": 2.5}), _get(gain=2.5)],
     "plain JSON replaces an object": [_get(), _patch("/plain", {"zone": {"a": 3}}), _get(zone={"a": 3})],
     "what counts by itself": [_get(uptime=1), _get(uptime=2), _patch("/plain", {"uptime": 3}, 422), _get(uptime=3)],

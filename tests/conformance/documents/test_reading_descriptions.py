@@ -190,8 +190,12 @@ def test_a_read_without_declared_content_shows_what_is_written_there():
     takes = {"requestBody": {"content": {"application/json": {"schema": target}}}, "responses": {"201": {}}}
     shows = {"responses": {"200": {"description": "", "content": {"application/json": {"schema": {}}}}}}
     text = {"responses": {"200": {"description": "", "content": {"text/plain": {}}}}}
+    states = {"type": "string", "enum": ["queued", "done"]}
+    filter_ = {"name": "status", "in": "query", "schema": {"anyOf": [states, {"type": "null"}]}}
+    sort = {"name": "sort", "in": "query", "schema": {"enum": ["x", "id"]}}
+    shown = {"type": "object", "properties": {"status": states, "x": {"type": "number"}}}
     paths = {
-        "/targets": {"get": shows, "post": takes},
+        "/targets": {"get": {**shows, "parameters": [filter_, sort]}, "post": takes},
         "/targets/{id}": {"get": {"responses": {"200": {"description": ""}}}, "delete": {"responses": {"204": {}}}},
         "/limits": {"get": shows, "put": takes},
         "/search": {"get": shows, "post": takes},
@@ -200,8 +204,8 @@ def test_a_read_without_declared_content_shows_what_is_written_there():
     found = {one.label: one for one in read_operations({"openapi": "3.1.0", "paths": paths})}
     shapes = {label: one.shape for label, one in found.items() if label.startswith("GET")}
     assert shapes == {
-        "GET /targets": {"type": "array", "items": target},
-        "GET /targets/{id}": target,
+        "GET /targets": {"type": "array", "items": shown},
+        "GET /targets/{id}": shown,
         "GET /limits": target,
         "GET /search": {},
         "GET /name": None,
