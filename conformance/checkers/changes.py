@@ -46,6 +46,15 @@ _WHILE: Final = re.compile(
 )
 # What cannot be done to a thing in some state, as in "A job that has finished cannot be cancelled".
 _CANNOT: Final = re.compile(r"([^.;:]*?)\b(?:cannot|can not|can no longer|must not|may not) be\b", re.IGNORECASE)
+# The one state in which something is done, as in "only a queued mission can be started" or "not queued". Below: words
+# with what is needed.
+_ONLY: Final = re.compile(
+    r"(?:\bonly (?:an? |the |for |if |when |while |it is |allowed |possible )*|^not )`?([\w-]+)(?!.*(?:,| or ))",
+    re.IGNORECASE,
+)
+_NEEDS: Final = re.compile(
+    r"\b(?:only|unless|must|ha(?:s|ve) to|needs?|until|before|requires?|should|can|may)\b", re.IGNORECASE
+)
 _ENDED: Final = re.compile(r"\b(?:final|terminal|finished|ended|over)\b", re.IGNORECASE)
 _AND_WHILE: Final = re.compile(r",?\s+(?:and|or)\s+(?:if|when|while|as long as)\s+", re.IGNORECASE)
 #: Phrases in a description which say that an operation is refused the second time.
@@ -535,6 +544,9 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
     thing, found = singular(collection_of(read.template).rpartition("/")[2]), defaultdict[str, set[str]](set)
     is_own = operation.template.count("{") == read.template.count("{")
     conditions = [found[1] for said in (_REFUSED, _WHILE) for found in said.finditer(operation.text)]
+    # The description of a 409 is a condition itself, if it does not say what is needed.
+    conditions += [text for text in re.split(r"[.;:]\s", operation.conflict) if not _NEEDS.search(text)]
+    only = {one.lower() for one in _ONLY.findall(operation.conflict)} & known[name].keys() if name and is_own else set()
     for said in (clause for condition in conditions for clause in _AND_WHILE.split(condition)):
         for unless, subject, no, rest in _IS.findall(said):
             for member, values in known.items() if subject.lower() in {f"the {thing}", *(["it"] * is_own)} else ():
@@ -545,8 +557,8 @@ def barred_by(operation: Operation, read: Operation) -> dict[str, frozenset[str]
             named = {state for state in known[name] if _word(state).search(said[1])}
             found[name] |= named or (FINAL & known[name].keys() if _ENDED.search(said[1]) else set())
     starts = _states_named(operation, set(known[name])) if name and operation.method == "POST" and is_own else set()
-    if starts and not found[name]:
-        found[name] = set(known[name]) - starts
+    if (starts | only) and not found[name]:
+        found[name] = set(known[name]) - starts - only
     return {member: frozenset(values) for member, values in found.items() if values}
 
 

@@ -79,6 +79,7 @@ class Operation:
         reads: whether it only reads, whatever its method (x-roaas-reads).
         created: whether it updates a thing that another operation creates (x-roaas-created).
         text: what its summary and its description say.
+        conflict: what the description of its status 409 says.
         guessed: what a read without a declared content may show, by what is written there; nothing is judged by it.
     """
 
@@ -99,6 +100,7 @@ class Operation:
     reads: bool = False
     created: bool = False
     text: str = ""
+    conflict: str = ""
     guessed: Schema | None = None
 
     @cached_property
@@ -287,6 +289,7 @@ def _operation(
         reads=bool(given.get("x-roaas-reads", False)),
         created=bool(given.get("x-roaas-created", False)),
         text=" ".join(one for key in ("summary", "description") if isinstance(one := given.get(key), str)),
+        conflict=str(given.get("responses", {}).get("409", {}).get("description", "")),
     )
 
 

@@ -5,7 +5,9 @@ import json
 import pytest
 from small_device import REFUSED, answers, contract_of, described
 
+from conformance.checkers.changes import barred_by
 from conformance.checkers.rest import RestCheckers
+from conformance.documents.openapi import read_operations
 from conformance.transport.exchange import Exchange, Request, Response
 
 _BASE = "http://device:8000"
@@ -131,3 +133,31 @@ def test_what_a_description_says_is_judged(contract, name):
 @pytest.mark.parametrize("name", _RIGHT)
 def test_what_it_leaves_open_is_not(contract, name):
     assert _broken(contract, _RIGHT[name]) == set()
+
+
+@pytest.mark.parametrize(
+    ("says", "barred"),
+    [
+        ("Only a queued mission can be started.", {"active", "done"}),
+        ("Only possible while it is queued", {"active", "done"}),
+        ("Not queued", {"active", "done"}),
+        ("The mission is not queued", {"active", "done"}),
+        ("It is done or active already.", {"active", "done"}),
+        ("Only queued or active missions can be started", set()),
+        ("The mission must be queued", set()),
+        ("Another mission is active", set()),
+        ("A mission with this name is there", set()),
+        ("Conflict", set()),
+    ],
+)
+def test_states_that_the_description_of_a_409_excludes(says, barred):
+    state = {"type": "string", "enum": ["queued", "active", "done"]}
+    id_ = {"name": "id", "in": "path", "required": True, "schema": {"type": "integer"}}
+    shown = answers({"type": "object", "properties": {"id": {"type": "integer"}, "status": state}})
+    start = {"responses": {"200": {"description": "started"}, "409": {"description": says}}}
+    paths = {
+        "/missions/{id}": {"parameters": [id_], "get": {"responses": {"200": shown}}},
+        "/missions/{id}/start": {"parameters": [id_], "post": start},
+    }
+    found = {one.label: one for one in read_operations(described(paths, "3.1.0"))}
+    assert barred_by(found["POST /missions/{id}/start"], found["GET /missions/{id}"]).get("status", set()) == barred
