@@ -90,7 +90,12 @@ class RosEnds:
         calls_of = {one.number: self._calls(one.exchange.request) for one in of_ros if one.exchange}
         for call, one in self._ros.operations.items():
             key = next(key for key in _DOES if hasattr(one, key))
-            mine = sorted((each for each in of_ros if call in calls_of[each.number]), key=lambda each: each.number)
+            # A finding that several operations share shows the request of the first.
+            mine = [
+                each
+                for each in sorted(of_ros, key=lambda each: each.number)
+                if call in calls_of[each.number] or any(names_operation(call, label) for label in each.operations)
+            ]
             row = {"operation": call, "does": _DOES[key], "name": getattr(one, key), "compared": self._compared[call]}
             row |= {"type": one.type} if key != "lists" else {}
             if mine:
