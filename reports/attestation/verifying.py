@@ -187,7 +187,7 @@ def _suite(statement: Statement, policy: Policy, known: Known) -> Iterator[Point
     yield Point(
         "contract",
         not (same and other),
-        text if same else "not compared, because another suite or contract judged the robot",
+        text if same else "unknown here: another suite or contract than yours judged the robot",
         "the files of the contract that the suite has",
         f"{contract}; if the vendor changed the files, do not rely on the certificate",
     )
@@ -246,12 +246,14 @@ def _extent(run: Run, policy: Policy) -> Iterator[Point]:
     yield Point(
         "efforts", run.effort in policy.efforts, run.effort, " or ".join(policy.efforts), f"{remedy} (--effort)"
     )
-    moved = "the robot was allowed to move" if run.motion_allowed else "the robot was not allowed to move"
+    moved = "motion was judged" if run.motion_allowed else "motion was not judged: --allow-motion was not given"
     yield Point(
         "motion", run.motion_allowed or not policy.motion, moved, "a robot that may move", f"{remedy} (--allow-motion)"
     )
     black_box = [name for name in passed_classes(run) if run.views.get(name) == "black box"]
-    text = f"ROS topics not observed: {', '.join(black_box)}" if black_box else "observed where a passed class uses it"
+    text = (
+        f"ROS topics not observed: {', '.join(black_box)}" if black_box else "no passed class left its ROS topics out"
+    )
     yield Point(
         "ros",
         not (policy.ros and black_box),
@@ -304,7 +306,7 @@ def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
     if policy.nonce is None:
         text, fresh = "you gave no nonce", True
     elif run.nonce != policy.nonce:
-        text, fresh = f"the run has {run.nonce!r}", False
+        text, fresh = f"the run has {run.nonce!r}" if run.nonce else "the run was made without one", False
     else:
         text, fresh = "the one that you gave", run.seed == seed_of(policy.nonce)
         text += "" if fresh else f", but the seed {run.seed} was not derived from it"
@@ -408,7 +410,11 @@ def _agreement(statement: Statement, result: Any) -> Point:
         other = sorted(key for key in signed if signed[key] != read.get(key))
     except (KeyError, TypeError, AttributeError, IndexError, msgspec.ValidationError):
         other = ["all"]
-    text = f"the certificate says otherwise than result.json: {', '.join(other)}" if other else "the same facts in both"
+    text = (
+        f"the certificate says otherwise than result.json: {', '.join(other)}"
+        if other
+        else "the certificate says what result.json says"
+    )
     return Point("agreement", not other, text, "a certificate that says what result.json says", "do not rely on it")
 
 
