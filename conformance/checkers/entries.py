@@ -86,8 +86,8 @@ class Entries:
         self._listed: dict[str, dict[str, dict[str, Any]]] = {}
         self._refused: dict[str, list[_Entry]] = defaultdict(list)
         self._longest: dict[str, int] = defaultdict(int)
-        # All identifiers that lists have shown, whole or not.
-        self._seen: dict[str, set[str]] = {}
+        # All entries that lists have shown, whole or not, as they were last.
+        self._seen: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
         self._unchanged: dict[str, dict[str, list[_Entry]]] = defaultdict(lambda: defaultdict(list))
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
@@ -107,8 +107,9 @@ class Entries:
                 memory.clear()
         elif request.method == "GET" and operation is not None and create is not None:
             listing, page = listing_of(operation), page_of(occasion.response, operation)
-            shown = {self._id_of(item, create) for item in page.items} if page is not None else set()
-            self._seen[path] = self._seen.get(path, set()) | shown
+            items = {self._id_of(item, create): members_of(item) for item in page.items} if page is not None else {}
+            yield from self._judge_gone(occasion, items, path)
+            self._seen[path] |= items
             if listing is not None and page is not None and self._is_whole(occasion, listing, page, path):
                 yield from self._judge(occasion, create, page, path)
 
@@ -121,7 +122,8 @@ class Entries:
             self._unchanged[path][id_].append(entry)
             return
         self._unchanged[path].pop(id_, None)
-        earlier, was = self._made[path].pop(id_, None), self._listed.get(path, {}).pop(id_, {})
+        earlier, was = self._made[path].pop(id_, None), self._seen[path].get(id_, {})
+        self._listed.get(path, {}).pop(id_, None)
         self._gone[path].pop(id_, None)
         self._given[path].add(id_)
         if not occasion.response.ok or status == HTTPStatus.ACCEPTED:
@@ -142,7 +144,7 @@ class Entries:
         if refuses(response.status, create):
             self._refused[path] = [*self._refused[path], entry][-_MOST:]
         elif not (id_ and may_create(create, response.status)) or (
-            response.status == HTTPStatus.OK and id_ in self._seen.get(path, {id_})
+            response.status == HTTPStatus.OK and (path not in self._seen or id_ in self._seen[path])
         ):
             self._listed.pop(path, None)
         else:
@@ -178,18 +180,24 @@ class Entries:
                 yield occasion.case("description/written-is-read", not wrong, expected, wrong, cause=cause, doubt=doubt)
                 del self._made[path][id_]
         yield from self._judge_others(occasion, create, items, made, path)
-        for id_, entry in list(self._gone[path].items()):
-            # A list may show what was deleted for a moment, or marked, or in another state.
-            now, is_late = items.get(id_), occasion.sent_s - entry.at_s > _SETTLES_S
-            if now is None or (is_late and now == entry.sent):
-                expected, cause = f"a list without {id_} after {entry.label}", f"{entry.operation.label} listed"
-                found = "a list with it as it was"
-                yield occasion.case("description/deleted-is-gone", now is None, expected, found, cause=cause)
-            if now is None or is_late:
-                del self._gone[path][id_]
+        for id_, entry in [(id_, one) for id_, one in self._gone[path].items() if id_ not in items]:
+            expected, cause = f"a list without {id_} after {entry.label}", f"{entry.operation.label} listed"
+            yield occasion.case("description/deleted-is-gone", True, expected, cause=cause)  # noqa: FBT003
+            del self._gone[path][id_]
         yield from self._judge_unchanged(occasion, create, items, path)
         yield from self._judge_refused(occasion, create, items, path)
         self._listed[path] = items
+
+    def _judge_gone(self, occasion: Occasion, items: dict[str, dict[str, Any]], path: str) -> Iterator[Case]:
+        """Judge that a list, or a page of one, does not show what was deleted."""
+        for id_, entry in [(id_, one) for id_, one in self._gone[path].items() if id_ in items]:
+            # It may show that for a moment, or marked, or in another state.
+            if occasion.sent_s - entry.at_s > _SETTLES_S:
+                if items[id_] == entry.sent:
+                    expected, cause = f"a list without {id_} after {entry.label}", f"{entry.operation.label} listed"
+                    found = "a list with it as it was"
+                    yield occasion.case("description/deleted-is-gone", False, expected, found, cause=cause)  # noqa: FBT003
+                del self._gone[path][id_]
 
     def _judge_others(
         self,

@@ -21,8 +21,10 @@ from conformance.transport.exchange import Exchange
 
 # Lists that are tried. Below: entries that are created in each. _LIMIT: items of a page without a declared maximum.
 _LISTS: Final = 4
-_ENTRIES: Final = 2
+_ENTRIES: Final = 3
 _LIMIT: Final = 100
+# In this turn, the usual body is sent.
+_USUAL: Final = 1
 _CHANGES: Final = ("PATCH", "PUT")
 
 
@@ -63,11 +65,12 @@ class _Entries:
         self._query = {listing.limit.name: most} if listing.limit is not None and is_fit else {}
 
     def write(self) -> None:
-        """Create two entries, change and delete one of them, and read the list each time."""
+        """Create entries, change and delete one in their midst, create another, and read the list each time."""
         self._read()
         paths = [self._create_one(turn) for turn in range(_ENTRIES)]
         self._read()
-        path = next(filter(None, reversed(paths)), "")
+        # Neither the newest nor the oldest: a device may delete another than the one that is named.
+        path = next(filter(None, (*paths[1:], *paths)), "") or self._own()
         for turn, method in enumerate(_CHANGES if path else (), _ENTRIES + 1):
             change = self._of_entry.get(method)
             for body in self._writer.bodies(change, turn)[:1] if change is not None else ():
@@ -80,13 +83,15 @@ class _Entries:
             id_ = unquote(path.rstrip("/").rpartition("/")[2]).casefold()
             if self._writer.send(delete, path).response.ok:
                 self._read_until(lambda items: id_ not in {identifier_of(one, delete) for one in items})
+            # An identifier that counts the entries is that of another one now.
+            self._create_one(0)
+            self._read()
 
     def _create_one(self, turn: int) -> str:
         """Create an entry, another one each turn; return the path by which it is changed, or an empty text."""
-        body = next(islice(self._writer.bodies(self._create, 1), turn, None), None)
-        made = self._writer.send(
-            self._create, self._path, (with_texts(self._create, body) if not turn else body) or body
-        )
+        body = next(islice(self._writer.bodies(self._create, turn), int(turn == _USUAL), None), None)
+        first = body if turn or body is None else with_texts(self._create, body) or body
+        made = self._writer.send(self._create, self._path, first)
         if made.response.status in FULL and makes_room(self._writer.api, made):
             made = self._writer.send(self._create, self._path, body)
         for other in (body, None) if body is not None else ():
@@ -95,6 +100,12 @@ class _Entries:
         id_: Any = id_member(read_json(made.response.body).value, item)[1] if item is not None else None
         end = "/" if item is not None and item.template.endswith("/") else ""
         return f"{self._path.rstrip('/')}/{quote(str(id_), safe='')}{end}" if made.response.ok and id_ else ""
+
+    def _own(self) -> str:
+        """Return the path of an entry that the run created before; empty without one."""
+        left = self._writer.api.left
+        ours = left.created_in(self._path) if left is not None else []
+        return ours[len(ours) // 2] if ours else ""
 
     def _read(self) -> Exchange:
         return self._writer.send(self._lister, self._path, query=self._query)

@@ -56,11 +56,6 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
         )
     if governor and governor not in _STEADY:
         remarks.append(f"the processor's governor is {governor!r}: its clock rate follows the load")
-    if before.load and after.load and max(before.load[0], after.load[0]) > cpus:
-        remarks.append(
-            f"the machine was busy: load average {before.load[0]:.1f} before the run and {after.load[0]:.1f} after it "
-            f"on {cpus} CPUs, so that requests waited for a processor too"
-        )
     found = {
         "steal_share": round(steal, 6),
         "throttled_share": round(throttled, 6),
@@ -69,7 +64,17 @@ def conditions(before: Moment, after: Moment) -> tuple[dict[str, Any], list[str]
         "load_average_before": round(before.load[0], 2) if before.load else None,
         "load_average_after": round(after.load[0], 2) if after.load else None,
     }
+    if said := busy_text(found, cpus):
+        remarks.append(f"the machine was busy: {said}, so that requests waited for a processor too")
     return found, remarks
+
+
+def busy_text(machine: dict[str, Any], cpus: int) -> str:
+    """Return how busy a machine was, by its load averages; empty if it had processors to spare."""
+    before, after = machine["load_average_before"], machine["load_average_after"]
+    if before is None or after is None or max(before, after) <= cpus:
+        return ""
+    return f"load average {before:.1f} before the run and {after:.1f} after it on {cpus} CPUs"
 
 
 def _read(path: Path) -> str | None:

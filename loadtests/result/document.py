@@ -12,7 +12,7 @@ from conformance.commandline.out_folder import without_folders
 from conformance.commandline.secrecy import SECRETS
 from loadtests.clients.payloads import CATALOGUE, LIBRARY
 from loadtests.measuring.executor import Member
-from loadtests.measuring.machine import Moment, conditions
+from loadtests.measuring.machine import Moment, busy_text, conditions
 from loadtests.measuring.preflight import Findings
 from loadtests.measuring.robot_process import describe, same_machine
 from loadtests.measuring.streams import stream_figures
@@ -177,6 +177,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         overloaded,
         outcome.knee_searches,
         interrupted=outcome.interrupted and len(reasons) == 1 and bool(counted.answered),
+        busy=busy_text(machine, os.cpu_count() or 1),
     )
     document = {
         "format": FORMAT,

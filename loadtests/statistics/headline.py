@@ -145,6 +145,7 @@ def says_nothing(comparisons: Sequence[SoapOverRest]) -> list[str]:
 _ORDER = {"delivery": 0, "pose": 1, "coffee": 2}  # described operations stay in the order of the options
 _TAIL = "p99"
 _TENTHS_MS = 10
+_SURE = 0.9
 _MOST_IN_SHORT = 3  # further series that the sentence names
 _AGAINST = {
     SLOWER: "Slower than the other robot",
@@ -171,6 +172,7 @@ class Found:
         overload: how the robot was overloaded, if it was.
         knees: the `knee_search` of latency.json.
         interrupted: by Ctrl-C, and valid until then.
+        busy: how busy the generator's machine was, if it had no processor to spare.
     """
 
     plan: Plan
@@ -185,6 +187,7 @@ class Found:
     overload: Overload | None = None
     knees: Sequence[Mapping[str, Any]] = ()
     interrupted: bool = False
+    busy: str = ""
 
 
 def headline(found: Found) -> dict[str, str]:
@@ -198,6 +201,8 @@ def headline(found: Found) -> dict[str, str]:
             sentence = f"{sentence} {said}"
         else:
             words, sentence = words if found.levels else knees[0], f"{said} {sentence}"
+    if found.busy and not found.worthless:
+        sentence += f" Measured on a busy machine ({found.busy}): another run will differ."
     return {"words": words, "sentence": sentence}
 
 
@@ -229,10 +234,15 @@ def _knees(searches: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         first = knee["errors_from"]
         yield (
             f"{name} breaks down at {knee['rate']:,.0f} requests/s ({low:,.0f} to {high:,.0f} in {knee['searches']} "
-            f"search{'' if knee['searches'] == 1 else 'es'})"
+            f"search{'' if knee['searches'] == 1 else 'es'}{_sureness(knee.get('confidence'))})"
             + ("" if first is None else f"; requests failed from {first:,.0f} requests/s on")
             + ("; the generator, not the robot, was the limit" if knee["limited_by"] == "generator" else "")
         )
+
+
+def _sureness(confidence: float | None) -> str:
+    """Return how sure it is that the knee lies between the searches' results, where that is less than usual."""
+    return "" if confidence is None or confidence >= _SURE else f", {confidence:.0%} sure"
 
 
 def _answered_text(found: Found) -> str:

@@ -174,12 +174,21 @@ def figure_interval_ms(units: Sequence[Unit], name: str, seed: int) -> Estimate:
         return Estimate(None, f"{samples} samples; a 95 % interval of {name} needs {needed}", None)
     replicates = resample(units, name, seed)
     if replicates is not None:
-        interval = replicates.interval(replicates.values[0], float(replicates.estimates[0]))
+        interval = _within_samples(replicates.interval(replicates.values[0], float(replicates.estimates[0])), units)
         return Estimate(interval, None if interval else "too few resamples hold samples", replicates)
     if name not in SHARES:
         return Estimate(None, f"fewer than {LEAST_ROUNDS} rounds of blocks", None)
     whole = Histogram.sum_of(unit.sides[0] for unit in units)
     return Estimate(order_interval_ms(whole, SHARES[name]), None, None)
+
+
+def _within_samples(interval: Interval | None, units: Sequence[Unit]) -> Interval | None:
+    """Return an interval no wider than the samples: a widened one may reach far beyond what was ever measured."""
+    whole = Histogram.sum_of(unit.sides[0] for unit in units)
+    least, most = whole.quantile_ms(0.0), whole.quantile_ms(1.0)
+    if interval is None or least is None or most is None:
+        return interval
+    return max(interval[0], least), min(interval[1], most)
 
 
 def order_interval_ms(histogram: Histogram, quantile: float) -> Interval | None:

@@ -47,6 +47,11 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
     half, (quantile, slow) = one["response_ms"]["p50"], _tail(one)
     if quantile == "p50":
         yield f"{name}: half of the responses take {ms(half)} ms or less; there are too few to say more."
+    elif slow < _AT_ONCE_MS <= ((one["ci95_ms"].get(quantile) or [0.0])[-1]):
+        yield (
+            f"{name}: a person probably notices no delay. {_TAILS[quantile]} responses come within {ms(slow)} ms, but "
+            "by its 95 % interval that may be more than the 100 ms below which a delay seems immediate."
+        )
     elif slow < _AT_ONCE_MS:
         yield (
             f"{name}: a person notices no delay. {_TAILS[quantile]} responses come within {ms(slow)} ms, and a delay "
@@ -66,8 +71,8 @@ def _of_series(one: Mapping[str, Any], result: Mapping[str, Any]) -> Iterator[st
         )
     if slow > 0 and quantile != "p50" and not result.get("overload"):
         yield (
-            f"A program that waits for each response of {name} can repeat that about "
-            f"{rate(float(f'{1000 / slow:.2g}'))} times a second and is late in {_BEYOND[quantile]} cases."
+            f"A control loop that waits for each response of {name} can run about "
+            f"{rate(float(f'{1000 / slow:.2g}'))} times a second, and is late in {_BEYOND[quantile]} turns."
         )
     failed = one["errors"] + one.get("dropped", 0)
     if failed:

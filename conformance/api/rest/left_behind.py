@@ -108,10 +108,15 @@ class LeftBehind:
         id_ = next((members[name] for name in IDS if isinstance(members.get(name), str | int)), None)
         return "" if id_ is None else f"{path.rstrip('/')}/{id_}{'/' if path.endswith('/') else ''}"
 
+    def created_in(self, collection: str) -> list[str]:
+        """Return the paths of things that the run has created in a collection, the oldest first."""
+        above = collection.rstrip("/")
+        return [path for path in self._created if path in self._new and path.rstrip("/").rpartition("/")[0] == above]
+
     def make_room(self, api: RestInterface, collection: str) -> bool:
         """Delete the older half of what the run created in a collection that takes no more; return whether it did."""
-        ours = [path for path in self._created if path.rstrip("/").rpartition("/")[0] == collection.rstrip("/")]
-        sent = [_send(api, "DELETE", path) for path in ours[: len(ours) // 2] if path in self._new]
+        ours = self.created_in(collection)
+        sent = [_send(api, "DELETE", path) for path in ours[: len(ours) // 2]]
         return any(exchange is not None and exchange.response.ok for exchange in sent)
 
     def tidy_up(self, api: RestInterface, longest_s: float) -> bool:

@@ -179,13 +179,17 @@ def doubt_of_life(*operations: Operation) -> str:
 
 def another(schema: Schema, body: dict[str, Any], turn: int, collections: frozenset[str]) -> dict[str, Any]:
     """Return a body with another value of each member that the client may choose, as far as the schema allows it."""
-    changed = dict(body)
+    changed, numbers = dict(body), set[float]()
     for name, part in flat(schema).get("properties", {}).items():
-        if name in body and not is_devices(name, part, collections):
-            for value in _others(part, body[name], turn, collections):
-                if value != body[name] and fits(part, value) and fits(schema, {**changed, name: value}):
-                    changed[name] = value
+        if name not in body or is_devices(name, part, collections):
+            continue
+        for value in _others(part, body[name], turn, collections):
+            if value != body[name] and fits(part, value) and fits(schema, {**changed, name: value}):
+                changed[name] = value
+                # Two equal numbers do not show that a device takes one for the other.
+                if not is_number(value) or value not in numbers:
                     break
+        numbers |= {changed[name]} if is_number(changed[name]) else set()
     return changed
 
 

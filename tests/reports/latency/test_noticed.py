@@ -53,7 +53,7 @@ def test_delays_are_named_as_people_and_programs_notice_them(described):
         "GET /a/{b_c}: a person notices no delay. 99 of 100 responses come within 12.5 ms, and a delay below about "
         "100 ms seems immediate."
     )
-    assert "can repeat that about 80 times a second and is late in 1 of 100 cases" in program
+    assert "can run about 80 times a second, and is late in 1 of 100 turns" in program
     assert load.startswith("No request failed. Measured at 200 requests/s")
     assert "usually notices no delay" in told(described, p50=2.0, p99=300.0)[0]
     assert "1 of 10 takes 3,000 ms or more, which is noticed as a wait" in told(described, p50=2.0, p90=3000.0)[0]
