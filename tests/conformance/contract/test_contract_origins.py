@@ -87,7 +87,9 @@ def word_of(clause: str) -> Level:
     norm, _, number = clause.partition(" ")
     if norm == "BP":
         return next(Level(word) for word, rules in CLAUSES["basic-profile"].items() if number in rules)
-    return Level({**CLAUSES["rfc"], **CLAUSES["soap"]}[clause])
+    known = {**CLAUSES["rfc"], **CLAUSES["soap"]}
+    assert clause in known, f"add {clause} to tests/conformance/data/clauses.toml, with its own word"
+    return Level(known[clause])
 
 
 @pytest.mark.parametrize("item", LEDGER.values(), ids=lambda item: item.id)
