@@ -18,6 +18,22 @@
 # The exit code is that of `roaas certify`: all but 0 make the job red.
 set -euo pipefail
 
+case ${1:-} in
+    "") ;;
+    -h | --help)
+        sed -n '2,/^# The exit code/s/^# \{0,1\}//p' -- "${BASH_SOURCE[0]}"
+        exit 0
+        ;;
+    *)
+        echo "roaas-ci takes no arguments, such as '$1': set ROAAS_URL or ROAAS_STATEMENT, and see roaas-ci --help" >&2
+        exit 2
+        ;;
+esac
+if [[ -z ${ROAAS_STATEMENT:-}${ROAAS_URL:-}${ROAAS_REST:-}${ROAAS_PUBLISHERS_WSDL:-}${ROAAS_SUBSCRIBERS_WSDL:-} ]]; then
+    echo "no robot is named: set ROAAS_URL to the address of its description, or ROAAS_STATEMENT to a file" >&2
+    exit 2
+fi
+
 out=${ROAAS_OUT:-roaas-results}
 read -r -a roaas <<<"${ROAAS_COMMAND:-roaas}"
 options=(--out "$out")

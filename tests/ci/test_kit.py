@@ -75,6 +75,15 @@ def bash(script, environment, folder):
     return ended(*command, env=environment, cwd=folder)
 
 
+def test_the_script_says_which_variables_it_reads(programs, tmp_path):
+    environment = {"PATH": os.environ["PATH"]}
+    told = ended("bash", programs / "roaas-ci", "--help", env=environment, cwd=tmp_path)
+    assert (told.returncode, "  ROAAS_URL  " in told.stdout, "#" in told.stdout) == (0, True, False), told.stdout
+    for arguments, said in (((), "set ROAAS_URL"), (("robot.toml",), "takes no arguments, such as 'robot.toml'")):
+        refused = ended("bash", programs / "roaas-ci", *arguments, env=environment, cwd=tmp_path)
+        assert (refused.returncode, said in refused.stderr) == (2, True), refused.stderr
+
+
 def on_github(programs, folder, **inputs):
     """Run the step `certify` as a runner would: the inputs go into its environment, and its script to bash."""
     step = next(one for one in ACTION["runs"]["steps"] if one.get("id") == "certify")
