@@ -85,7 +85,7 @@ def _counts(counts: Mapping[str, Any], plan: Mapping[str, Any], *, in_stages: bo
 def _stages(stages: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return each stage of a changing load with its figures."""
     lines = []
-    for each in stages:
+    for each in (each for each in stages if each["seconds"]):
         times = ", ".join(
             f"{name} {each['response_ms'][name]:.3f}"
             for name in ("p50", "p95", "p99", "max")

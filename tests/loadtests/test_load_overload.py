@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import psutil
 import pytest
 
-from reports.latency.page import latency_html
+from reports.latency.page import latency_html, latency_markdown
 
 
 @pytest.fixture
@@ -124,3 +124,4 @@ def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load):
     words = "REST breaks down at " if run.result["valid"] else "Not valid"
     assert run.result["headline"]["words"].startswith(words)
     assert "Where it breaks" in latency_html(run.result)
+    assert re.search(r"\| REST \| \d+ \|", latency_markdown(run.result))

@@ -4,7 +4,7 @@ import pytest
 
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
-from reports.latency.page import latency_html
+from reports.latency.page import latency_html, latency_markdown
 
 STAGES = ((40.0, 2.0), (40.0, 2.0), (200.0, 0.0), (200.0, 1.0))
 
@@ -29,6 +29,7 @@ def test_each_stage_has_its_figures(started, load):
     assert run.result["plan"]["stages"] == [[40, 2], [40, 2], [200, 0], [200, 1]]
     assert "stage 4, 200 to 200/s in 1 s, GET /state over rest (wire): " in run.out
     assert "Stage by stage" in latency_html(run.result)
+    assert "Response time by stage" in latency_markdown(run.result)
 
 
 @pytest.mark.parametrize(
