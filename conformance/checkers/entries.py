@@ -122,7 +122,7 @@ class Entries:
             self._unchanged[path][id_].append(entry)
             return
         self._unchanged[path].pop(id_, None)
-        earlier, was = self._made[path].pop(id_, None), self._seen[path].get(id_, {})
+        earlier, was = self._made[path].pop(id_, None), self._seen.get(path, {}).get(id_, {})
         self._listed.get(path, {}).pop(id_, None)
         self._gone[path].pop(id_, None)
         self._given[path].add(id_)
@@ -157,6 +157,7 @@ class Entries:
                 holds = own or id_ in values
                 yield occasion.case("description/created-is-there", holds, expected, f"{id_} again", cause=cause)
             self._given[path].add(id_)
+            self._gone[path].pop(id_, None)
             if occasion.is_valid and body and len(self._made[path]) < _MOST:
                 self._made[path][id_] = entry
 
@@ -280,7 +281,7 @@ class Entries:
         self, occasion: Occasion, create: Operation, items: dict[str, dict[str, Any]], path: str
     ) -> Iterator[Case]:
         """Judge whether what is new in a list, and no creation has given, was asked for by a refused one."""
-        parts = parts_of(next(iter(create.bodies.values())).schema) if create.bodies else {}
+        parts = parts_of(_schema_of(create))
         free = {name for name, part in parts.items() if is_free_text(part)}
         before, refused = self._listed.get(path), self._refused.pop(path, [])
         known = self._given[path].union(before or ())
@@ -296,7 +297,7 @@ class Entries:
 
 
 def _schema_of(operation: Operation) -> dict[str, Any]:
-    return next(iter(operation.bodies.values())).schema
+    return next((body.schema for body in operation.bodies.values()), {})
 
 
 def _begins(value: Any, seen: Any) -> bool:

@@ -42,7 +42,7 @@ def created_path(
     whole = whole if isinstance(whole, dict) else usual[0].body
     whole = with_texts(create, whole) or whole
     owned = with_owned(create, read, whole) or (whole if isinstance(whole, dict) else None)
-    known = {str(one) for one in surveyor.values.known_ids(read, read.parameter("path")[-1])}
+    known = {str(id_) for one in read.parameter("path")[-1:] for id_ in surveyor.values.known_ids(read, one)}
     tried = [*(replace(usual[0], body=item) for item in (owned, body) if item), *usual]
     made = _first_taken(surveyor, create, tried)
     if (

@@ -141,7 +141,7 @@ _RIGHT = {
     "a creation that is answered with what is there": [_MARK_MADE, _marks(m1=5), _MARK_MADE, _marks(m1=5)],
     "another client's equal entry, before": [_marks(m2=5), _MARK_MADE, _marks(m1=5, m2=5)],
     "a search that is answered 200": [_flags(f1=9), _FLAG_MADE, _flags(f1=9)],
-    "a number that is given again": [_MARK_MADE, _deleted(), _MARK_MADE, _marks(m1=5)],
+    "a number that is given again": [_marks(m1=5), _deleted(), _MARK_MADE, *[_marks(m1=5)] * 4],
     "a list of which nothing is known before": [_made("n1", "refused", 406), _listed("n1", n1="refused")],
 }  # fmt: skip
 
