@@ -48,7 +48,8 @@ def test_no_command_imports_a_module_of_the_working_directory(place, command):
     arguments = [word.replace("GET.", "GET ") for word in command.format(url=url).split()]
     done = ended(ROAAS, *arguments, cwd=folder)
     assert not marker.exists(), marker.read_text()
-    assert done.returncode in {0, 1}, done.stdout + done.stderr
+    # A second of load is too short to compare.
+    assert done.returncode in {0, 1, 4 if "compare" in command else 0}, done.stdout + done.stderr
 
 
 def test_neither_does_the_command_as_a_module(place):
