@@ -120,8 +120,7 @@ def test_searches_for_the_knee_agree_on_a_known_capacity(bucket, load):
     assert all(missed.count(rate) >= 2 for _, rate in search["brackets"]), "what ends a branch was tried twice"
     over = [point["achieved_rate"] for point in search["curve"] if point["offered_rate"] > 1.3 * capacity]
     assert over == pytest.approx([capacity] * len(over), rel=0.2), "an overloaded robot goes on at its capacity"
-    # A busy machine makes requests late.
-    words = "REST breaks down at " if run.result["valid"] else "Not valid"
-    assert run.result["headline"]["words"].startswith(words)
+    # It leads even where a busy machine made other requests late.
+    assert run.result["headline"]["words"].startswith("REST breaks down at ")
     assert "Where it breaks" in latency_html(run.result)
     assert re.search(r"\| REST \| \d+ \|", latency_markdown(run.result))
