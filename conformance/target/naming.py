@@ -227,6 +227,9 @@ def _judge_described(source: str, api: Api | None, statement: Path | None, optio
         raise StatementError(str(error)) from error
     declared = load_statement(statement, contract) if statement else empty_statement(contract)
     _check_map(declared, contract)
+    if options.ros_play:
+        # The suite is the robot, and it does not move.
+        declared = msgspec.structs.replace(declared, motion_map=None, state_map=None)
     if soap and declared.motion_map is not None:
         _check_messages(declared.motion_map, contract)
     where = place_api_key(where, contract.openapi)
@@ -244,6 +247,7 @@ def _map_classes(statement: Path | None, options: DeviceOptions) -> tuple[str, .
     moves = ((MOTION,) if options.moves or "motion" in maps else ()) + ((STATES,) if "states" in maps else ())
     if not (options.ros or options.ros_play):
         return moves
+    moves = () if options.ros_play else moves
     if "ros" not in maps:
         raise StatementError(f"{_BY_MAP} a statement with a table [ros]: docs/ros-gateway.md shows one")
     if problem := lacking_ros("judging a ROS gateway"):

@@ -27,8 +27,8 @@ def responses(trace: Services, ros: RosMap) -> Iterator[Outcome]:
         if call.server not in _RESPONDS or not call.answer:
             continue
         ok, body, found = call.is_success, call.body, ""
-        if not ok and call.server is not Server.RESPONDS:
-            # A gateway may give a slow server up, and has to say so; what follows is judged by recovery.
+        if call.is_refused or (not ok and call.server is not Server.RESPONDS):
+            # A gateway may have limits, and may give a slow server up; what follows is judged by recovery.
             continue
         if ok and isinstance(call.attempt, Exchange):
             found = differing(call.attempt, call.answer, trace.responses[call.operation], body, body.result, ros)

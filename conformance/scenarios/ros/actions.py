@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.services import NO_PLAY
-from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_success
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_out_of_range, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Acts
@@ -183,6 +183,8 @@ class _Sender:
             if (heard and goal.is_ok) or WALL_CLOCK.now() > until:
                 WALL_CLOCK.sleep(_MORE_S)
                 return goal
+            maker = self._gateway.maker(self._gateway.definition(f"{self._body.type}#Goal"))
+            maker.is_gentle |= is_out_of_range(exchange, self._body)
 
     def _begin_goal(self, course: Course, *steps: dict[str, Any]) -> Goal:
         robot = self._gateway.robot

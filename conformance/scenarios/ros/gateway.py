@@ -151,7 +151,7 @@ class Gateway:
 
     def maker(self, definition: Definition) -> Maker:
         """Return this run's generator for messages of a type, so that none of its usual messages comes again."""
-        made = Maker(definition, self.run.seed, self.binding.syntax == "XML")
+        made = Maker(definition, self.run.seed, self.binding.syntax == "XML", is_gentle=not self.plays)
         return self._makers.setdefault(definition.root, made)
 
     def usual(self, name: str) -> dict[str, Any]:

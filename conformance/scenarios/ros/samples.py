@@ -37,8 +37,10 @@ _SECONDS: Final = 2**31 - 1
 _NANOSECONDS: Final = 999_999_999
 # Octets for each number of a large message.
 _OCTETS: Final = 100
-_GENTLE: Final = 0.001
-_GENTLY: Final = 50
+# Small values, by which a real robot hardly moves: up to 500 steps of so much, and integers up to 50.
+_GENTLE: Final = 0.0001
+_GENTLY: Final = 500
+_LEAST: Final = 50
 
 
 class Kind(StrEnum):
@@ -74,11 +76,13 @@ class Maker:
         definition: of the type.
         seed: of what is random.
         is_xml: whether strings have to be such as XML can write and keep.
+        is_gentle: whether usual values are small, for a real robot, or a gateway that refuses greater ones.
     """
 
     definition: Definition
     seed: int
     is_xml: bool = False
+    is_gentle: bool = False
 
     def __post_init__(self) -> None:
         self._random = random.Random(f"{self.seed} {self.definition.root}")  # noqa: S311 - values, no secrets
@@ -103,16 +107,15 @@ class Maker:
 
     def usual(self) -> Sample:
         """Return a message of usual values, a different one each time."""
-        return Sample("a usual message", Kind.USUAL, self._message(None))
-
-    def gentle(self) -> Sample:
-        """Return a message of small values, by which a real robot hardly moves; a different one each time."""
+        if not self.is_gentle:
+            return Sample("a usual message", Kind.USUAL, self._message(None))
         share = next(self._gentle) % _GENTLY + 1
 
         def small(shape: Shape, _: int | None) -> Any:
             if shape.item in FLOATS:
                 return _single(_GENTLE * share)
-            return share if shape.item in INTEGERS else shape.item == "boolean" if not shape.is_text else ""
+            least = (share - 1) % _LEAST + 1
+            return least if shape.item in INTEGERS else shape.item == "boolean" if not shape.is_text else ""
 
         return Sample("a message of small values", Kind.USUAL, self._message(None, small))
 

@@ -16,7 +16,7 @@ from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Maker, Sample
-from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_success
+from conformance.scenarios.ros.web import TRIES, document_of, gave_up, is_out_of_range, is_success
 from conformance.scenarios.scenario import NotDeclaredError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Calls, Lists, Reads
@@ -105,6 +105,11 @@ class Called:
     def is_success(self) -> bool:
         """Return whether the gateway reports that the service responded."""
         return is_success(self.attempt, self.body)
+
+    @property
+    def is_refused(self) -> bool:
+        """Return whether the gateway took the request for a wrong one, and called nobody."""
+        return not self.heard and is_out_of_range(self.attempt, self.body)
 
     @property
     def is_open(self) -> bool:
@@ -244,6 +249,7 @@ class _Caller:
             called = self._call_server(server, request.value, complete)
             if not gave_up(called.attempt, self._body):
                 break
+        self._requests.is_gentle |= called.is_refused
         return called
 
     def _usual(self) -> tuple[Sample, Sample]:

@@ -15,7 +15,16 @@ from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
 from conformance.scenarios.ros.robot import Heard
 from conformance.scenarios.ros.samples import Kind, Sample
-from conformance.scenarios.ros.web import content_of, differences, differing, document_of, equal, is_success, with_texts
+from conformance.scenarios.ros.web import (
+    content_of,
+    differences,
+    differing,
+    document_of,
+    equal,
+    is_out_of_range,
+    is_success,
+    with_texts,
+)
 from conformance.scenarios.scenario import NoOccasionError, NotPossibleError, partial_trace, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.statement.ros_map import Publishes, Reads
@@ -275,7 +284,7 @@ class _Writer:
         until = clock.now() + 2 * self.body.within_s
         while True:
             self.reliable = not robot.tell("listen", topic=topic, type=self.body.type)["best_effort"]
-            one = self.send(self.usual())
+            one = self.send(self.maker.usual())
             if robot.take_heard(topic, 1, 1.0):
                 # Those that were sent before may come late.
                 clock.sleep(_MORE_S)
@@ -284,12 +293,9 @@ class _Writer:
             if clock.now() > until:
                 came = one.exchange.came
                 raise NotPossibleError(f"{self.call} got {came}, and no message came on {topic} ({self.body.type})")
+            self.maker.is_gentle |= is_out_of_range(one.exchange, self.body)
             # A publisher that is there by now may be one of best effort, which a reliable subscriber does not hear.
             robot.tell("forget", name=topic)
-
-    def usual(self) -> Sample:
-        """Return a message that differs from all others, by which a real robot hardly moves."""
-        return self.maker.usual() if self.gateway.plays else self.maker.gentle()
 
     def end(self) -> None:
         """Leave a real robot with the message of default values, which stops one that is driven."""
@@ -328,7 +334,7 @@ class _Writer:
     def one_by_one(self, effort: Effort) -> Iterator[Burst]:
         """Yield each message with its outcome."""
         extreme = self.maker.samples(_SAMPLES[effort.name], large=_LARGE[effort.name])
-        for sample in extreme if self.gateway.plays else (self.maker.gentle() for _ in range(_BURST)):
+        for sample in extreme if self.gateway.plays else (self.maker.usual() for _ in range(_BURST)):
             if sample.kind is Kind.NON_FINITE and self.gateway.ros.non_finite != "string":
                 # JSON has no such number, and null may be refused as well.
                 continue
@@ -373,7 +379,7 @@ class _Writer:
 
     def burst(self, clients: int, each: int, how: str) -> Burst:
         """Return the outcome of messages of clients that send at the same moment, each one after another."""
-        samples = [[self.usual() for _ in range(each)] for _ in range(clients)]
+        samples = [[self.maker.usual() for _ in range(each)] for _ in range(clients)]
         made = [[(sample, json.dumps(self.value(sample)), self.request(sample)) for sample in own] for own in samples]
         requests = [[request for _, _, request in own] for own in made]
         sent = tuple(
@@ -387,7 +393,7 @@ class _Writer:
 
     def send_malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, with their outcome."""
-        right = self.request(self.usual())
+        right = self.request(self.maker.usual())
         wrong = {"no body": b""}
         is_wrong = {"half of the body": right.body[: len(right.body) // 2]}
         # Of a map with `fields`, the body may lack what is wrong.
@@ -404,7 +410,7 @@ class _Writer:
         # A gateway refuses in several places, and each may change what becomes of the next message.
         for what, made in every.items():
             self.send_made(what, "", made)
-            one = self.send(self.usual())
+            one = self.send(self.maker.usual())
             heard = tuple(self.hear_of(one))
             yield Burst(self.call, f"a message after {what}", (one,), heard, self.reliable)
             if not heard:

@@ -16,6 +16,7 @@ import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from http import HTTPStatus
 from typing import Any, Final
 
 from conformance.documents.xml import NotXmlError, elements, local, parse
@@ -32,6 +33,9 @@ _UUID: Final = 16
 _NAMES: Final = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf, "INF": math.inf, "-INF": -math.inf}
 _NUMBER: Final = re.compile(r"\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*")
 _MISSING: Final = object()
+#: Statuses, and SOAP's fault codes, for a request that is refused because of what it says.
+_REFUSED: Final = {HTTPStatus.BAD_REQUEST, HTTPStatus.UNPROCESSABLE_ENTITY}
+_CLIENT: Final = re.compile(rb"[:>](Client|Sender)\b[^<]*</")
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,14 @@ def is_success(attempt: Attempt, body: Body) -> bool:
     if isinstance(body, Calls) and body.state is not None:
         return value_at(value, body.state.at) in body.state.succeeded
     return failure is None or value_at(value, failure.at) not in failure.values
+
+
+def is_out_of_range(attempt: Attempt, body: Body) -> bool:
+    """Return whether a request was refused as the client's fault: its values may be beyond a limit that no type has."""
+    if not isinstance(attempt, Exchange) or is_success(attempt, body):
+        return False
+    status, octets = attempt.response.status, attempt.response.body
+    return status in _REFUSED or (status == HTTPStatus.INTERNAL_SERVER_ERROR and _CLIENT.search(octets) is not None)
 
 
 def gave_up(attempt: Attempt | None, body: Body) -> bool:

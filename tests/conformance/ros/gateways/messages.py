@@ -177,6 +177,8 @@ class Forms:
             number = math.inf
         if not math.isfinite(number) or (name == "float" and abs(number) > _FLOAT32_MOST):
             raise RefusedError(f"{place} is beyond what ROS can hold")
+        if "limits" in self.faults and abs(number) > 1:
+            raise RefusedError(f"{place} is beyond the limit of this robot")
         return round(number, 6) if "6 digits sent" in self.faults else number
 
     def _integer(self, value: Any, name: str, place: str) -> Any:
