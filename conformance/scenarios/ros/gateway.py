@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
 from typing import Any, Final, TypeVar
@@ -21,7 +21,7 @@ from conformance.scenarios.ros.samples import Maker
 from conformance.scenarios.ros.web import document_for, document_of, with_texts
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_calls import NAME
-from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Reads, RosMap
+from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange, NoAnswerError, Outgoing, Response
 from conformance.transport.rosbridge import Subscription
 from conformance.transport.streams import Message, Stream
@@ -33,8 +33,10 @@ CROWD: Final = 32
 # Pause between two reads of the gateway, s.
 PACE_S: Final = 0.03
 #: PATIENCE_S: additional time for a busy machine to show the last messages, s. _DISCOVERY_S: to discover the graph, s.
+#: _ALONE_S: how long it is heard whether another robot publishes, s.
 PATIENCE_S: Final = 10.0
 _DISCOVERY_S: Final = 15.0
+_ALONE_S: Final = 1.2
 _KEYS: Final[dict[type, str]] = {kind: name for name, kind in KINDS.items()}
 #: What of a type an operation is sent.
 _PARTS: Final[dict[type, str]] = {Calls: "#Request", Acts: "#Goal"}
@@ -56,6 +58,7 @@ class Gateway:
     binding: Binding
     ros: RosMap
     _robot: Robot | None = field(default=None, init=False)
+    _is_alone: bool = field(default=False, init=False)
     _problem: str = field(default="", init=False)
     _numbers: Iterator[int] = field(default_factory=lambda: itertools.count(1), init=False)
     _makers: dict[str, Maker] = field(default_factory=dict, init=False)
@@ -80,6 +83,7 @@ class Gateway:
                 self._robot = Robot(self.ros.domain)
                 self._robot.await_ready()
                 self._await_others(self._robot)
+                self._check_alone(self._robot)
             except ProbeError as error:
                 self._problem = f"the suite's ROS node in domain {self.ros.domain}: {error}"
                 raise NotPossibleError(self._problem) from error
@@ -95,6 +99,32 @@ class Gateway:
                     "ROS_STATIC_PEERS such that it is found on this machine"
                 )
             WALL_CLOCK.sleep(PACE_S)
+
+    def _check_alone(self, robot: Robot) -> None:
+        """Hear whether anybody publishes what the suite is to publish: a gateway would be blamed for that.
+
+        Raises:
+            ProbeError: somebody does.
+        """
+        ends = [] if not self.plays or self._is_alone else self.ros.operations.values()
+        # What the gateway publishes, it may repeat by itself, as a watchdog does.
+        own = {one.publishes for one in ends if isinstance(one, Publishes)}
+        types = {one.topic: one.type for one in ends if isinstance(one, Reads) and one.topic not in own}
+        with ExitStack() as listening:
+            for topic, type_ in types.items():
+                listening.enter_context(robot.publishing(topic))
+                # That a type is not installed is told where it is needed.
+                with suppress(ProbeError):
+                    robot.tell("listen", topic=topic, type=type_)
+            until = WALL_CLOCK.now() + bool(types) * _ALONE_S
+            while WALL_CLOCK.now() < until:
+                if found := next((topic for topic in types if robot.take_heard(topic)), ""):
+                    raise ProbeError(
+                        f"another node publishes on {found}: with --ros-play the suite is the robot, so end the real "
+                        "one or the other run, or give the gateway a ROS domain of its own"
+                    )
+                WALL_CLOCK.sleep(PACE_S)
+        self._is_alone = True
 
     def kill(self) -> None:
         """Kill the suite's ROS process, so that its nodes leave the graph abruptly; the next use starts another."""

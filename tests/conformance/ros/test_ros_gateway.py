@@ -192,6 +192,18 @@ class _Moving(threading.Thread):
         self.process.close()
 
 
+def test_with_a_robot_beside_it_a_gateway_is_not_blamed_for_what_that_publishes(tmp_path, domain_id):
+    robot = _Moving(domain_id)
+    with gateway("flask", domain_id, tmp_path) as statement:
+        robot.start()
+        try:
+            _, judged, out = _judged(statement, domain_id, "--ros-play", "--effort", "quick", select=CORE, code=4)
+        finally:
+            robot.end()
+    assert {judged[id_] for id_ in CORE} == {"skip"}
+    assert "another node publishes on /odom: with --ros-play the suite is" in (out / "result.json").read_text()
+
+
 @pytest.mark.parametrize(
     ("faults", "broken"), [([], set()), (["6 digits"], {"read-exact"}), (["first message for ever"], {"read-fresh"})]
 )
