@@ -301,19 +301,20 @@ def test_whatever_a_description_is_a_run_ends_as_documented(name, tmp_path):
 LIES = ("NaN", "Infinity", "-1e999", '"0.1"', "null", "[]", "true", "1e308", '"\\u001b[31m"')
 
 
-def lying(lies: tuple[str, ...]) -> dict[str, Any]:
+def lying() -> dict[str, Any]:
     """Return the handlers of a cart that lies about where it is."""
 
     async def accept(_: web.Request) -> web.Response:
         return web.json_response({})
 
-    states = [lambda _, lie=lie: web.Response(text=f'{{"x": {lie}}}', content_type="application/json") for lie in lies]
+    states = [
+        lambda _, lie=lie: web.Response(text=f'{{"x": {lie}}}', content_type="application/json") for lie in ("0", *LIES)
+    ]
     return {"/state": odd(in_turns(*states)), "/velocity": {"PUT": accept}, "/stop": {"POST": accept}}
 
 
-@pytest.mark.parametrize("lies", [("0", *LIES), ('"0.1"',)], ids=["in turns", "text"])
-def test_a_device_that_lies_about_its_motion_does_not_conform(lies, tmp_path):
-    with watched(tmp_path) as place, small_device(described(moving_cart.PATHS), lying(lies)) as url:
+def test_a_device_that_lies_about_its_motion_does_not_conform(tmp_path):
+    with watched(tmp_path) as place, small_device(described(moving_cart.PATHS), lying()) as url:
         (place / "out").mkdir()
         statement = place / "out" / "cart.toml"
         statement.write_text(moving_cart.MAP, encoding="utf-8")

@@ -37,26 +37,23 @@ def _failed(name, mutant=None, **more):
     return failed, judged
 
 
-# The relative arm and the camera move as the others do.
-_SEEDS = [(name, seed) for name in DEVICES for seed in range(5 if name in {"arm", "rover"} else 3)]
-
-
-@pytest.mark.parametrize(("name", "seed"), _SEEDS)
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("name", DEVICES)
 def test_a_right_device_breaks_no_rule(name, seed):
     failed, judged = _failed(name, noise=0.004 if seed else 0.0, seed=seed)
     assert failed == set()
     assert len(judged) > 10
 
 
-@pytest.mark.parametrize("takes_s", [0.05, 0.15, 0.3, 1.0])
+@pytest.mark.parametrize("takes_s", [0.15, 1.0])
 @pytest.mark.parametrize("name", DEVICES)
 def test_a_right_device_that_is_far_away_breaks_no_rule(name, takes_s):
     assert _failed(name, noise=0.004, takes_s=lambda: takes_s)[0] == set()
 
 
-@pytest.mark.parametrize(("name", "seed"), _SEEDS)
-def test_a_right_device_behind_a_relay_breaks_no_rule(name, seed):
-    assert _failed(name, noise=0.004, seed=seed, takes_s=_relay(seed))[0] == set()
+@pytest.mark.parametrize("name", DEVICES)
+def test_a_right_device_behind_a_relay_breaks_no_rule(name):
+    assert _failed(name, noise=0.004, takes_s=_relay(0))[0] == set()
 
 
 @pytest.mark.parametrize("name", DEVICES)
@@ -74,7 +71,7 @@ def test_a_velocity_that_is_taken_wrongly_now_and_then_or_not_quite_ended_is_fou
     assert failed & {f"motion/{one}" for one in ("velocity", "velocity-stop", "hold", "watchdog", "stop-lasts")}, name
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", ["rover", "arm"])
 def test_a_right_device_breaks_no_rule_at_quick(name, seed):
     assert _failed(name, noise=0.004 if seed % 2 else 0.0, seed=seed, effort="quick")[0] == set()
@@ -103,7 +100,7 @@ def test_a_stop_is_seen_under_way_however_coarse_the_tolerance_is(tolerance):
     assert (failed, "motion/stop" in judged) == (set(), True)
 
 
-@pytest.mark.parametrize("seconds", [1, 2, 4, 9])
+@pytest.mark.parametrize("seconds", [2, 9])
 def test_a_slow_arm_that_passes_the_targets_of_other_clients_is_not_blamed(seconds):
     # From the middle, the way to a limit leads through the targets between.
     toml = MAP.replace("seconds = 0.5", f"seconds = {seconds}").replace("[-0.4, 0.6]", "[-0.4, 0.4]")
@@ -158,7 +155,7 @@ def test_what_may_move_nothing(quiet, outcomes):
 _STILL_RULES = {f"motion/{kind}-still" for kind in ("refused", "incomplete", "unauthorised")}
 
 
-@pytest.mark.parametrize("phase", range(6))
+@pytest.mark.parametrize("phase", range(0, 6, 2))
 @pytest.mark.parametrize("careless", ["", "incomplete"])
 def test_an_arm_that_sways_within_its_tolerance_is_not_blamed_for_attempts_at_rest(careless, phase):
     found, given = played_attempts(careless, 0.018, phase)
