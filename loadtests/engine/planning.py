@@ -93,6 +93,7 @@ def until_decided(
     plan: Plan,
     other: Against,
     recorder: Recorder,
+    deviation: float,
     carry_out: Callable[[Plan], None],
     is_over: Callable[[], bool],
     tell: Callable[[str], None],
@@ -103,13 +104,14 @@ def until_decided(
         plan: what was carried out before.
         other: the settings of the comparison.
         recorder: the records.
+        deviation: relative standard deviation of the ratio between runs.
         carry_out: carries out a plan.
         is_over: whether the run has to end.
         tell: says what happens.
     """
     plans = [plan]
     for look in other.looks[1:]:
-        if is_over() or not _is_unclear(plans, other, recorder):
+        if is_over() or not _is_unclear(plans, other, recorder, deviation):
             break
         seconds = (look - len(plans)) * plan.load.duration_s
         tell(f"not clear yet whether this robot is slower than the other: measuring for another {seconds:g} s")
@@ -119,7 +121,8 @@ def until_decided(
     return plans[-1]
 
 
-def _is_unclear(plans: Sequence[Plan], other: Against, recorder: Recorder) -> bool:
+def _is_unclear(plans: Sequence[Plan], other: Against, recorder: Recorder, deviation: float) -> bool:
     recorder.flush()
     measured = Measured(plans, recorder)
-    return against(measured, aa_controls(measured), other.tolerance, len(other.looks), {}).verdict == UNCLEAR
+    found = against(measured, aa_controls(measured), other.tolerance, len(other.looks), {}, deviation)
+    return found.verdict == UNCLEAR

@@ -34,6 +34,7 @@ from loadtests.result.outcome import Carried, Outcome, RunAborted
 from loadtests.result.terminal import summary
 from loadtests.schedule.plan import QUICK_ANSWER_S, SHORT_BLOCK_S, Plan
 from loadtests.settings.settings import Settings
+from loadtests.statistics.rounds import between_runs
 
 if TYPE_CHECKING:
     from loadtests.clients.robot import Robot
@@ -193,7 +194,8 @@ class Run:
         if other is None:
             return plan
         part = partial(self._carry_out, executor=executor)
-        return until_decided(plan, other, executor.recorder, part, lambda: self._over, self.progress.say)
+        deviation = between_runs(self.outcome.before.load)
+        return until_decided(plan, other, executor.recorder, deviation, part, lambda: self._over, self.progress.say)
 
     def _start_anew(self, command: str | None, plan: Plan) -> None:
         """Restart the robot with a command, if there is one, and wait until the robot responds."""

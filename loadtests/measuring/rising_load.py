@@ -90,6 +90,5 @@ class RisingLoad:
                     )
                 return result
 
-            words = self._criterion.words()
-            found.append(knee_search(interface, words, search_again(wanted.knee_searches, limits, attempt)))
+            found.append(knee_search(interface, self._criterion, search_again(wanted.knee_searches, limits, attempt)))
         return found

@@ -141,7 +141,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     counted = counts.counts(measured, ((one.plan, one.elapsed_s) for one in outcome.carried))
     pacing = executor.pacing if executor else ""
     machine, spoilt = conditions(outcome.before, Moment.now())
-    deviation = between_runs(machine, os.cpu_count() or 1, len(measured.repeats))
+    deviation = between_runs(outcome.before.load, len(measured.repeats))
     comparisons = soap_over_rest(measured, deviation)
     reasons, notes = ([str(aborted)], []) if aborted else invalid_because(generator, counted, plan, pacing, spoilt)
     reasons = _endings(outcome, plan) + reasons + outcome.invalid
@@ -155,7 +155,7 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
     )
     workers, losses = process_figures(executor.members if executor else [])
     controls = aa_controls(measured)
-    compared = _against(outcome, measured, controls)
+    compared = _against(outcome, measured, controls, deviation)
     levels = [] if aborted else service_levels.levels(measured, settings.slo)
     kept = [level.outcome for level in levels]
     code = _code(outcome, aborted, Reasons(reasons, undecided), kept, compared)
@@ -169,7 +169,6 @@ def compose(outcome: Outcome, plan: Plan, aborted: RunAborted | None) -> tuple[i
         settings.limits.max_rate,
         series,
         comparisons,
-        controls,
         compared,
         reasons,
         undecided,
@@ -236,12 +235,13 @@ def _endings(outcome: Outcome, plan: Plan) -> list[str]:
     return found
 
 
-def _against(outcome: Outcome, measured: Measured, controls: list[AaControl]) -> Against | None:
+def _against(outcome: Outcome, measured: Measured, controls: list[AaControl], deviation: float) -> Against | None:
     """Return the comparison with another robot, or None if the run had only one."""
     settings = outcome.settings.against
     if settings is None:
         return None
-    return against(measured, controls, settings.tolerance, len(settings.looks), outcome.robots[1].addresses_by_name)
+    other = outcome.robots[1].addresses_by_name
+    return against(measured, controls, settings.tolerance, len(settings.looks), other, deviation)
 
 
 def _streams(outcome: Outcome) -> list[dict[str, Any]]:

@@ -3,7 +3,9 @@
 Both robots take turns in one run, so that whatever disturbs the machine disturbs both. A robot counts as slower where
 the whole interval of a ratio lies beyond the tolerance, and as not slower where its upper bound lies within it; in
 between the run is unclear. One ratio of several suffices to call a robot slower, which makes a false positive likelier
-with each: the lower bounds are widened until all of them hold together (Bonferroni, on the logarithmic scale). To clear
+with each: the lower bounds are widened until all of them hold together (Bonferroni, on the logarithmic scale). The A/A
+control cannot see how two processes of one program differ, such as in the processor that each waits for: so the
+intervals hold the variation between runs, and a robot is slower only if all parts of the run show it. To clear
 a robot every median has to lie within the tolerance, which needs no such correction (an intersection-union test:
 Berger, Technometrics 24, 1982). A run that goes on while it is unclear is judged several times, and each time could go
 wrong: both bounds are widened by the number of times (Armitage, McPherson and Rowe 1969; Bonferroni).
@@ -19,7 +21,7 @@ import msgspec
 
 from conformance.commandline.exit_codes import ExitCode
 from loadtests.schedule.plan import SeriesName
-from loadtests.statistics.comparisons import AaControl, Ratio, compare_sides
+from loadtests.statistics.comparisons import CLAIMS, AaControl, Judged, compare_sides
 from loadtests.statistics.figures import name_fields, plain_quantiles, rounded_interval
 from loadtests.statistics.intervals import figure_interval_ms
 from loadtests.statistics.measured import Measured, Side
@@ -33,7 +35,7 @@ SLOWER, NOT_SLOWER, UNCLEAR = "slower", "not slower", "unclear"
 EXIT_CODES = {SLOWER: ExitCode.FAILED, NOT_SLOWER: ExitCode.PASSED, UNCLEAR: ExitCode.INCONCLUSIVE}
 
 
-class Change(Ratio, kw_only=True):
+class Change(Judged, kw_only=True):
     """The ratio of this robot's quantile to the other robot's, with the verdict if the quantile is judged."""
 
     interface: str
@@ -71,8 +73,9 @@ class Judge:
     together: int
     looks: int = 1
 
-    def verdict(self, ratio: float | None, interval: list[float] | None, control: list[float] | None) -> str:
-        """Judge a ratio by its interval; `control` is the interval of the A/A control, where there is one."""
+    def verdict(self, change: Change) -> str:
+        """Return the verdict on a change that was judged by the A/A control, where there was one."""
+        ratio, interval, control = change.ratio, change.ci95, change.noise_ci95
         if ratio is None or interval is None:
             return UNCLEAR
         beyond = 1 + self.tolerance
@@ -80,7 +83,7 @@ class Judge:
             return UNCLEAR  # this robot differs from itself by more than the tolerance
         low, high = interval
         if _widen(ratio, low, self.together * self.looks) > beyond:
-            return SLOWER
+            return SLOWER if change.judgement in CLAIMS else UNCLEAR
         return NOT_SLOWER if _widen(ratio, high, self.looks) <= beyond else UNCLEAR
 
 
@@ -91,7 +94,12 @@ def _widen(ratio: float, bound: float, together: int) -> float:
 
 
 def against(
-    measured: Measured, controls: Sequence[AaControl], tolerance: float, looks: int, robot: dict[str, str | None]
+    measured: Measured,
+    controls: Sequence[AaControl],
+    tolerance: float,
+    looks: int,
+    robot: dict[str, str | None],
+    deviation: float,
 ) -> Against:
     """Compare this robot with the other one.
 
@@ -101,6 +109,7 @@ def against(
         tolerance: the share by which this robot may be slower.
         looks: how often at most the run is judged.
         robot: the other robot's addresses.
+        deviation: relative standard deviation of the ratio between runs.
     """
     names = measured.plan.series_names()
     judge = Judge(tolerance, len(names) * len(JUDGED), looks)
@@ -109,10 +118,12 @@ def against(
     for name in names:
         for quantile in _SHOWN:
             # The other robot comes first, so that the ratio is this robot's time over the other's.
-            fields = compare_sides(measured, Side("against", name), Side("duel", name), quantile)
+            fields = compare_sides(measured, Side("against", name), Side("duel", name), quantile, deviation)
             change = Change(**name_fields(name), **fields)
+            # A short run has no A/A interval, and may show a large difference all the same.
+            change.judge(known.get((*name, quantile)), deviation, controlled=False)
             if quantile in JUDGED:
-                change.verdict = judge.verdict(change.ratio, change.ci95, known.get((*name, quantile)))
+                change.verdict = judge.verdict(change)
             changes.append(change)
     series = [_series(measured, name) for name in names]
     overall = _overall(changes)

@@ -2,10 +2,12 @@
 
 The A/A control, an interface against itself, is measured in the same blocks and for as long as the comparison. Where
 its own interval does not contain 1, the method is biased in this run, by up to that much. Where the effect lies inside
-its interval, an interface differs as much from itself. Neither is called a difference.
+its interval, an interface differs as much from itself. Neither is called a difference. Nor is one that the six parts
+of the run do not agree about: a process that waits for a processor is slow for seconds, which its blocks share.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -22,6 +24,7 @@ BASE = "rest"
 WEB_SERVICES = (BASE, "soap")
 COMPARED = ("mean", "p50", "p90", "p99")
 Verdict = Literal["differs", "bounded", "noise", "none"]
+CLAIMS = ("differs", "bounded")
 #: An interval that includes both twice as long and half as long is inconclusive.
 _SHARP = 2.0
 
@@ -30,6 +33,7 @@ class Ratio(msgspec.Struct, kw_only=True):
     """Two sides at one quantile, as in latency.json: the second minus the first, and the second divided by the first.
 
     Attributes:
+        parts: the ratios of successive sixths of the run.
         reason: why there is no ratio, or no interval.
     """
 
@@ -42,6 +46,7 @@ class Ratio(msgspec.Struct, kw_only=True):
     ci95_difference_ms: list[float] | None
     rounds: dict[str, Any] | None
     reason: str | None
+    parts: list[float] = []
 
 
 class AaControl(Ratio, kw_only=True):
@@ -50,15 +55,31 @@ class AaControl(Ratio, kw_only=True):
     interface: str
 
 
-class SoapOverRest(Ratio, kw_only=True):
-    """SOAP compared with REST at one quantile, with the claim that the data allow: an entry of `comparisons`."""
+class Judged(Ratio, kw_only=True):
+    """A ratio with the claim that the data allow."""
 
-    difference_ms: float | None = msgspec.field(name="soap_minus_rest_ms")
     between_runs: float | None = None
     noise_ci95: list[float] | None = None
     judgement: str = "none"
     bound: float | None = None
     judgement_reason: str | None = None
+
+    def judge(self, control: Sequence[float] | None, deviation: float, *, controlled: bool = True) -> None:
+        """Judge the ratio by `control`, the interval of the A/A control; `deviation` is in the ratio's interval.
+
+        Without a control nothing is claimed, unless it is not `controlled`.
+        """
+        self.between_runs, self.noise_ci95 = rounded(deviation), rounded_interval(control)
+        limits = control if controlled else control or (1.0, 1.0)
+        found = judge(self.ratio, self.ci95, limits, self.parts) if self.ratio is not None else Judgement("none")
+        self.judgement, self.bound = found.verdict, rounded(found.bound)
+        self.judgement_reason = found.reason or self.reason
+
+
+class SoapOverRest(Judged, kw_only=True):
+    """SOAP compared with REST at one quantile: an entry of `comparisons`."""
+
+    difference_ms: float | None = msgspec.field(name="soap_minus_rest_ms")
 
 
 class OverRest(Ratio, kw_only=True):
@@ -102,11 +123,7 @@ def comparison(
     """Compare SOAP and REST at one quantile, judged by `control`, the interval of the A/A control."""
     rest, soap = (Side("duel", (operation, interface, client)) for interface in WEB_SERVICES)
     entry = SoapOverRest(operation=operation, client=client, **compare_sides(measured, rest, soap, quantile, deviation))
-    entry.between_runs, entry.noise_ci95 = rounded(deviation), rounded_interval(control)
-    interval = None if entry.ci95 is None else (entry.ci95[0], entry.ci95[1])
-    said = judge(entry.ratio, interval, control) if entry.ratio is not None else Judgement("none")
-    entry.judgement, entry.bound = said.verdict, rounded(said.bound)
-    entry.judgement_reason = said.reason or entry.reason
+    entry.judge(control, deviation)
     return entry
 
 
@@ -184,6 +201,7 @@ def compare_sides(
         "ci95_difference_ms": rounded_interval(result.ci95_difference_ms) if result else None,
         "rounds": rounds_of(result.replicates, measured.pair_s(first.phase, first.name)) if result else None,
         "reason": reason,
+        "parts": [round(part, 6) for part in result.parts] if result else [],
     }
 
 
@@ -203,28 +221,33 @@ class Judgement:
     reason: str | None = None
 
 
-def judge(ratio: float, effect: Interval | None, control: Interval | None) -> Judgement:
-    """Judge a ratio by its 95 % interval and by the interval of the A/A control."""
+def judge(
+    ratio: float, effect: Sequence[float] | None, control: Sequence[float] | None, parts: Sequence[float] = ()
+) -> Judgement:
+    """Judge a ratio by its 95 % interval, by the interval of the A/A control, and by whether the run's parts agree."""
     if effect is None or control is None:
         return Judgement("none", reason=f"the run is too short for an {'' if effect is None else 'A/A '}interval")
     if ratio < 1:  # the same question from the other side
-        mirrored = judge(1 / ratio, (1 / effect[1], 1 / effect[0]), (1 / control[1], 1 / control[0]))
+        inverse = [1 / max(part, 1e-9) for part in parts]
+        mirrored = judge(1 / ratio, (1 / effect[1], 1 / effect[0]), (1 / control[1], 1 / control[0]), inverse)
         return mirrored if mirrored.verdict != "bounded" else replace(mirrored, bound=1 / (mirrored.bound or 1.0))
     low, high = effect
     reach = max(control[1], 1 / control[0])
-    biased = not control[0] <= 1 <= control[1]
-    if not biased and ratio > reach and low > 1:
+    biased, agreed = not control[0] <= 1 <= control[1], all(part > 1 for part in parts)
+    if not biased and agreed and ratio > reach and low > 1:
         return Judgement("differs")
-    if biased and (bound := _beyond_bias(ratio, low, control)) > 1:
+    if biased and agreed and (bound := _beyond_bias(ratio, low, control)) > 1:
         return Judgement("bounded", bound, _bias_text(control))
     bound = max(high, 1 / low) * (reach if biased else 1.0)
     if bound > _SHARP:
         return Judgement("none", bound, f"even a factor of {_SHARP:g} is not excluded")
     inside = _bias_text(control) if biased else "an interface differs from itself by as much (A/A control)"
+    if not agreed:
+        inside = f"the {len(parts)} parts of the run do not agree: {min(parts):.2f} to {max(parts):.2f} times"
     return Judgement("noise", bound, inside)
 
 
-def _beyond_bias(ratio: float, low: float, control: Interval) -> float:
+def _beyond_bias(ratio: float, low: float, control: Sequence[float]) -> float:
     """Return the least ratio that is left after the bias that the A/A control shows.
 
     Ratio and bias come from different blocks, so that their uncertainties add as variances do (JCGM 100:2008, GUM,
@@ -234,5 +257,5 @@ def _beyond_bias(ratio: float, low: float, control: Interval) -> float:
     return ratio / max(bias, 1 / bias) * math.exp(-math.hypot(math.log(ratio / low), uncertain))
 
 
-def _bias_text(control: Interval) -> str:
+def _bias_text(control: Sequence[float]) -> str:
     return f"the A/A control came to {min(control):.3f} to {max(control):.3f} times, which does not include 1"

@@ -1,5 +1,6 @@
 """From cells to figures: the series of latency.json."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -9,7 +10,6 @@ from loadtests.statistics.histogram import SHARES, Histogram
 from loadtests.statistics.intervals import Replicates, figure_interval_ms, samples_for_point
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.recorder import Cell
-from loadtests.statistics.rounds import Interval
 
 _WITH_INTERVAL = ("p50", "p99")
 _DIGITS = 6  # nanoseconds
@@ -63,7 +63,7 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else round(value, _DIGITS)
 
 
-def rounded_interval(interval: Interval | None) -> list[float] | None:
+def rounded_interval(interval: Sequence[float] | None) -> list[float] | None:
     """Return an interval as [lower, upper], both rounded to nanoseconds."""
     return None if interval is None else [round(bound, _DIGITS) for bound in interval]
 

@@ -11,7 +11,7 @@ import msgspec
 
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.against import DECIDING, NOT_SLOWER, SLOWER, UNCLEAR, Against, Change
-from loadtests.statistics.comparisons import AaControl, SoapOverRest
+from loadtests.statistics.comparisons import Judged, SoapOverRest
 from loadtests.statistics.counts import Counts
 from loadtests.statistics.figures import Figures, Series, plain_quantiles, rounded
 from loadtests.statistics.histogram import Histogram
@@ -20,7 +20,8 @@ from loadtests.statistics.overload import Overload
 from loadtests.statistics.service_levels import BROKEN, NOT_KNOWN
 
 MOST_CPU = 0.95
-#: How late requests may start, as a share of the median and of the p99 of the service time.
+#: How late requests may start, as a share of the median and of the p99 of the service time in blocks whose requests all
+#: started on time: a generator that waits for a processor measures its own waiting as service time.
 MOST_LAG = {"p50": 0.10, "p99": 0.20}
 #: LEAST_LAG_MS: a process needs this long to wake up, so a shorter lag does not count. LEAST_ACHIEVED: share of the
 #: rate.
@@ -57,7 +58,9 @@ def generator_figures(measured: Measured, cpu_share: float | None) -> GeneratorF
             cell = measured.total(name, phase)
             late += cell.late
             if name[2] == plan.clients[0]:
-                service.merge(cell.service)
+                for block in measured.blocks(name, phase):
+                    if block.cell.late <= block.cell.queued.total:  # late only for want of a free connection
+                        service.merge(block.cell.service)
                 lag.merge(measured.spans(phase, name).lag)
     return GeneratorFigures(
         cpu_share=rounded(cpu_share),
@@ -71,10 +74,9 @@ def generator_figures(measured: Measured, cpu_share: float | None) -> GeneratorF
 
 
 def _lag_limits(service: Histogram) -> Figures:
-    """Return how large the lag may be beside the service time."""
-    times = plain_quantiles(service)
+    """Return how large the lag may be beside the service time of blocks that started on time."""
     return {
-        name: None if (time := times[name]) is None else rounded(max(share * time, LEAST_LAG_MS[name]))
+        name: rounded(max(share * (service.figure_ms(name) or 0.0), LEAST_LAG_MS[name]))
         for name, share in MOST_LAG.items()
     }
 
@@ -179,7 +181,6 @@ class Found:
     most_rate: float | None = None
     series: Sequence[Series] = ()
     comparisons: Sequence[SoapOverRest] = ()
-    controls: Sequence[AaControl] = ()
     against: Against | None = None
     worthless: Sequence[str] = field(default=())
     undecided: Sequence[str] = field(default=())
@@ -202,7 +203,10 @@ def headline(found: Found) -> dict[str, str]:
         else:
             words, sentence = words if found.levels else knees[0], f"{said} {sentence}"
     if found.busy and not found.worthless:
-        sentence += f" Measured on a busy machine ({found.busy}): another run will differ."
+        sentence += (
+            f" Measured on a busy machine ({found.busy}): another run will differ by more than the intervals say, "
+            "most of all at the 99th percentile."
+        )
     return {"words": words, "sentence": sentence}
 
 
@@ -234,15 +238,20 @@ def _knees(searches: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         first = knee["errors_from"]
         yield (
             f"{name} breaks down at {knee['rate']:,.0f} requests/s ({low:,.0f} to {high:,.0f} in {knee['searches']} "
-            f"search{'' if knee['searches'] == 1 else 'es'}{_sureness(knee.get('confidence'))})"
+            f"search{'' if knee['searches'] == 1 else 'es'}{_sureness(knee)})"
             + ("" if first is None else f"; requests failed from {first:,.0f} requests/s on")
             + ("; the generator, not the robot, was the limit" if knee["limited_by"] == "generator" else "")
         )
 
 
-def _sureness(confidence: float | None) -> str:
+def _sureness(knee: Mapping[str, Any]) -> str:
     """Return how sure it is that the knee lies between the searches' results, where that is less than usual."""
-    return "" if confidence is None or confidence >= _SURE else f", {confidence:.0%} sure"
+    few, needed, confidence = knee.get("step_requests"), knee.get("needed_requests", 0), knee.get("confidence") or 0.0
+    if few is not None and few < needed:
+        return f"; not sure: a step had {few:,} requests, and its criterion needs {needed:,}: longer --step-duration"
+    if knee["searches"] == 1:
+        return ", whose error only more searches show"
+    return "" if confidence >= _SURE else f", which enclose the true rate with a probability of {confidence:.0%}"
 
 
 def _answered_text(found: Found) -> str:
@@ -270,11 +279,11 @@ def _levels(outcomes: Sequence[str]) -> str | None:
 def _result_words(found: Found) -> tuple[str, str]:
     """Return two forms of the result, a few words and a sentence, for a run without service levels or errors."""
     if found.against is not None:
-        return _AGAINST[found.against.verdict], _other_robot(found, found.against)
+        return _other_robot(found, found.against)
     medians = [entry for entry in found.comparisons if entry.quantile == DECIDING]
     if medians:
         leading = min(medians, key=_rank)
-        words, sentence = _median_words(leading)
+        words, sentence = _ratio_words(leading, _TWO_INTERFACES)
         tail = next(
             entry
             for entry in found.comparisons
@@ -326,28 +335,34 @@ def _between(bounds: Sequence[float] | None, least: int = 2) -> str:
     return f"{low:.{digits}f} to {high:.{digits}f}"
 
 
-def _median_words(entry: SoapOverRest) -> tuple[str, str]:
-    """Return two forms of the comparison of a median, a few words and a sentence."""
+_TWO_INTERFACES = ("SOAP takes {} times as long as REST", "SOAP and REST")
+_TWO_ROBOTS = ("This robot takes {} times as long as the other one", "the two robots")
+
+
+def _ratio_words(entry: Judged, names: tuple[str, str]) -> tuple[str, str]:
+    """Return two forms of a comparison, a few words and a sentence; `names` are a claim and the two sides."""
+    claim, sides = names
+    where = "at the median" if entry.quantile == DECIDING else "at the 99th percentile"
+    control = f"A/A control {_between(entry.noise_ci95)}" if entry.noise_ci95 else "no A/A control"
     sure = f"95 % interval {_between(entry.ci95)}"
-    control = f"A/A control {_between(entry.noise_ci95)}"
     if entry.judgement == "differs":
-        words = f"SOAP takes {entry.ratio:.2f} times as long as REST"
-        return words, f"{words} at the median ({sure}, {control}; {_more(entry.difference_ms)})"
+        words = claim.format(f"{entry.ratio:.2f}")
+        return words, f"{words} {where} ({sure}, {control}; {_more(entry.difference_ms)})"
     if entry.judgement == "bounded":
-        words = f"SOAP takes {_least(entry)} times as long as REST"
-        return words, f"{words} at the median ({sure}, corrected by this run's {control})"
+        words = claim.format(_least(entry))
+        return words, f"{words} {where} ({sure}, corrected by this run's {control})"
     if entry.judgement == "noise":
-        words = "No significant difference between SOAP and REST"
-        return words, f"{words} at the median ({sure}, {control}; a factor beyond {entry.bound:.2f} is excluded)"
-    words = "The comparison of SOAP and REST is inconclusive"
-    return words, f"{words} at the median ({entry.judgement_reason})"
+        words = f"No significant difference between {sides}"
+        return words, f"{words} {where} ({sure}, {control}; a factor beyond {entry.bound:.2f} is excluded)"
+    words = f"The comparison of {sides} is inconclusive"
+    return words, f"{words} {where} ({entry.judgement_reason})"
 
 
-def _least(entry: SoapOverRest) -> str:
+def _least(entry: Judged) -> str:
     return f"{'at least' if (entry.bound or 0.0) > 1 else 'at most'} {entry.bound:.2f}"
 
 
-def _tail(entry: SoapOverRest) -> str:
+def _tail(entry: Judged) -> str:
     """Return the second half of a sentence: the comparison of the p99."""
     if entry.judgement == "differs":
         return f", and {entry.ratio:.2f} times at the 99th percentile ({_between(entry.ci95)})"
@@ -358,30 +373,22 @@ def _tail(entry: SoapOverRest) -> str:
     return "; 99th percentile: inconclusive"
 
 
-def _other_robot(found: Found, compared: Against) -> str:
-    """Return the change that decides the verdict: of several, the one with the highest upper bound."""
+def _other_robot(found: Found, compared: Against) -> tuple[str, str]:
+    """Return verdict and sentence of the change that decides: of several, the one with the highest upper bound."""
+    words = _AGAINST[compared.verdict]
     deciding = [change for change in compared.changes if change.ci95 and change.verdict == compared.verdict]
     if not deciding:
-        return "No figure of the two robots has an interval: measure longer."
+        return words, "No figure of the two robots has an interval: measure longer."
     leading = max(deciding, key=lambda change: (change.quantile == DECIDING, (change.ci95 or [0.0])[-1]))
-    where = "the median" if leading.quantile == DECIDING else "the 99th percentile"
-    control = next((entry.ci95 for entry in found.controls if _figure(entry) == _figure(leading)), None)
-    itself = f", A/A control {_between(control)}" if control else ""
-    sure = f"95 % interval {_between(leading.ci95)}{itself}; {_more(leading.difference_ms)}"
     tail = next(change for change in compared.changes if _figure(change) == (*_figure(leading)[:3], _TAIL))
-    also = (
-        f", and {tail.ratio:.2f} times at the 99th percentile ({_between(tail.ci95)}),"
-        if tail is not leading and tail.ci95
-        else ","
-    )
-    return (
-        f"This robot takes {leading.ratio:.2f} times as long as the other one at {where} ({sure}){also} where "
+    return words, (
+        f"{_ratio_words(leading, _TWO_ROBOTS)[1]}{'' if tail is leading else _tail(tail)}; "
         f"{1 + compared.tolerance:.4g} times is tolerated: {leading.operation} over "
         f"{leading.interface.upper()}, {_how(leading, found)}."
     )
 
 
-def _figure(entry: AaControl | Change) -> tuple[str, str, str, str]:
+def _figure(entry: Change) -> tuple[str, str, str, str]:
     return entry.operation, entry.interface, entry.client, entry.quantile
 
 
@@ -391,7 +398,7 @@ def _alone(entry: Series, found: Found) -> tuple[str, str]:
     tail = (
         "; they are too few for a 99th percentile"
         if entry.service_ms[_TAIL] is None
-        else f", and 99 of 100 take {_at_most(entry, _TAIL)}{_sure(entry, _TAIL)}"
+        else f", and 99 of 100 take {_at_most(entry, _TAIL)}{'' if found.busy else _sure(entry, _TAIL)}"
     )
     return words, f"{words}{_sure(entry, DECIDING)}{tail}: {_how(entry, found)}."
 
@@ -409,7 +416,7 @@ def _at_most(entry: Series, quantile: str) -> str:
 
 def _sure(entry: Series, quantile: str) -> str:
     bounds = entry.ci95_ms[quantile]
-    return f" (95 % interval {_ms(bounds[0])} to {_ms(bounds[1])} ms)" if bounds else ""
+    return f" (95 % interval within this run {_ms(bounds[0])} to {_ms(bounds[1])} ms)" if bounds else ""
 
 
 def _two_modes(series: Sequence[Series]) -> str:

@@ -19,6 +19,8 @@ from conformance.statement.load import ServiceLevel
 from loadtests.schedule.arrivals import arrivals_due
 from loadtests.schedule.plan import Plan
 from loadtests.statistics.figures import rounded, rounded_interval
+from loadtests.statistics.histogram import SHARES
+from loadtests.statistics.intervals import samples_for_interval
 from loadtests.statistics.measured import Measured, counted_times
 from loadtests.statistics.recorder import Recorder
 
@@ -50,6 +52,11 @@ class Criterion:
         """Return the criterion by an operation's service level, or the usual one."""
         most = level.limits.items() if level else ()
         return cls({name.removesuffix("_ms"): ms for name, ms in most if name.endswith("_ms")} or {"p99": _MOST_P99_MS})
+
+    @property
+    def needed_requests(self) -> int:
+        """Return how many requests a step must have, so that its quantiles are known at all."""
+        return max(samples_for_interval(SHARES[quantile]) for quantile in self.limits)
 
     def words(self) -> str:
         """Return the criterion as a sentence."""
@@ -84,6 +91,11 @@ class Step(msgspec.Struct, kw_only=True):
     reason: str | None
     cpu_share: float | None = None
     lag_p99_ms: float | None = None
+
+    @property
+    def requests(self) -> int:
+        """Return how many requests were due in the step."""
+        return self.count + self.errors + self.dropped
 
     @property
     def limited_by_generator(self) -> bool:
@@ -189,8 +201,11 @@ class Search:
         return min(max(rate, self.lowest), self.highest)
 
 
-def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[str, Any]:
-    """Return the combined result of all searches for the knee of one interface."""
+def knee_search(interface: str, criterion: Criterion, searches: list[Search]) -> dict[str, Any]:
+    """Return the combined result of all searches for the knee of one interface.
+
+    With too few requests in a step that kept the criterion, there is no confidence: that nothing was slow is chance.
+    """
     found = [(search, estimate) for search in searches if (estimate := search.estimate()) is not None]
     estimates = [estimate for _, estimate in found]
     trials = [trial for search in searches for trial in search.tried]
@@ -198,15 +213,19 @@ def knee_search(interface: str, criterion: str, searches: list[Search]) -> dict[
     busy = sum(trial.limited_by_generator for trial in missed)
     kept = [search.floor for search in searches if search.floor is not None]
     failing = [trial.offered_rate for trial in trials if trial.errors or trial.dropped]
+    requests = min((search.results[floor].requests for search, _ in found if (floor := search.floor)), default=None)
+    enough = requests is not None and requests >= criterion.needed_requests
     lowest = min((search.floor or 0.0 for search, _ in found), default=0.0)
     highest = max((search.ceiling or 0.0 for search, _ in found), default=0.0)
     return {
         "interface": interface,
-        "criterion": criterion,
+        "criterion": criterion.words(),
         "searches": len(searches),
         "rate": rounded(math.exp(sum(map(math.log, estimates)) / len(estimates))) if estimates else None,
         "interval": rounded_interval((lowest, highest)) if estimates else None,
-        "confidence": rounded(1 - 2.0 ** (1 - len(estimates))) if estimates else None,
+        "step_requests": requests,
+        "needed_requests": criterion.needed_requests,
+        "confidence": rounded(1 - 2.0 ** (1 - len(estimates))) if estimates and enough else None,
         "brackets": [[rounded(search.floor), rounded(search.ceiling)] for search in searches],
         "held_up_to": rounded(max(kept, default=None)) if not estimates and kept else None,
         "errors_from": rounded(min(failing, default=None)),

@@ -12,9 +12,10 @@ for every unit.
 """
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -192,12 +193,11 @@ IDLE_MACHINE, BUSY_MACHINE = 0.01, 0.02
 _REACH = 1.959964  # standard deviations to either side hold 95 %
 
 
-def between_runs(machine: dict[str, Any], cpus: int, repeats: int) -> float:
-    """Return the standard deviation between runs, by the `machine` of the environment; 0 where repeats show it."""
+def between_runs(load: Sequence[float] | None, repeats: int = 1) -> float:
+    """Return the standard deviation between runs, by the load averages before the run; 0 where repeats show it."""
     if repeats >= LEAST_REPEATS:
         return 0.0
-    load = machine["load_average_before"]
-    return BUSY_MACHINE if load is not None and load > cpus else IDLE_MACHINE
+    return BUSY_MACHINE if load and load[0] > (os.cpu_count() or 1) else IDLE_MACHINE
 
 
 def widened_ratio(ratio: float, interval: Interval, deviation: float) -> Interval:

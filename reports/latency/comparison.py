@@ -21,6 +21,8 @@ from reports.latency.distributions import AllSeries, Series, all_series
 from reports.latency.numbers import rate
 
 QUANTILES = ("p50", "p99")
+#: Share by which a quantile must change to count where one run met a busy machine: equal p99s were 50 times apart.
+_BUSY = {"p50": 1.0, "p99": 99.0}
 _ASCENDING = ("p50", "p90", "p99")
 _CONFIDENCE = 0.95
 TIMES = {"service": ("service_ms", "ci95_ms"), "response": ("response_ms", "response_ci95_ms")}
@@ -95,13 +97,12 @@ class Comparison:
     def busy(self) -> str:
         """Return what to do where a machine was busy; empty where none was."""
         for word, result in (("old", self.old), ("new", self.new)):
-            environment = result["environment"]
-            load = (environment.get("machine") or {}).get("load_average_before")
-            if load is not None and load > environment["cpus"]:
+            if load := _busy_load(result):
                 return (
-                    f"The machine was busy before the {word} run (load average {load:.1f} on {environment['cpus']} "
-                    "CPUs), and two runs meet different disturbances: to be sure, measure both versions in one run "
-                    "with roaas load --against."
+                    f"The machine was busy before the {word} run (load average {load:.1f} on "
+                    f"{result['environment']['cpus']} CPUs), and two runs meet different disturbances. So a median "
+                    "counts only if it doubles, a p99 only if it grows a hundredfold. To be sure, measure both "
+                    "versions in one run with roaas load --against."
                 )
         return ""
 
@@ -109,6 +110,12 @@ class Comparison:
     def slower(self) -> bool:
         """Return whether any quantile got slower beyond its threshold."""
         return bool(self.with_verdict("slower"))
+
+
+def _busy_load(result: Mapping[str, Any]) -> float | None:
+    """Return the load average before a run that found the machine busy."""
+    load: float | None = (result["environment"].get("machine") or {}).get("load_average_before")
+    return load if load is not None and load > result["environment"]["cpus"] else None
 
 
 def _uncertainty(change: Change) -> tuple[float, float]:
@@ -136,10 +143,12 @@ def compare(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, st
         raise ResultsIncompatibleError(f"the two results have no series in common ({held})")
     noise = [*old.get("noise_floor", []), *new.get("noise_floor", [])]
     lag = _lag(old, new)
+    busy = _busy_load(old) or _busy_load(new)
+    least = {quantile: max(threshold, _BUSY[quantile] if busy else 0.0) for quantile in QUANTILES}
     drafts = [
         replace(change, lag_ms=lag[change.quantile] if change.time == "response" else 0.0)
         for key in common
-        for change in _changes(old_series[key], new_series[key], noise, threshold)
+        for change in _changes(old_series[key], new_series[key], noise, least)
     ]
     together = sum(change.interval is not None for change in drafts)
     changes = tuple(_settle(change, together, threshold) for change in drafts)
@@ -188,14 +197,16 @@ def _same_cap(old: Mapping[str, Any], new: Mapping[str, Any], names: tuple[str, 
         )
 
 
-def _changes(old: Series, new: Series, noise: Sequence[Mapping[str, Any]], threshold: float) -> Iterator[Change]:
+def _changes(
+    old: Series, new: Series, noise: Sequence[Mapping[str, Any]], least: Mapping[str, float]
+) -> Iterator[Change]:
     for time, (values, bounds) in TIMES.items():
         if time == "response" and new.data[values] == new.data["service_ms"]:
             continue  # in the closed model both times are the same
         for quantile in QUANTILES:
             before, after = old.data[values].get(quantile), new.data[values].get(quantile)
             intervals = (old.data.get(bounds, {}).get(quantile), new.data.get(bounds, {}).get(quantile))
-            limit = max(threshold, noise_of(noise, new, quantile))
+            limit = max(least[quantile], noise_of(noise, new, quantile))
             ratio = after / before if before and after is not None else None
             interval = ratio_interval(before, intervals[0], after, intervals[1])
             operation, client, interface = new.key

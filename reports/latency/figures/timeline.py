@@ -19,8 +19,9 @@ _LINES = (("p99_ms", "-", "99 %"), ("p95_ms", "-.", "95 %"), ("p50_ms", "--", "m
 @picture(
     "load",
     "Response time and throughput over the offered rate. The shaded region is where the knee lies: below it all "
-    "searches kept the criterion, above it none did. A hollow marker is a rate that did not keep it. Of several trials "
-    "of a rate the median is drawn. Where throughput leaves the dotted line, the robot answers less than it is asked.",
+    "searches kept the criterion, above it none did. A filled marker is the median of a rate's trials that kept it, a "
+    "hollow one that of its trials that missed it: a rate with both is uncertain. Where throughput leaves the dotted "
+    "line, the robot answers less than it is asked.",
 )
 def load(result: Mapping[str, Any]) -> Iterator[Panel]:
     """Yield a panel of latency for each interface whose knee was searched, and one of throughput."""
@@ -32,14 +33,14 @@ def load(result: Mapping[str, Any]) -> Iterator[Panel]:
 
 
 def _curve(search: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return a point for each rate, with the medians of its trials."""
-    trials: defaultdict[float, list[Mapping[str, Any]]] = defaultdict(list)
+    """Return a point for the trials of each rate that kept the criterion and one for those that missed it: medians."""
+    trials: defaultdict[tuple[float, bool], list[Mapping[str, Any]]] = defaultdict(list)
     for trial in search.get("curve", []):
         if trial["offered_rate"] > 0:
-            trials[trial["offered_rate"]].append(trial)
+            trials[trial["offered_rate"], not trial["meets"]].append(trial)
     points = []
-    for rate, found in sorted(trials.items()):
-        point: dict[str, Any] = {"rate": rate, "meets": any(trial["meets"] for trial in found)}
+    for (rate, missed), found in sorted(trials.items()):
+        point: dict[str, Any] = {"rate": rate, "meets": not missed}
         for key in ("achieved_rate", "p50_ms", "p95_ms", "p99_ms"):
             values = [trial[key] for trial in found if trial.get(key) is not None]
             point[key] = median(values) if values else None

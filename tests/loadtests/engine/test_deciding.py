@@ -7,7 +7,7 @@ from loadtests.engine.planning import until_decided
 from loadtests.schedule.arrivals import Schedule
 from loadtests.schedule.plan import Load, Plan
 from loadtests.settings.settings import Against
-from loadtests.statistics.against import NOT_SLOWER, SLOWER, UNCLEAR, Judge, against
+from loadtests.statistics.against import NOT_SLOWER, SLOWER, UNCLEAR, Change, Judge, against
 from loadtests.statistics.comparisons import aa_controls
 from loadtests.statistics.measured import Measured
 from loadtests.statistics.overload import Liveness
@@ -44,13 +44,13 @@ class Bench:
 
     def decided(self, is_over=lambda: False):
         self.carry_out(PLAN)
-        return until_decided(PLAN, OTHER, self.recorder, self.carry_out, is_over, lambda _: None)
+        return until_decided(PLAN, OTHER, self.recorder, 0.01, self.carry_out, is_over, lambda _: None)
 
     @property
     def verdict(self):
         self.recorder.flush()
         measured = Measured(self.plans, self.recorder)
-        return against(measured, aa_controls(measured), 0.05, 3, {}).verdict
+        return against(measured, aa_controls(measured), 0.05, 3, {}, 0.01).verdict
 
 
 @pytest.mark.parametrize(("slower", "verdict"), [(1.0, NOT_SLOWER), (1.3, SLOWER)])
@@ -82,12 +82,22 @@ def test_nothing_more_is_measured_once_the_run_is_over():
     assert Bench(3.0).decided(is_over=lambda: True).part == 0
 
 
+def change(ratio, ci95, parts=()):
+    found = Change(**dict.fromkeys(Change.__struct_fields__) | {"ratio": ratio, "ci95": ci95, "parts": list(parts)})
+    found.judge([0.9, 1.1], 0.01)
+    return found
+
+
 def test_who_is_judged_several_times_has_wider_intervals():
-    interval, control = [0.97, 1.045], [0.9, 1.1]
-    assert Judge(0.05, 2).verdict(1.0, interval, control) == NOT_SLOWER
-    assert Judge(0.05, 2, looks=3).verdict(1.0, interval, control) == UNCLEAR
-    assert Judge(0.05, 2).verdict(1.2, [1.08, 1.3], control) == SLOWER
-    assert Judge(0.05, 2, looks=3).verdict(1.2, [1.08, 1.3], control) == UNCLEAR
+    assert Judge(0.05, 2).verdict(change(1.0, [0.97, 1.045])) == NOT_SLOWER
+    assert Judge(0.05, 2, looks=3).verdict(change(1.0, [0.97, 1.045])) == UNCLEAR
+    assert Judge(0.05, 2).verdict(change(1.2, [1.08, 1.3])) == SLOWER
+    assert Judge(0.05, 2, looks=3).verdict(change(1.2, [1.08, 1.3])) == UNCLEAR
+
+
+def test_a_robot_is_slower_only_if_all_parts_of_the_run_show_it():
+    assert Judge(0.05, 2).verdict(change(1.2, [1.08, 1.3], [1.1, 1.3, 1.2, 1.15, 1.4, 1.2])) == SLOWER
+    assert Judge(0.05, 2).verdict(change(1.2, [1.08, 1.3], [1.9, 0.9, 1.2, 1.0, 2.4, 1.2])) == UNCLEAR
 
 
 @pytest.mark.parametrize("report_s", [0.0, 1.0])

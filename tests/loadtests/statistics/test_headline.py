@@ -62,19 +62,27 @@ def test_a_duel_says_what_was_judged(median, tail, sentence):
 def test_another_robot_is_judged_by_the_figure_that_decides():
     known = {"operation": "pose", "interface": "rest", "client": "wire", "difference_ms": -0.02, "ci95": [0.7, 0.9]}
     known |= {"ci95_difference_ms": None, "rounds": None, "reason": None, "verdict": "not slower"}
+    known |= {"judgement": "differs", "noise_ci95": [0.97, 1.04]}
     changes = [Change(quantile=q, ratio=r, **known) for q, r in (("p50", 0.8), ("p99", 0.85))]
     compared = Against(robot={}, tolerance=0.05, verdict="not slower", changes=changes, series=[])
     found = headline(replace(FOUND, against=compared))
     assert found["words"] == "Not slower than the other robot"
     assert found["sentence"] == (
-        "This robot takes 0.80 times as long as the other one at the median (95 % interval 0.70 to 0.90; 0.020 ms "
-        "less), and 0.85 times at the 99th percentile (0.70 to 0.90), where 1.05 times is tolerated: pose over REST, "
-        "wire client, 200 requests/s."
+        "This robot takes 0.80 times as long as the other one at the median (95 % interval 0.70 to 0.90, A/A control "
+        "0.97 to 1.04; 0.020 ms less), and 0.85 times at the 99th percentile (0.70 to 0.90); 1.05 times is tolerated: "
+        "pose over REST, wire client, 200 requests/s."
+    )
+    for change in changes:
+        change.judgement, change.bound = "noise", 1.4
+    assert headline(replace(FOUND, against=compared))["sentence"] == (
+        "No significant difference between the two robots at the median (95 % interval 0.70 to 0.90, A/A control 0.97 "
+        "to 1.04; a factor beyond 1.40 is excluded); 99th percentile: not significant (a factor beyond 1.40 is "
+        "excluded); 1.05 times is tolerated: pose over REST, wire client, 200 requests/s."
     )
 
 
 def test_one_interface_alone_says_how_long_it_takes():
-    half = "Half of the pose requests over REST take at most 0.074 ms (95 % interval 0.073 to 0.075 ms)"
+    half = "Half of the pose requests over REST take at most 0.074 ms (95 % interval within this run 0.073 to 0.075 ms)"
     found = headline(replace(FOUND, series=[series()]))
     assert found["sentence"] == f"{half}, and 99 of 100 take at most 0.400 ms: wire client, 200 requests/s."
     failed = headline(replace(FOUND, series=[series(at_least=("p99", "max"))]))
@@ -118,12 +126,39 @@ def test_a_cap_on_a_closed_model_is_part_of_its_figures():
 
 
 def test_the_knee_leads_a_run_that_searched_for_it():
-    knee = {"interface": "rest", "rate": 315, "interval": [308, 322], "searches": 1, "errors_from": None}
+    knee = {"interface": "rest", "rate": 315, "interval": [308, 322], "searches": 5, "errors_from": None}
+    knee |= {"confidence": 0.9375, "step_requests": 900, "needed_requests": 368}
     none = {"interface": "soap", "rate": None, "held_up_to": 2000}
     run = replace(FOUND, series=[series()], knees=[knee | {"limited_by": "robot"}, none])
     said = (
-        "REST breaks down at 315 requests/s (308 to 322 in 1 search). SOAP did not break down up to 2,000 requests/s."
+        "REST breaks down at 315 requests/s (308 to 322 in 5 searches). SOAP did not break down up to 2,000 requests/s."
     )
-    assert headline(run)["words"] == "REST breaks down at 315 requests/s (308 to 322 in 1 search)"
+    assert headline(run)["words"] == "REST breaks down at 315 requests/s (308 to 322 in 5 searches)"
     assert headline(run)["sentence"].startswith(f"{said} Half of the ")
     assert headline(replace(run, undecided=["9 failed"]))["sentence"].endswith(f"because 9 failed. {said}")
+
+
+@pytest.mark.parametrize(
+    ("known", "words"),
+    [
+        ({"searches": 1, "confidence": 0.0}, "in 1 search, whose error only more searches show)"),
+        ({"confidence": 0.75}, "in 3 searches, which enclose the true rate with a probability of 75%)"),
+        ({"confidence": None, "step_requests": 75}, "not sure: a step had 75 requests, and its criterion needs 368"),
+    ],
+)
+def test_a_knee_claims_no_more_than_its_searches_and_requests_show(known, words):
+    knee = {"interface": "rest", "rate": 315, "interval": [308, 322], "searches": 3, "errors_from": None}
+    knee |= {"limited_by": "robot", "step_requests": 900, "needed_requests": 368}
+    assert words in headline(replace(FOUND, series=[series()], knees=[knee | known]))["words"]
+
+
+def test_a_run_on_a_busy_machine_gives_no_interval_for_its_p99():
+    entry = series()
+    entry.ci95_ms["p99"] = [0.3, 0.5]
+    assert (
+        "0.400 ms (95 % interval within this run 0.300 to 0.500 ms)"
+        in headline(replace(FOUND, series=[entry]))["sentence"]
+    )
+    busy = headline(replace(FOUND, series=[entry], busy="load average 9.0 on 2 CPUs"))["sentence"]
+    assert "99 of 100 take at most 0.400 ms: " in busy
+    assert "another run will differ by more than the intervals say, most of all at the 99th percentile" in busy

@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from loadtests.statistics.knee import RESOLUTION, Step, knee_search, search_again
+from loadtests.statistics.knee import RESOLUTION, Criterion, Step, knee_search, search_again
+
+P99 = Criterion({"p99": 50.0})
 
 
-def robot(knee, tried=None):
+def robot(knee, tried=None, seconds=10):
     """What an attempt finds on a robot that gives way at a rate."""
 
     def attempt(rate, search):
@@ -18,6 +20,7 @@ def robot(knee, tried=None):
         meets = rate < knee
         known = dict.fromkeys(Step.__struct_fields__) | {"offered_rate": rate, "meets": meets, "dropped": 0}
         known |= {"errors": 0 if rate < 2 * knee else 3, "reason": None if meets else "too slow"}
+        known["count"] = int(rate * seconds)
         return Step(**known | {"cpu_share": 0.2})
 
     return attempt
@@ -26,7 +29,7 @@ def robot(knee, tried=None):
 @given(st.floats(60, 40_000))
 def test_every_search_encloses_the_knee_in_few_steps(knee):
     tried = []
-    found = knee_search("rest", "p99 below 50 ms", search_again(5, (50, 50_000), robot(knee, tried)))
+    found = knee_search("rest", P99, search_again(5, (50, 50_000), robot(knee, tried)))
     assert found["interval"][0] <= knee <= found["interval"][1]
     for kept, missed in found["brackets"]:
         assert kept < knee <= missed
@@ -34,6 +37,14 @@ def test_every_search_encloses_the_knee_in_few_steps(knee):
     assert found["confidence"] == pytest.approx(0.9375)
     assert len(tried) <= 28 + 4 * 16, "what missed is tried twice"
     assert found["limited_by"] == "robot"
+
+
+def test_steps_of_few_requests_know_no_p99():
+    found = knee_search("rest", P99, search_again(5, (50, 50_000), robot(100, seconds=1)))
+    assert (found["confidence"], found["needed_requests"]) == (None, 368)
+    assert 90 <= found["step_requests"] <= 100
+    median = knee_search("rest", Criterion({"p50": 50.0}), search_again(5, (50, 50_000), robot(100, seconds=1)))
+    assert median["confidence"] == pytest.approx(0.9375)
 
 
 def test_a_rate_that_missed_by_chance_ends_no_branch():
@@ -45,7 +56,7 @@ def test_a_rate_that_missed_by_chance_ends_no_branch():
         unlucky = rate == 200 or (rate > 600 and tried.count(rate) == 1)
         return msgspec.structs.replace(trial, meets=trial.meets and not unlucky)
 
-    found = knee_search("rest", "…", search_again(3, (50, 50_000), attempt))
+    found = knee_search("rest", P99, search_again(3, (50, 50_000), attempt))
     assert all(kept < 900 <= missed for kept, missed in found["brackets"])
     assert {point.offered_rate for point in found["curve"]} == set(tried)
 
@@ -63,9 +74,9 @@ def test_a_miss_while_the_generator_was_late_is_tried_again():
 
 
 def test_what_lies_beyond_the_limits_is_not_guessed():
-    above = knee_search("rest", "…", search_again(2, (50, 400), robot(1e6)))
+    above = knee_search("rest", P99, search_again(2, (50, 400), robot(1e6)))
     assert (above["rate"], above["interval"], above["held_up_to"]) == (None, None, 400)
-    below = knee_search("rest", "…", search_again(2, (50, 400), robot(1)))
+    below = knee_search("rest", P99, search_again(2, (50, 400), robot(1)))
     assert (below["rate"], below["held_up_to"], below["brackets"]) == (None, None, [[None, 50]] * 2)
 
 

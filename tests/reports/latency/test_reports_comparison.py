@@ -57,6 +57,9 @@ def test_where_a_machine_was_busy_one_run_with_both_is_the_way(latency):
     for new in (scaled(latency, 1.2, "soap"), scaled(latency, 1.01)):
         told = verdict(compared(latency, new, 0.001)).sentence
         assert "in one run with roaas load --against" in told
+    assert not compared(latency, scaled(latency, 1.5)).slower, "two runs on a busy machine differ by as much"
+    doubled = compared(latency, scaled(latency, 3.0))
+    assert {change.quantile for change in doubled.with_verdict("slower")} == {"p50"}, "no p99 is known there"
 
 
 def test_faster_is_no_failure(latency):
