@@ -9,6 +9,7 @@ from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import quote
 
+from conformance.api.rest.patches import same
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
@@ -35,6 +36,7 @@ _EARLIER: Final = re.compile(r"\b(?:previous(?:ly)?|former(?:ly)?|old|before|pri
 _SEEN: Final = 2
 # How many different numbers must be answered by the same one.
 _NUMBERS: Final = 3
+_READ: Final = "description/written-is-read"
 # Writes that are remembered until a read shows what they did.
 _MOST: Final = 200
 
@@ -107,8 +109,7 @@ class Answers:
                 found = f"{told[name]}, whatever was sent from {min(asked)} to {max(asked)}"
                 cause = f"{operation.label} {name} stuck"
                 doubt = "" if "integer" in kinds_of(parts[name]) else "it may be what the device measures"
-                id_ = "description/written-is-read"
-                yield occasion.case(id_, not is_stuck, expected, found, cause=cause, doubt=doubt)
+                yield occasion.case(_READ, not is_stuck, expected, found, cause=cause, doubt=doubt)
 
     def _judge(self, occasion: Occasion, item: Operation, write: Occasion) -> Iterator[Case]:
         """Judge whether the response to a write shows what was sent, as the next read does."""
@@ -120,21 +121,28 @@ class Answers:
         schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
         told = object_in(read_json(answer.body).value, names)
         now = object_in(read_json(occasion.response.body).value, names)
+        is_later = answer.status == HTTPStatus.ACCEPTED
         for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
             seen, key = {name: now[name]}, (operation.label, name)
             if flat(own[name]) != flat(shape[name]) or is_shared(name):
                 continue
-            if any(differences({name: sent[name]}, seen, schema, item.shape, self._collections)):
+            if wrong := next(differences({name: sent[name]}, seen, schema, item.shape, self._collections), ""):
                 self._late.add(key)
+                # What is created later than it is answered, is judged as what is created at once.
+                is_told = is_later and same(told[name], now[name])
+                self._untrue[key] |= {write.request.body} if is_told else set()
+                if is_told and len(self._untrue[key]) >= _SEEN:
+                    expected = f"{clip(sent[name])} as {name}, as it was sent"
+                    yield write.case(_READ, False, expected, wrong, cause=f"{operation.label} {name}")  # noqa: FBT003
             if key in self._late:
                 continue
             other = next(differences(seen, told, schema, item.shape, self._collections), "")
             self._untrue[key] |= {write.request.body} if other else set()
             if not other or len(self._untrue[key]) >= _SEEN:
                 expected = f"{clip(now[name])} as {name}, as it was sent and as the next GET shows it"
-                cause, is_later = f"{operation.label} told", answer.status == HTTPStatus.ACCEPTED
+                cause = f"{operation.label} told"
                 doubt = "the response may show the state before the request" if is_later else ""
-                yield write.case("description/written-is-read", not other, expected, other, cause=cause, doubt=doubt)
+                yield write.case(_READ, not other, expected, other, cause=cause, doubt=doubt)
 
 
 def _is_number(value: Any) -> bool:

@@ -242,6 +242,7 @@ class Memory:
         overlaps = before is not None and occasion.sent_s < before.changed_s
         if status == HTTPStatus.ACCEPTED or overlaps or not occasion.context.is_simple:
             return
+        yield from self._judge_put(occasion, operation, before)
         thing = _Thing.of(path, occasion.exchange, made=status == HTTPStatus.CREATED)
         if occasion.request.method == "DELETE":
             thing.gone, thing.own, thing.ends = True, path in self._made, ending_with(operation)
@@ -257,6 +258,18 @@ class Memory:
                 thing.written[name] = value, operation
                 thing.shown.pop(name, None)
         self._things[path.casefold()] = thing
+
+    @staticmethod
+    def _judge_put(occasion: Occasion, put: Operation, before: _Thing | None) -> Iterator[Case]:
+        """Judge whether a PUT tells by 201 that it has created a thing, and by other statuses that it replaced one."""
+        is_new, status = before is not None and before.gone and before.absent, occasion.response.status
+        if put.method == "PUT" and before is not None and (is_new or not before.gone):
+            expected = f"status 201, as a GET after {before.change} found nothing" if is_new else "status 200 or 204"
+            expected += "" if is_new else f", as a thing was there after {before.change}"
+            holds, known = (status == HTTPStatus.CREATED) is bool(is_new), {"201"} if is_new else {"200", "204"}
+            doubt = "" if known & put.responses.keys() else "the description has no other status"
+            id_, cause = "description/created-is-there", f"{put.label} status {status}"
+            yield occasion.case(id_, holds, expected, f"status {status}", cause=cause, doubt=doubt)
 
     def _again(self, occasion: Occasion, delete: Operation, before: _Thing | None) -> Iterator[Case]:
         """Judge a DELETE of what is gone already, if it is declared how that is answered."""
@@ -317,12 +330,15 @@ class Memory:
             found = urlsplit(joined(url, value)) if value and is_same(joined(url, value), url) else None
             base = urlsplit(url.removesuffix(occasion.context.target)).path
             there = _path_in(found.path.removeprefix(base)) if found is not None and not found.query else path
+            is_whole = found is None or found.path.startswith(base)
             near = {above, above.rpartition("/")[0]}
             if there.rpartition("/")[0] in near and there.count("/") == path.count("/"):
-                holds, expected = there.casefold() == path.casefold(), f"{name}: {path}, where the created thing is"
+                holds = is_whole and there.casefold() == path.casefold()
+                expected = f"{name}: {base}{path}, where the created thing is"
+                doubt = "" if is_whole else "the thing may be there as well"
                 label = occasion.operation.label if occasion.operation else ""
                 id_ = "description/created-is-there"
-                yield occasion.case(id_, holds, expected, f"{name}: {value}", cause=f"{label} {name}")
+                yield occasion.case(id_, holds, expected, f"{name}: {value}", cause=f"{label} {name}", doubt=doubt)
 
     def _defaults(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
         """Judge whether omitted members of a created thing have their defaults; a single failure may be chance."""

@@ -11,6 +11,7 @@ from conformance.checkers import declared, fields, problem, texts
 from conformance.checkers.answers import Answers
 from conformance.checkers.changes import Changes, Transitions
 from conformance.checkers.codings import Codings
+from conformance.checkers.commands import Commands
 from conformance.checkers.contents import Contents
 from conformance.checkers.entity_tags import Conditional, EntityTags
 from conformance.checkers.entries import Entries
@@ -49,11 +50,11 @@ class Histories:
     def __init__(self, contract: Contract) -> None:
         self._contract = contract
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
-        self._untouched, self._answers = Untouched(contract), Answers(contract)
+        self._untouched, self._answers, self._commands = Untouched(contract), Answers(contract), Commands(contract)
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract), Entries(contract), self._answers,
+            self._untouched, Sublists(contract), Entries(contract), self._answers, self._commands,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
@@ -63,6 +64,7 @@ class Histories:
         self._changes.forget()
         self._untouched.forget()
         self._answers.forget()
+        self._commands.forget()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""

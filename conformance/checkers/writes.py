@@ -22,6 +22,7 @@ from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, 
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
+    WHOLE,
     Leaf,
     differences,
     is_devices,
@@ -108,8 +109,9 @@ class _Change(NamedTuple):
 
     @property
     def sent_value(self) -> Any:
-        """The JSON value of its body."""
-        return read_json(self.write.request.body).value
+        """The JSON value of its body; of a list, an object with that."""
+        value = read_json(self.write.request.body).value
+        return {WHOLE: value} if isinstance(value, list) and self.write.request.method == "PUT" else value
 
     @property
     def schema(self) -> Schema:
@@ -215,7 +217,8 @@ class Writes:
         state = self._states.get(path) if item is not None else None
         writes, last = self._writes.get(path, []), self._last.get(path, {})
         if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
-            self._accepted[path] = read_json(request.body).value
+            value = read_json(request.body).value
+            self._accepted[path] = {WHOLE: value} if isinstance(value, list) else value
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]
@@ -456,6 +459,9 @@ class Writes:
         is_plain = all(map(is_number, (*value, *now))) and not part.get("uniqueItems")
         is_other = is_plain and len(value) == len(now) and sorted(value) == sorted(now) and value != now
         is_fewer = is_plain and len(now) < len(value) and set(value) == set(now)
+        if all(isinstance(item, str) and item.strip() == item != "" for item in (*value, *now)):
+            # A device may leave out what is there twice, and order texts as it likes.
+            is_fewer = set(now) < set(value) or (set(now) > set(value) and name == WHOLE)
         return f"{clip(now)} as {name}" if is_other or is_fewer else ""
 
     def _left_out(self, occasion: Occasion, item: Operation, change: _Change) -> Iterator[Case]:

@@ -8,10 +8,11 @@ from dataclasses import replace
 from typing import Any, Final
 from urllib.parse import quote, unquote, urlsplit
 
-from conformance.api.rest.inputs import Inputs, usual_inputs, whole_body
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs, whole_body
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits, other_texts
 from conformance.api.rest.things import collection_of, id_member, may_create
+from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -92,6 +93,11 @@ def location_of(api: RestInterface, read: Operation, made: Exchange) -> str:
     # The Location header may be wrong, so try it.
     found = (text for text in usable if len(usable) == 1 or api.send(Outgoing("GET", text)).response.ok)
     return next(found, "")
+
+
+def path_of_usual(read: Operation, values: Values) -> str:
+    """Return the target of an operation's usual request."""
+    return request_of(read, usual_inputs(read, values)[0]).target
 
 
 def with_texts(create: Operation, body: Any) -> Any:

@@ -28,9 +28,8 @@ from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
-from conformance.scenarios.creating import location_of
+from conformance.scenarios.creating import location_of, path_of_usual
 from conformance.scenarios.living import ABSENT
-from conformance.scenarios.own_things import path_of_usual
 from conformance.scenarios.scenario import NoOccasionError, scenario
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.writing import Writer, members

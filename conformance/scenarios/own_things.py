@@ -12,7 +12,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from conformance.api.rest.applicable import allows, callable_operations
-from conformance.api.rest.inputs import Inputs, request_of, usual_inputs
+from conformance.api.rest.inputs import Inputs, request_of, usual_inputs, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, listing_of, page_of
 from conformance.api.rest.patches import same
@@ -30,7 +30,8 @@ from conformance.documents.openapi import Operation, is_json, operations_of, res
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.documents.security import demands
-from conformance.scenarios.creating import created_path, with_texts
+from conformance.scenarios.commanding import send_commands
+from conformance.scenarios.creating import created_path, path_of_usual, with_texts
 from conformance.scenarios.entries import change_entries
 from conformance.scenarios.list_queries import choosing
 from conformance.scenarios.lists import Paged, pages_below
@@ -86,7 +87,10 @@ def own_things(api: RestInterface, values: Values) -> Survey:
             is_fixed = not is_item or (bool(collection_of(path)) and (create is None or make is _put))
             free = [operation for operation in changes if not is_item or is_free(operation, path)]
             if free and is_fixed and not thing_path:
-                _Thing(surveyor, read, path_of_usual(read, values), is_own=False).write(free)
+                kept = _Thing(surveyor, read, path_of_usual(read, values), is_own=False)
+                kept.write(free)
+                if not is_item and is_free(free[0], path):
+                    kept.upload()
             if create is not None and thing_path:
                 thing = _Thing(surveyor, read, thing_path)
                 thing.try_undeclared()
@@ -102,12 +106,8 @@ def own_things(api: RestInterface, values: Values) -> Survey:
     with api.run.limit.lift(), suppress(NoAnswerError):
         post_files(surveyor, operations)
         change_entries(surveyor, operations)
+        send_commands(surveyor, operations)
     return surveyor.trace
-
-
-def path_of_usual(read: Operation, values: Values) -> str:
-    """Return the target of an operation's usual request."""
-    return request_of(read, usual_inputs(read, values)[0]).target
 
 
 def _put(surveyor: Surveyor, create: Operation, read: Operation) -> str:
@@ -331,6 +331,7 @@ class _Thing:
             whole = replace(request_of(read, usual_inputs(read, self.surveyor.values)[0]), target=path)
             files = [(media_type, file_of(media_type, octets)) for octets in FILES if media_type]
             files += [(_TEXT, octets) for octets in _TEXTS if _TEXT in put.bodies]
+            first = self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
             # Another media type comes first: a refused one ends the uploads.
             for other in others[:1]:
                 inputs = replace(usual_inputs(put, self.surveyor.values)[0], media_type=other)
@@ -353,6 +354,7 @@ class _Thing:
                     self.surveyor.send(put, Variation(Kind.ODD, "", "", inputs), coded)
                     self.surveyor.send(read, Variation(Kind.AGAIN, "", "", Inputs()), whole)
                 earlier = [octets for _, octets in files[:-1]]
+                earlier += [first.exchange.response.body] if first.exchange is not None and first.ok else []
                 earlier += [file_of(other, octets) for other in others[:1] for octets in FILES[:2]]
                 self._look_again(read, whole, earlier)
                 for again in (replace(whole, method="HEAD"), whole):
@@ -384,7 +386,8 @@ class _Thing:
                 continue
             usual = usual_inputs(create, values)[0]
             bodies = [usual.body, with_texts(create, usual.body)] if listing is not None else []
-            made = [self._at(create, replace(usual, body=body), below) for body in bodies if body is not None]
+            fresh = (with_new_values(create, replace(usual, body=body), values) for body in bodies if body is not None)
+            made = [self._at(create, inputs, below) for inputs in fresh]
             if not made or listing is None:
                 continue
             known = (str(item) for item in values.known_ids(self.read, self.read.parameter("path")[-1]))

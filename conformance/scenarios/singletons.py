@@ -118,6 +118,12 @@ def _write_values(writer: Writer, read: Operation, write: Operation) -> list[Wri
     if not is_json(media_type) or not before.response.ok or before.response.cut:
         return []
     schema = write.bodies[media_type].schema
+    if isinstance(value := read_json(before.response.body).value, list):
+        others = values_of(schema, value, writer.values.collections) if fits(schema, value) else ()
+        for one in (*others, value) if write.method == "PUT" else ():
+            writer.conditional(write, read, "", one)
+            writer.send(read)
+        return []
     parts = flat(schema).get("properties", {})
     first = {
         name: one

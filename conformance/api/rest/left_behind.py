@@ -18,6 +18,7 @@ from conformance.api.rest.applicable import allows
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.things import collection_of, may_create
 from conformance.api.rest.values import IDS
+from conformance.documents.files import keeps_octets
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, matching
 from conformance.documents.representation import flat
@@ -194,11 +195,17 @@ def _send(api: RestInterface, method: str, path: str, was: bytes | None = None) 
     if was is not None:
         media_type = next(filter(is_json, operation.bodies), "")
         value = read_json(was).value
-        if not isinstance(value, dict) or not media_type:
+        if media_type and isinstance(value, dict | list):
+            taken = flat(operation.bodies[media_type].schema).get("properties", {})
+            if taken and isinstance(value, dict):
+                kept = {name for name, part in taken.items() if not flat(part).get("readOnly")}
+                value = {name: one for name, one in value.items() if name in kept}
+            body = json.dumps(value).encode()
+        elif media_type := next(filter(keeps_octets, operation.bodies), ""):
+            body = was
+        else:
             return None
-        taken = flat(operation.bodies[media_type].schema).get("properties", {})
-        kept = {name: one for name, one in value.items() if name in taken and not flat(taken[name]).get("readOnly")}
-        headers, body = (("Content-Type", media_type),), json.dumps(kept).encode()
+        headers = (("Content-Type", media_type),)
     sent = api.client.send(method, path, headers=headers, body=body)
     if sent.response.status in _WANTS_CONDITION and (read := _send(api, "GET", path)) is not None:
         tag = read.response.header("etag") or ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from http import HTTPStatus
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
@@ -77,7 +78,7 @@ class Values:
                 self._learn_id(operation, item)
 
     def _note_deletion(self, operation: Operation, exchange: Exchange) -> None:
-        """Remember that a thing is gone, or that it is there."""
+        """Remember that a thing is gone, or that it is there, and whether PUT has created it (RFC 9110 9.3.4)."""
         above, _, last = operation.template.rstrip("/").rpartition("/")
         text = unquote(urlsplit(exchange.request.url).path.rstrip("/").rpartition("/")[2])
         if last.startswith("{") and operation.method == "DELETE":
@@ -86,6 +87,9 @@ class Values:
             self._gone[above].add(text)
         elif last.startswith("{"):
             self._gone[above].discard(text)
+            if operation.method == "PUT" and exchange.response.status == HTTPStatus.CREATED:
+                for known in (self._ids, self._made):
+                    self._remember(known[above], text)
 
     def _learn_id(self, operation: Operation, id_: Any) -> None:
         """Remember the id of a thing in the collection of an operation."""
@@ -140,11 +144,13 @@ class Values:
         by_thing = [
             value
             for template, values in self._ids.items()
-            if thing and singular(template.rsplit("/", 1)[-1]) == thing
+            if thing and singular(_last(template)) == thing
             for value in values
         ]
         by_own = self._ids.get(own, []) if plain.endswith(("id", "uuid", "parent")) else []
-        return [value for value in _distinct([*by_name, *by_thing, *by_end, *by_own]) if fits(schema, value)]
+        gone = {text for above, texts in self._gone.items() if thing == singular(_last(above)) for text in texts}
+        found = _distinct([*by_name, *by_thing, *by_end, *by_own])
+        return [value for value in found if fits(schema, value) and text_of(value) not in gone]
 
     @staticmethod
     def _remember(known: list[Any], value: Any) -> None:
@@ -162,8 +168,7 @@ class Values:
     @staticmethod
     def _of(known: Mapping[str, list[Any]], above: str) -> list[Any]:
         """Return the ids of a collection; last, of one with its name below another thing, where they may be made."""
-        last = above.rpartition("/")[2]
-        others = [name for name in known if name != above and name.rpartition("/")[2] == last]
+        others = [name for name in known if name != above and _last(name) == _last(above)]
         return [one for name in (above, *others) for one in known.get(name, ())]
 
     def of(self, operation: Operation, parameter: Parameter) -> list[Any]:
@@ -215,6 +220,10 @@ class Values:
         if isinstance(item, list):
             return known[: len(item)] if len(known) >= len(item) else item
         return known[0] if known else self.fill(item, schema, operation)
+
+
+def _last(template: str) -> str:
+    return template.rpartition("/")[2]
 
 
 def _distinct(values: Sequence[Any]) -> list[Any]:

@@ -1,0 +1,234 @@
+"""Commands on things, and whole documents: an effect that never comes, or that only the response shows, is blamed."""
+
+import asyncio
+import itertools
+import json
+
+import pytest
+from aiohttp import web
+from small_device import (
+    REFUSED,
+    answers,
+    body_of,
+    certified,
+    contract_of,
+    described,
+    error,
+    object_of,
+    reading,
+    small_device,
+)
+
+from conformance.checkers.rest import RestCheckers
+from conformance.transport.exchange import Exchange, Request, Response
+
+_BASE = "http://device:8000"
+_JOB = object_of(
+    "id",
+    "status",
+    id={"type": "string"},
+    status={"type": "string", "enum": ["queued", "running", "done", "cancelled"]},
+    litres={"type": "number"},
+    locked={"type": "boolean"},
+)
+_ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
+_DONE = {"200": answers(_JOB), "202": {"description": "later"}, "4XX": REFUSED}
+_READ, _STATES, _THERE = (f"description/{name}" for name in ("written-is-read", "states", "created-is-there"))
+_PATHS = {
+    "/jobs/{id}": {"parameters": [_ID], **reading(_JOB), "put": {"requestBody": body_of(_JOB), "responses": {
+        "200": answers(_JOB), "201": answers(_JOB), "4XX": REFUSED,
+    }}},
+    **{
+        f"/jobs/{{id}}/{name}": {"parameters": [_ID], "post": {"summary": text, "responses": _DONE}}
+        for name, text in (
+            ("cancel", "Cancel it"), ("lock", "Lock it"), ("unlock", "Unlock it"), ("fill", "Fill it up"),
+            ("pause", "It pauses when it can"),
+        )
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(name="contract", scope="module")
+def _contract(tmp_path_factory):
+    return contract_of(tmp_path_factory.mktemp("pack"), described(_PATHS, "3.1.0"))
+
+
+def _get(after_s=0.1, **members):
+    return after_s, "GET", "", 200, {"id": "1", "status": "queued", "locked": False, "litres": 1, **members}
+
+
+def _do(name, code=200, **told):
+    return 0.1, "POST", f"/{name}", code, {"id": "1", "status": "queued", "locked": False, "litres": 1, **told}
+
+
+def _broken(contract, steps):
+    checkers, broken, now = RestCheckers(contract, _BASE), set(), 1000.0
+    for after_s, method, below, status, seen in steps:
+        now += after_s
+        request = Request(method, f"{_BASE}/jobs/1{below}", (("Host", "device:8000"),), b"")
+        body = json.dumps(seen).encode()
+        response = Response(status, (("Content-Type", "application/json"),), body, 1.0, received_s=now)
+        broken |= {one.requirement for one in checkers(Exchange(request, response)) if not one.holds}
+    return broken & {_READ, _STATES, _THERE}
+
+
+@pytest.mark.parametrize(
+    ("steps", "broken"),
+    [
+        ([_get(), _do("cancel"), _get(), _get(4)] * 2, {_STATES}),
+        ([_get(), _do("cancel"), _get(), _get(4)], set()),  # once may be chance
+        ([_get(), _do("cancel"), _get(), _get(1, status="cancelled")], set()),
+        ([_get(), _do("cancel"), _get(1, status="done")] * 2, {_STATES}),
+        ([_get(status="done"), _do("cancel", status="done"), _get(4, status="done")], set()),
+        ([_get(), _do("cancel", code=202), _get(4)] * 2, set()),
+        ([_get(), _do("lock"), _get(4)] * 2, {_STATES}),
+        ([_get(), _do("unlock"), _get(4)] * 2, set()),
+        ([_get(), _do("lock"), _do("fill"), _get(4)] * 2, set()),  # two at once: neither is judged
+        ([_get(), _do("pause"), _get(4)] * 2, set()),
+        ([_get(), _do("fill", litres=9), _get(4)] * 2, {_READ}),
+        ([_get(), _do("fill", litres=9), _get(4, litres=9)] * 2, set()),
+        ([_get(), _do("fill", litres=9, id="2"), _get(4)] * 2, set()),  # another thing
+        # What changes by itself tells nothing.
+        ([_get(litres=1), _get(litres=2), _do("fill", litres=9), _get(4, litres=2)] * 2, set()),
+    ],
+)
+def test_the_effect_of_a_command(contract, steps, broken):
+    assert _broken(contract, steps) == broken
+
+
+_OCTETS, _NOTES = {"type": "string", "format": "binary"}, {"type": "array", "items": {"type": "string", "minLength": 1}}
+_PUMP, _ZONE = object_of("enabled", enabled={"type": "boolean"}), object_of("wet", wet={"type": "integer"})
+_ORDER = object_of("litres", litres={"type": "number", "minimum": 0, "maximum": 50})
+_SWITCHED, _STORED = {"200": answers(_PUMP), "4XX": REFUSED}, {"204": {"description": "stored"}, "4XX": REFUSED}
+_DEVICE = {
+    "/pump": reading(_PUMP),
+    "/pump/enable": {"post": {"summary": "Switch it on", "responses": _SWITCHED}},
+    "/pump/disable": {"post": {"summary": "Switch it off", "responses": _SWITCHED}},
+    "/jobs": {"post": {"requestBody": body_of(_ORDER), "responses": {"202": answers(_JOB), "4XX": REFUSED}}},
+    "/jobs/{id}": {"parameters": [_ID], **reading(_JOB)},
+    "/jobs/{id}/cancel": {"parameters": [_ID], "post": {"responses": {"200": answers(_JOB), "4XX": REFUSED}}},
+    "/notes": {**reading(_NOTES), "put": {"requestBody": body_of(_NOTES), "responses": _STORED}},
+    "/photo": {
+        "get": {"responses": {"200": answers(_OCTETS, "application/octet-stream")}},
+        "put": {"requestBody": body_of(_OCTETS, "application/octet-stream"), "responses": _STORED},
+    },
+    "/zones": reading({"type": "array", "items": {"type": "string"}}),
+    "/zones/{id}": {
+        "parameters": [_ID],
+        **reading(_ZONE),
+        "put": {
+            "requestBody": body_of(_ZONE),
+            "responses": {"200": answers(_ZONE), "201": answers(_ZONE), "4XX": REFUSED},
+        },
+        "delete": {"responses": _STORED},
+    },
+}
+
+
+class _Garden:
+    """A pump with jobs, notes, a photo and zones, and one fault."""
+
+    def __init__(self, fault):
+        self.fault, self.ids, self.jobs = fault, itertools.count(1), {}
+        self.notes, self.photo, self.zones, self.is_on = ["a"], b"none", {"a": 1}, False
+
+    async def pump(self, request):
+        if request.method == "POST":
+            value = request.path.endswith("enable")
+            self.is_on = value and self.fault != "enable does nothing"
+            return web.json_response({"enabled": value})
+        return web.json_response({"enabled": self.is_on})
+
+    async def begin(self, request):
+        body = await _json(request)
+        litres = body.get("litres") if isinstance(body, dict) else None
+        if isinstance(litres, bool) or not isinstance(litres, int | float) or not 0 <= litres <= 50:
+            return error(422, "litres")
+        job = {"id": f"j{next(self.ids)}", "status": "queued", "litres": litres * (self.fault != "litres lost")}
+        self.jobs[job["id"]] = job
+        asyncio.get_running_loop().call_later(0.8, self.end, job)
+        return web.json_response(job, status=202, headers={"Location": f"/jobs/{job['id']}"})
+
+    def end(self, job):
+        job["status"] = "done" if job["status"] == "queued" else job["status"]
+
+    async def job(self, request):
+        job = self.jobs.get(request.match_info["id"])
+        if job is None or (request.method == "POST" and job["status"] != "queued"):
+            return error(409 if job else 404, "no job, or not queued")
+        if request.method == "POST":
+            job["status"] = "queued" if self.fault == "cancel does nothing" else "cancelled"
+        return web.json_response(job)
+
+    async def put_notes(self, request):
+        body = await _json(request)
+        if not isinstance(body, list) or not all(isinstance(one, str) and one for one in body):
+            return error(422, "texts")
+        self.notes = [*self.notes, *body] if self.fault == "notes are added" else body
+        return web.Response(status=204)
+
+    async def picture(self, request):
+        if request.method == "PUT":
+            octets = await request.read()
+            self.photo = self.photo if self.fault == "photo is kept" else octets
+            return web.Response(status=204)
+        return web.Response(body=self.photo, content_type="application/octet-stream")
+
+    async def put_zone(self, request):
+        body, name = await _json(request), request.match_info["id"]
+        if not isinstance(body, dict) or not isinstance(body.get("wet"), int) or isinstance(body["wet"], bool):
+            return error(422, "wet")
+        is_new = name not in self.zones and self.fault != "created with 200"
+        self.zones[name] = body["wet"]
+        return web.json_response({"wet": body["wet"]}, status=201 if is_new else 200)
+
+    async def zone(self, request):
+        name = request.match_info["id"]
+        if name not in self.zones:
+            return error(404, "no such zone")
+        if request.method == "DELETE":
+            del self.zones[name]
+            return web.Response(status=204)
+        return web.json_response({"wet": self.zones[name]})
+
+    async def all_of(self, request):
+        return web.json_response(self.notes if request.path == "/notes" else sorted(self.zones))
+
+    @property
+    def routes(self):
+        return {
+            "/pump": {"GET": self.pump}, "/pump/enable": {"POST": self.pump}, "/pump/disable": {"POST": self.pump},
+            "/jobs": {"POST": self.begin}, "/jobs/{id}": {"GET": self.job}, "/jobs/{id}/cancel": {"POST": self.job},
+            "/notes": {"GET": self.all_of, "PUT": self.put_notes}, "/zones": {"GET": self.all_of},
+            "/photo": {"GET": self.picture, "PUT": self.picture},
+            "/zones/{id}": {"GET": self.zone, "PUT": self.put_zone, "DELETE": self.zone},
+        }  # fmt: skip
+
+
+async def _json(request):
+    try:
+        return await request.json()
+    except ValueError:
+        return None
+
+
+_FAULTS = {
+    "enable does nothing": {_STATES, _READ},
+    "cancel does nothing": {_STATES},
+    "litres lost": {_READ},
+    "notes are added": {_READ},
+    "photo is kept": {_READ},
+    "created with 200": {_THERE},
+}
+
+
+@pytest.mark.parametrize("fault", ["", *_FAULTS])
+def test_commands_and_whole_documents_of_a_device(tmp_path, fault):
+    garden = _Garden(fault)
+    with small_device(described(_DEVICE, "3.1.0"), garden.routes) as url:
+        selected = ("--select", "description") if fault else ()
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", "--call", "*", *selected)
+    assert {id_ for id_, verdict in seen.blamed.items() if verdict == "fail"} == _FAULTS.get(fault, set()), seen.text
+    if not fault:
+        # What a client had there before is there again, and nothing else.
+        assert (garden.notes, garden.photo, garden.zones) == (["a"], b"none", {"a": 1})
