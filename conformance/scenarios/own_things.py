@@ -221,9 +221,8 @@ class _Thing:
     def _write_each(self, change: Operation, bodies: list[Any], alone: list[Any], *, is_first: bool) -> list[Any]:
         """Write bodies one after another, and read after each; return those of one member that are refused."""
         refused, is_behind = list[Any](), False
-        for turn, body in enumerate(
-            alone if self.tag else [one for one in bodies if _is_beyond_ascii(one)][:1] + alone
-        ):
+        beyond_ascii = (one for one in bodies if not all(str(item).isascii() for item in one.values()))
+        for turn, body in enumerate(alone if self.tag else [*islice(beyond_ascii, 1), *alone]):
             old = self.tag
             is_done = self.send(change, body, *self._current(None if turn else change)).ok
             if is_done or not turn:
@@ -597,7 +596,3 @@ def _fits(change: Operation, tags: str) -> bool:
     return all(
         fits(parameter.schema, tags) for parameter in change.parameter("header") if parameter.name.lower() == "if-match"
     )
-
-
-def _is_beyond_ascii(body: dict[str, Any]) -> bool:
-    return any(isinstance(item, str) and not item.isascii() for item in body.values())
