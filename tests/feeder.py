@@ -5,6 +5,7 @@ import re
 import threading
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 from xml.sax.saxutils import escape
 
@@ -104,7 +105,7 @@ class Feeder(Device):
     reads: int = 0
     due: list[tuple[float, dict[str, str]]] = field(default_factory=list)
 
-    @property
+    @cached_property
     def schema(self) -> etree.XMLSchema:
         """The schema that validates requests, without some of the facets if that is the fault."""
         names = [name for name in ("maxInclusive", "maxLength") if f"no {name}" in self.faults]

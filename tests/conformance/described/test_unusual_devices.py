@@ -57,7 +57,7 @@ def test_faults_are_found(device, arguments, faults, tmp_path):
     assert done.blamed.keys() == set(faults.values()), done.text
 
 
-@pytest.mark.parametrize("seed", range(1, 4))
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_crash_now_and_then_is_one_finding(seed, tmp_path):
     done = _certified(devices.unions, ("--class", "robustness"), tmp_path, {"500 now and then"}, seed)
     assert done.blamed == {"robustness/no-server-error": "fail"}, done.text
