@@ -86,7 +86,7 @@ def _only_position(places: Sequence[str], own: str, *, alone: bool) -> list[str]
     known = [place for place in places if _POSITION.search(member_name(place)) and is_axis(member_name(place))]
     known = [place for place in known if not (FAST.search(place) or ECHO.search(place))]
     if own.isdecimal():
-        known = [place for place in known if place.rpartition("/")[2] == own]
+        known = [place for place in known if own in place.split("/")]
     return known if len(known) == 1 and (alone or own.isdecimal()) else []
 
 

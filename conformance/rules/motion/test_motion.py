@@ -10,7 +10,7 @@ from conformance.measures.samples import SEVERAL
 from conformance.rules.motion.judging import ALL, at, halts, in_words, judge_goal, legs_of, moved_axis, off, usable
 from conformance.scenarios.motion.measuring import speed_in
 from conformance.scenarios.motion.moves import many_commands, new_targets, repeated, stops, targets
-from conformance.scenarios.motion.resting import crept, fastest
+from conformance.scenarios.motion.resting import crept, fastest, set_out
 from conformance.scenarios.motion.several import several_clients, several_drivers
 from conformance.scenarios.motion.trace import Drive, Leg, Reading, middle_of
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
@@ -37,11 +37,12 @@ def reaches(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
         yield from judge_goal(leg, leg.commands[-1], motion)
 
 
-@rule("motion/stays", on=(targets,))
+@rule("motion/stays", on=(targets, new_targets))
 def stays(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
-    """Judge whether the device stays at a target that it has reached."""
+    """Judge whether the device stays at a target that it has reached, the last one that it accepted."""
     for leg in trace:
-        seen, goal = usable(leg), leg.commands[-1]
+        goal = next((command for command in reversed(leg.commands) if command.is_ok), leg.commands[-1])
+        seen = leg.after(goal.answered)
         arrived = _first_at(seen, goal.targets, motion)
         if arrived is None:
             continue
@@ -148,6 +149,7 @@ def stop_lasts(trace: tuple[Leg, ...], motion: MotionMap) -> Iterator[Outcome]:
                 continue
             where, last = at(readings[:SEVERAL], motion), at(readings[-SEVERAL:], motion)
             moved = off(last, where, motion) or fastest(readings, motion) or crept(readings, motion, leg.resting)
+            moved = moved or set_out(readings, motion, leg.resting)
             after = readings[-1].sent - leg.commands[1].sent
             yield Case(
                 not moved, leg.commands[1].exchange, f"rest after {leg.what}", f"{moved}, {after:.1f} s after the stop"

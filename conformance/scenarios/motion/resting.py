@@ -12,6 +12,8 @@ from conformance.statement.motion_map import MotionMap
 
 #: Shortest time that shows whether a device creeps, s.
 CREEPS_S: Final = 1.0
+# Time in which a device that has rested is seen to creep, s.
+_SETS_OUT_S: Final = 0.6
 # By default, how fast a device may seem to move at rest: these shares of its tolerance of speed, and of position.
 _OF_SPEED: Final = 0.1
 _OF_POSITION: Final = 0.2
@@ -92,6 +94,21 @@ def crept(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> s
     """Return the same of the last readings, where they last long enough to tell."""
     last = [reading for reading in readings if reading.sent >= readings[-1].sent - 1.5 * CREEPS_S]
     return creeping(last, motion, resting) if last and last[-1].sent - last[0].sent >= CREEPS_S else ""
+
+
+def set_out(readings: Sequence[Reading], motion: MotionMap, resting: Resting) -> str:
+    """Return the axes that rested, and then moved on for a while, however slowly, as text; empty if there is none."""
+    for said, seen, rate, most in _seen_of(readings, motion, resting):
+        rested = False
+        for begin in range(0, len(seen), SEVERAL):
+            window = [sample for sample in seen[begin:] if sample[0] <= seen[begin][0] + _SETS_OUT_S]
+            if window[-1][0] - seen[begin][0] < _SETS_OUT_S / 2 or len(window) < 2 * SEVERAL:
+                break
+            speed = goes_on(window, rate, most)
+            if rested and abs(speed) > 2 * most(window):
+                return f"{said} {speed:.3g} per second for {_SETS_OUT_S:g} s"
+            rested = rested or abs(rate(window) or 0.0) <= most(window)
+    return ""
 
 
 def _beside(most: float, room: Callable[[Sequence[Sample]], float]) -> Callable[[Sequence[Sample]], float]:

@@ -20,6 +20,8 @@ from conformance.statement.motion_map import MotionMap
 
 # Responses from the last reading to the end of a drive: of that reading, a command, the next reading, and the stop.
 _BLIND: Final = 3
+# Commands before the end of a drive that are each held for the hold time at most after the position that is known.
+_HOLDS: Final = 3
 # Time between two readings that shows how fast a device is, s.
 _APART_S: Final = 0.3
 # Plan a drive for a device this much faster than declared or seen, because its greatest speed shows only under way.
@@ -77,7 +79,7 @@ class Room:
         # A move to the start of a drive may turn the device.
         turned = self._motion.goto is not None
         for name, axis in self._axes.items():
-            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s), turned=turned)
+            down, up = self._way(name, choices, _FASTER * (lasts_s + self._blind_s), turned=turned)
             if down + up > 0:
                 ways[name] = down, up
                 # The start of a drive is reached within the tolerance only.
@@ -104,7 +106,7 @@ class Room:
         """Return by how much velocities must be multiplied, at most 1, for a drive that begins here; 0: no room."""
         share = 1.0
         for name, axis in self._axes.items():
-            down, up = self._way(name, choices, _FASTER * (lasts_s + _BLIND * self.slowest_s))
+            down, up = self._way(name, choices, _FASTER * (lasts_s + self._blind_s))
             for way, free in ((down, here[name] - axis.limits[0]), (up, axis.limits[1] - here[name])):
                 share = min(share, max(0.0, free) / way) if way > 0 else share
         slow = any(
@@ -170,14 +172,20 @@ class Room:
         if len(seen) < SEVERAL:
             return False
         for name, axis in self._axes.items():
-            here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + _BLIND * self.slowest_s)
+            here, (down, up) = middle_of(seen, name), self._way(name, choices, rests_s + self._blind_s)
             if (down and here - down < axis.limits[0]) or (up and here + up > axis.limits[1]):
                 return True
         return False
 
     def leads_on(self, speeds: Speeds, readings: Sequence[Reading], lasts_s: float) -> bool:
         """Return whether a device that is under way has room for another velocity, for so long, s."""
-        return not self.is_over([speeds], readings, _FASTER * lasts_s + _BLIND * self.slowest_s)
+        return not self.is_over([speeds], readings, _FASTER * lasts_s + self._blind_s)
+
+    @property
+    def _blind_s(self) -> float:
+        """How long a device may drive on unseen, s: after a command that came late, no longer than its hold time."""
+        hold_s = self._motion.velocity.hold_s if self._motion.velocity else None
+        return min(_BLIND * self.slowest_s, math.inf if hold_s is None else _HOLDS * hold_s)
 
     def _unsure(self, axis: str) -> float:
         """Return how far apart two readings of a device at rest may be along an axis."""

@@ -446,14 +446,15 @@ def _creeping_after_hold(body: Body) -> None:
     body.drive = drive  # type: ignore[method-assign]
 
 
-def _creeping_after_stop(body: Body) -> None:
+def _creeping_after_stop(body: Body, rests_s: float = 0.0, lasts_s: float = 60.0) -> None:
     right = body.halt
 
     def halt(now: float) -> None:
         moving = body.moving(now)
         right(now)
         if moving:
-            body.drive(dict.fromkeys(body.limits, _CREEP), 60.0, now)
+            creep = partial(body.drive, dict.fromkeys(body.limits, _CREEP), lasts_s)
+            body.later.append((now + rests_s, creep))
 
     body.halt = halt  # type: ignore[method-assign]
 
@@ -519,6 +520,7 @@ def finer_velocity_mutants(axes: list[str]) -> Iterator[tuple[str, Change]]:
     yield "velocity-stop-creeps-on", _creeping_after_zero
     yield "watchdog-creeps-on", _creeping_after_hold
     yield "stop-creeps-on", _creeping_after_stop
+    yield "stop-creeps-for-a-second", partial(_creeping_after_stop, rests_s=0.9, lasts_s=1.0)
     yield "velocity-stop-late", _zero(lambda body, v, now, right: right(v, 0.9, now))
     yield "velocity-resumes", _zero(_resuming)
     yield "refused-stops", _after_refusal(lambda body, now: body.drive(dict.fromkeys(axes, 0.0), 0.0, now))

@@ -461,6 +461,18 @@ def test_numbers_in_texts_are_read_and_a_heading_in_degrees_begins_anew():
     assert looks.samples("GET /state", "/heading", 0) == [(0, 358.5), (1, 359.75), (2, 361.0)]
 
 
+def test_items_of_a_list_are_read_at_their_place_within_objects():
+    joints = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
+    body = {"content": {"application/json": {"schema": {"type": "object", "properties": {"joints": joints}}}}}
+    paths = {"/arm": {"put": {"requestBody": body, "responses": {}}}}
+    looks = Looks()
+    state = {"joints": [{"name": "base", "position": 0.1, "velocity": 0}, {"name": "elbow", "position": 2}]}
+    looks.add("GET /state", 0, numbers_of(state))
+    numbers = commanded_by(read_operations({"openapi": "3.1.0", "info": {}, "paths": paths})[0])
+    places = [place for _, place in looks.places_of(numbers, "/arm", ["GET /state"]).values()]
+    assert places == ["/joints/0/position", "/joints/1/position"]
+
+
 class Leasing(Api):
     """An arm with a lease; ``wants``: whether it moves only for a client that has it, or any token."""
 
