@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+import json
+import re
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from http import HTTPStatus
 from typing import Any, Final
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.listing import items_of
-from conformance.api.rest.things import collection_of, identifier_of, object_in
+from conformance.api.rest.statuses import refuses
+from conformance.api.rest.things import collection_of, identifier_of, may_create, object_in
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
@@ -25,6 +28,11 @@ _REMEMBERED: Final = 50_000
 # of each.
 _TAKEN: Final = frozenset({HTTPStatus.BAD_REQUEST, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY})
 _FEW: Final = 8
+# Phrases in the description of a 409 before and behind a member of which no two things may have the same value.
+_SAME: Final = r"\b(?:duplicate|same|existing|taken|(?:with|has) (?:this|that|such an?|its))"
+_HAS: Final = r"\b(?:taken|occupied|in use|(?:already )?exists?|already used|not unique|must be unique)\b"
+# How often a value is taken again before that counts; once, the earlier thing may have ended by itself.
+_TWICE: Final = 2
 _OCTETS: Final = 16_384
 
 
@@ -131,6 +139,9 @@ class Uniques:
         self._shared: dict[str, set[str]] = defaultdict(set)
         # By collection: the last bodies of created things.
         self._bodies: dict[str, list[dict[str, Any]]] = defaultdict(list)
+        # By collection: for each unique text of what exists, where it was taken; below, how often it was taken again.
+        self._held: dict[str, set[str]] = defaultdict(set)
+        self._again = Counter[str]()
         # By collection and identifier: members as they were read since the last change.
         self._read: dict[str, dict[str, dict[str, Any]]] = defaultdict(dict)
 
@@ -146,7 +157,12 @@ class Uniques:
         above, _, last = path.rpartition("/")
         if method == "POST" and is_json(occasion.request.media_type):
             self._keep_created(occasion, path)
-        elif method in {"PUT", "PATCH", "DELETE"} and answer.ok:
+            yield from self._judge_taken(occasion, operation, path)
+        elif method not in SAFE and not refuses(answer.status, operation):
+            self._held.clear()
+        if method == "POST":
+            return
+        if method in {"PUT", "PATCH", "DELETE"} and answer.ok:
             self._read[above].clear()
         elif method == "GET" and answer.ok and is_json(answer.media_type) and self._bodies.get(path):
             yield from self._judge_list(occasion, operation, self._bodies[path])
@@ -172,6 +188,23 @@ class Uniques:
             made |= {(name, str(one)) for name, one in body.items() if _is_plain(one) and len(made) < _REMEMBERED}
         elif occasion.response.status in _TAKEN and occasion.is_valid:
             self._refused[path] = [*refused, body][-_FEW:]
+
+    def _judge_taken(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
+        """Judge whether a creation is refused by 409, if its members are taken by which the description says so."""
+        body, status = read_json(occasion.request.body).value, occasion.response.status
+        names = [name for name in body if _is_said(name, operation.conflict)] if isinstance(body, dict) else []
+        is_made = occasion.response.ok and (status == HTTPStatus.CREATED or may_create(operation, status))
+        if not (is_made and operation.conflict):
+            self._held.clear() if not refuses(status, operation) else None
+            return
+        key, held = json.dumps({name: body[name] for name in names}, sort_keys=True), self._held[path]
+        if names and occasion.is_valid and len(held) < _REMEMBERED:
+            self._again[operation.label] += key in held
+            if key not in held or self._again[operation.label] >= _TWICE:
+                expected = f"a refusal with 409, as there is one with {clip(key)} ({operation.conflict})"
+                cause = f"{operation.label} taken"
+                yield occasion.case("description/states", key not in held, expected, f"status {status}", cause=cause)
+            held.add(key)
 
     @staticmethod
     def _judge_list(occasion: Occasion, operation: Operation, bodies: list[dict[str, Any]]) -> Iterator[Case]:
@@ -199,6 +232,12 @@ class Uniques:
                 found, cause = f"{name} {clip(value)}, as {above}/{twice} has", f"{operation.label} {name} twice"
                 doubt = "those creations may have been refused for another reason"
                 yield occasion.case("description/own-identifier", not twice, expected, found, cause=cause, doubt=doubt)
+
+
+def _is_said(name: str, text: str) -> bool:
+    """Return whether the description of a 409 says that another thing has this member's value already."""
+    word = rf"\b{re.escape(name)}\b"
+    return bool(re.search(rf"{_SAME} {word}|{word}[^.;,]*{_HAS}", text, re.IGNORECASE))
 
 
 def _is_plain(value: Any) -> bool:

@@ -33,20 +33,10 @@ _CONNECTING: Final = frozenset(
 # Words in paths of resources that store what is written; others may show what the device does.
 _KEEPING: Final = frozenset(
     {
-        "settings",
-        "setting",
-        "config",
-        "configuration",
-        "preferences",
-        "options",
-        "parameters",
-        "setup",
-        "limits",
-        "profile",
-        "setpoint",
-        "setpoints",
+        "settings", "setting", "config", "configuration", "preferences", "options", "parameters", "setup", "limits",
+        "profile", "setpoint", "setpoints", "schedule", "calendar", "program", "rules", "thresholds", "calibration",
     }
-)
+)  # fmt: skip
 _MOST_VALUES, _MOST_ITEMS = 5, 10
 # Added to numbers that may have a fraction.
 _PART: Final = 0.375
@@ -220,12 +210,17 @@ def values_of(schema: Schema, first: Any, collections: frozenset[str]) -> Iterat
         found = [not first]
     elif not found and is_number(first):
         found = [given.get("minimum"), given.get("maximum"), 0] if kinds & {"number", "integer"} else []
-        found += [sum(found[:2]) / 2 + _PART] if "number" in kinds and all(map(is_number, found)) else []
+        middle = sum(found[:2]) / 2 if all(map(is_number, found[:2])) else None
+        found += [] if middle is None else [middle + _PART if "number" in kinds else int(middle)]
         found += [first + 1, first - 1] if not any(map(is_number, found[:2])) else []
     elif not found and isinstance(first, list):
         found = [[], alike_and_apart({**given, "minItems": min(given.get("maxItems", 2), _MOST_ITEMS)})[1]]
     elif not found and isinstance(first, str) and "pattern" not in given and "format" not in given:
         found = ["roaas 1", ""]
+    elif not found and isinstance(first, str) and "format" not in given:
+        found = [
+            another({"properties": {"it": schema}}, {"it": first}, turn, collections)["it"] for turn in range(_TURNS)
+        ]
     elif isinstance(first, dict):
         found = [another(schema, first, turn, collections) for turn in range(_TURNS)]
     usable = [item for item in found if item is not None and item != first and fits(schema, item)]

@@ -34,7 +34,11 @@ _JOB = object_of(
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _DONE = {"200": answers(_JOB), "202": {"description": "later"}, "4XX": REFUSED}
 _READ, _STATES, _THERE = (f"description/{name}" for name in ("written-is-read", "states", "created-is-there"))
+_ROW = object_of("row", row={"type": "integer"}, label={"type": "string"})
+_TAKEN = {"201": answers(_ROW), "409": {**REFUSED, "description": "The row is taken in this bed"}}
 _PATHS = {
+    "/rows": {"post": {"requestBody": body_of(_ROW), "responses": _TAKEN}},
+    "/rows/{id}": {"parameters": [_ID], **reading(_ROW), "delete": {"responses": {"204": {"description": ""}}}},
     "/jobs/{id}": {"parameters": [_ID], **reading(_JOB), "put": {"requestBody": body_of(_JOB), "responses": {
         "200": answers(_JOB), "201": answers(_JOB), "4XX": REFUSED,
     }}},
@@ -94,6 +98,27 @@ def _broken(contract, steps):
 )
 def test_the_effect_of_a_command(contract, steps, broken):
     assert _broken(contract, steps) == broken
+
+
+@pytest.mark.parametrize(
+    ("steps", "broken"),
+    [
+        (["POST 1", "POST 1", "POST 1"], {_STATES}),
+        (["POST 1", "POST 1"], set()),  # once, the first one may have ended by itself
+        (["POST 1", "POST 2", "POST 3"], set()),
+        (["POST 1", "DELETE", "POST 1", "DELETE", "POST 1"], set()),
+    ],
+)
+def test_a_value_that_the_description_of_a_409_calls_taken(contract, steps, broken):
+    checkers, found = RestCheckers(contract, _BASE), set()
+    for number, step in enumerate(steps):
+        method, _, row = step.partition(" ")
+        body = json.dumps({"row": int(row), "label": f"{number}"}).encode() if method == "POST" else b""
+        fields = (("Host", "device:8000"), ("Content-Type", "application/json"))
+        request = Request(method, f"{_BASE}/rows{'' if body else '/1'}", fields if body else fields[:1], body)
+        answer = Response(201 if body else 204, fields[1:] if body else (), body, 1.0, received_s=1000.0 + number)
+        found |= {one.requirement for one in checkers(Exchange(request, answer)) if not one.holds}
+    assert found & {_STATES} == broken
 
 
 _OCTETS, _NOTES = {"type": "string", "format": "binary"}, {"type": "array", "items": {"type": "string", "minLength": 1}}
