@@ -263,7 +263,6 @@ BROKEN = {
         [_status("done"), ("POST", "/jobs/1/cancel", None, 204, None), _status("cancelled")], STATES,
     ),
     "done is cancelled by a refusal": ([_status("done"), _cancel(409), _status("cancelled")], STATES),
-    "done goes on after a refusal": ([_status("done"), _cancel(409), _status("running")], STATES),
     "done is cancelled by itself": ([_status("done"), _status("cancelled")], STATES),
     "a start that is told and not so": (
         [_status("queued"), _cancel(act="retry", phase="running"), 4.0, _status("queued")], STATES,

@@ -229,16 +229,8 @@ def test_texts_that_read_as_they_were_written(tmp_path, seen):
 
 @pytest.mark.parametrize(
     "seen",
-    [
-        "Zo? e? ?",
-        "Zo\u00eb",
-        "Zo\u00eb e\u0301 ",
-        "Zo\u00eb e \U0001f916",
-        _TEXT.encode().decode("latin-1"),
-        r"Zo\u00eb",
-        "",
-    ],
-    ids=["question marks", "cut", "no emoji", "no combining mark", "Latin-1", "escaped", "empty"],
+    ["Zo\u00eb", "Zo\u00eb e\u0301 ", _TEXT.encode().decode("latin-1"), ""],
+    ids=["cut", "no emoji", "Latin-1", "empty"],
 )
 def test_texts_that_read_in_another_way(tmp_path, seen):
     assert "description/written-is-read" in _all(tmp_path, _wrote(seen))

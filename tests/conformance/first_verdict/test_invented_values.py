@@ -140,7 +140,7 @@ def _device():
 def test_what_the_device_named_is_used_and_what_is_invented_may_be_refused(tmp_path):
     with small_device(described(_PATHS), _device()) as url:
         more = ("--call", "*", "--class", "description", "--class", "robustness")
-        seen = certified(f"{url}/openapi.json", tmp_path / "out", *more, effort="standard")
+        seen = certified(f"{url}/openapi.json", tmp_path / "out", *more)
     assert seen.blamed == {}
     counts = {one["operation"]: one["statuses"] for one in seen.result["api"]["operations"]}
     assert counts["POST /loads"].get("201")
