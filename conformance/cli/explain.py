@@ -33,7 +33,7 @@ NEEDS = {
     Prerequisite.LIMITS: "limits in the statement",
     Prerequisite.HOLD: "a hold time in the statement (hold_s, of [limits] or of the motion map)",
     Prerequisite.RESOLVED: "declared tolerances that are small beside the limits",
-    Prerequisite.SEEN: "a device that shows this by itself; others are not judged by it",
+    Prerequisite.SEEN: "a device that does this without being made to; a device that never does it is not judged",
     Prerequisite.PROBE: "a ROS probe (--ros-domain-id)",
 }
 

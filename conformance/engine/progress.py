@@ -124,7 +124,7 @@ class Progress:
         """Redraw the bar; or write a line when a stage begins, and when none was written for a while."""
         mark = item.get_closest_marker("phase")
         phase = mark.args[0] if mark else STAGES[0]
-        text = f"{phase}: {item.name.removeprefix('test_').replace('_', ' ')}"
+        text = f"{item.name.partition('[')[0].removeprefix('test_').replace('_', ' ')} (stage: {phase})"
         now = time.monotonic()
         if self._bar is not None:
             self._bar.update(0, f"{self._so_far()} | {text}")

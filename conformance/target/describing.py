@@ -129,8 +129,8 @@ def fetch_description(
                 found = read_description(urljoin(source, path), load, overlays, trust)
             except DescriptionError:
                 continue
-            remark = f"The description was found at {found.source}."
-            return replace(found, elsewhere=(remark,))
+            named = f"{source} is no description. " if urlsplit(source).path.strip("/") else ""
+            return replace(found, elsewhere=(f"{named}The description was found at {found.source}.",))
         if "; are credentials missing" in str(error):
             raise
         tried = f"{', '.join(usual[:2])} and {len(usual) - 2} other usual places have none either. " if usual else ""

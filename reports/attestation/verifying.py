@@ -235,8 +235,8 @@ def _requirements(statement: Statement, policy: Policy, known: Known) -> Iterato
     yield Point(
         "tested",
         tested >= policy.tested * len(musts),
-        f"{tested} of {len(musts)} MUSTs of the required classes",
-        f"at least {policy.tested:.0%} of them (tested)",
+        f"{tested} of {len(musts)} MUST requirements of the required classes; the run had no occasion for the others",
+        f"at least {policy.tested:.0%} of them tested",
         "ask for a run that may do more (--allow-motion, --call, credentials), or demand less",
     )
 
@@ -315,8 +315,9 @@ def _time(run: Run, policy: Policy, now: dt.datetime) -> Iterator[Point]:
 
 PROVED = (
     "Proved: the holder of this key vouches that this run took place and gave the result with the digest above, and "
-    "the envelope was not changed since. A file that is REFUSED above is not the one that was signed."
+    "the envelope was not changed since."
 )
+REFUSED = "The signature is valid, but a point above is refused: do not rely on this certificate."
 NOT_PROVED = (
     "Not proved: that the robot is genuine, that the named suite really ran, or that another run would give the same "
     "result. You have to know who holds the key, and decide whether to trust them."

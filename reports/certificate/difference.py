@@ -94,14 +94,15 @@ class Difference:
     Attributes:
         changes: the changed requirements, the worst kind of change first.
         circumstances: settings in which the two runs differ: name, value before, value now.
-        still_failing: number of requirements that failed before and fail now, without those beside the verdict.
+        still: how many requirements failed or warned before and fail now, and how many warn now, without those beside
+            the verdict.
     """
 
     old: Mapping[str, Any]
     new: Mapping[str, Any]
     changes: tuple[Change, ...]
     circumstances: tuple[tuple[str, str, str], ...]
-    still_failing: int
+    still: tuple[int, int]
 
     @property
     def groups(self) -> dict[Kind, tuple[Change, ...]]:
@@ -151,7 +152,8 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Difference:
     order = list(Kind)
     changes.sort(key=lambda change: (order.index(change.kind), change.id))
     judged = {id_: item for id_, item in now.items() if not item.get("beside")}
-    still = sum(_has_failed(item) and id_ in judged and _has_failed(judged[id_]) for id_, item in before.items())
+    kept = [judged[id_]["verdict"] for id_, item in before.items() if _has_failed(item) and id_ in judged]
+    still = (kept.count("fail"), kept.count("warn"))
     return Difference(old, new, tuple(changes), tuple(_circumstances(old, new)), still)
 
 
@@ -239,6 +241,8 @@ def _changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
         known = old["suite"]["digest"] == new["suite"]["digest"] or "none" not in {before, now}
         if before != now and known:
             versions = [_at(item, version) for item in (old, new)] if version else []
+            if "none" in {before, now}:
+                versions = ["none" if each == "none" else "given" for each in (before, now)]
             yield name + (f" ({' → '.join(versions)})" if len(set(versions)) > 1 else "")
     called = [{each["operation"] for each in _operations(item) if each["called"]} for item in (old, new)]
     if called[0] != called[1]:

@@ -22,8 +22,8 @@ def headline(found: Difference) -> str:
         for kind, changes in found.groups.items()
         if kind in _TONES
     ]
-    still = f"{found.still_failing} still failing" if found.still_failing else ""
-    summary = ", ".join([*counts, *filter(None, [still])]) or "no requirement changed its verdict"
+    still = [f"{n} {words}" for n, words in zip(found.still, ("still failing", "still warned of"), strict=True) if n]
+    summary = ", ".join([*counts, *still]) or "no requirement changed its verdict"
     number = len(found.regressions)
     worse = f"{number} {'regression' if number == 1 else 'regressions'}" if number else "No regression"
     return f"{worse}: {summary}."

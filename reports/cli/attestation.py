@@ -11,7 +11,7 @@ from reports.attestation.envelope import read_envelope
 from reports.attestation.keys import PRIVATE_NAME, PUBLIC_NAME, generate, public_key
 from reports.attestation.policy import OF_DESCRIBED
 from reports.attestation.statement import RESULT_SUBJECT
-from reports.attestation.verifying import DESCRIBED, NOT_PROVED, PROVED, Verification, unseal
+from reports.attestation.verifying import DESCRIBED, NOT_PROVED, PROVED, REFUSED, Verification, unseal
 from reports.attestation.verifying import verify as verified
 from reports.cli.options import CONTRACT, FILE, FOLDER, FrontDoor, policy_of
 from reports.errors import EnvelopeRefusedError
@@ -89,6 +89,6 @@ def _print(found: Verification, key: str) -> None:
     for remark in found.remarks:
         click.echo(f"\n{fill(on_a_line(remark, 400), 100)}")
     refused = [point.name for point in found.points if not point.met]
-    for words in (PROVED, NOT_PROVED):
+    for words in (REFUSED if refused else PROVED, NOT_PROVED):
         click.echo(f"\n{fill(words, 100)}")
     click.echo(f"\nREFUSED by your policy: {', '.join(refused)}" if refused else "\nACCEPTED by your policy")
