@@ -74,7 +74,6 @@ WSDL = wsdl(
 _APPLIED = {
     "refused applied": ("Rate", "Label"),
     "refused label applied": ("Label",),
-    "refused rate applied": ("Rate",),
     "mandatory label applied": ("Label",),
 }
 

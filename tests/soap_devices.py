@@ -23,7 +23,6 @@ USER, PASSWORD = "operator", "correct horse"
 _XS = 'xmlns:xs="http://www.w3.org/2001/XMLSchema"'
 _WSDL = 'xmlns="http://schemas.xmlsoap.org/wsdl/"'
 _SECURITY = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-secext-1.0.xsd"
-_UTILITY = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-wssecurity-utility-1.0.xsd"
 
 CAMERA_XSD = f"""<xs:schema {_XS} targetNamespace="urn:camera" xmlns:c="urn:camera" elementFormDefault="qualified">
 <xs:simpleType name="Angle"><xs:restriction base="xs:double"><xs:minInclusive value="-1"/><xs:maxInclusive value="1"/>

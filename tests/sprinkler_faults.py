@@ -28,17 +28,6 @@ FAULTS = [
     (
         "as described",
         {
-            "a missing If-Match is taken": "description/if-match",
-            "a stale If-None-Match is current": "description/entity-tag",
-            "one key acts twice": "description/idempotency-key",
-            "what is refused with 406 is written": "description/refused-keeps",
-            "a part tells its own length as the whole one": "http/range",
-            "the checksum is of other octets": "description/digest",
-        },
-    ),
-    (
-        "as described",
-        {
             "If-None-Match: * is not looked at": "description/if-match",
             "a stale If-Range gets a part": "description/entity-tag",
             "a repeated key acts and says nothing": "description/idempotency-key",
@@ -48,28 +37,11 @@ FAULTS = [
         },
     ),
     (
-        "keys that are refused again",
-        {
-            "what is refused with 428 is deleted": "description/refused-keeps",
-            "what is refused with 415 is created": "description/refused-keeps",
-            "a new key gets an old answer": "description/idempotency-key",
-            "the first tag alone counts": "description/if-match",
-        },
-    ),
-    (
         "as described",
         {
             "HEAD renames": "description/safe",
             "CSV lacks the last row": "description/same-values",
             "two decimals are kept": _READ,
-        },
-    ),
-    (
-        "without conditions",
-        {
-            "a forecast deletes zones": "description/safe",
-            "CSV has other values": "description/same-values",
-            "a creation tells the default minutes": _READ,
         },
     ),
     (

@@ -7,6 +7,7 @@ environment, then the script to bash.
 import json
 import os
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from pathlib import Path
 import pytest
 import yaml
 from processes import ended
+from warm_commands import beginning
 
 from conformance.contract.pack import Contract
 from proof.selftest.proxy import Proxy
@@ -36,7 +38,10 @@ def programs(tmp_path_factory):
     """A folder with the two programs that an installed suite has: of the code at hand."""
     folder = tmp_path_factory.mktemp("runner") / "roaas" / "bin"
     folder.mkdir(parents=True)
-    (folder / "roaas").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m roaas "$@"\n', encoding="utf-8")
+    # A robot goes on until it is ended, and gets a Python of its own.
+    own, warm = (f'{shlex.join(words)} -m roaas "$@"' for words in ((sys.executable,), beginning()))
+    text = f'#!/bin/sh\n[ "$1" = robot ] && exec {own}\nexec {warm}\n'
+    (folder / "roaas").write_text(text, encoding="utf-8")
     (folder / "roaas-ci").symlink_to(CI / "certify.sh")
     (folder / "roaas").chmod(0o755)
     return folder

@@ -133,8 +133,7 @@ def _taking(document: dict[str, Any]) -> Handle:
 #: Descriptions that are judged as others are, though they are large.
 LARGE = {
     "ring": lambda: described(
-        {"/good": reading({"type": "string"}), **{f"/{i}": reading(_ref(f"s{i}")) for i in range(3)}},
-        components={"schemas": _ring()},
+        {"/good": reading({"type": "string"}), "/ring": reading(_ref("s0"))}, components={"schemas": _ring()}
     ),
     "example": lambda: _large("content", {"example": "a" * 20_000_000}),
     "pattern": lambda: _large("schema", {"pattern": "a" * 20_000_000}),

@@ -12,7 +12,7 @@ _FOLLOWS = {
 
 # Faults for which the whole class is judged: nothing else may be blamed. Some of these faults show only after the
 # requests of other requirements.
-_WHOLE_CLASS = (6, 7, 10)
+_WHOLE_CLASS = (3, 4, 7)
 # What the other styles do in their own way is judged by these classes.
 _CLASSES = ("--class=description", "--class=http")
 

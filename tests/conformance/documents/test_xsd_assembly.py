@@ -224,9 +224,6 @@ _MUTUAL = "".join(
 _OFTEN = (
     '<xs:sequence minOccurs="9" maxOccurs="999999999"><xs:element name="v" minOccurs="2" maxOccurs="{}"/></xs:sequence>'
 )
-_PATTERN = (
-    '<xs:simpleType name="D"><xs:restriction base="xs:string"><xs:pattern value="{}"/></xs:restriction></xs:simpleType>'
-)
 
 
 @pytest.mark.parametrize(
