@@ -33,7 +33,11 @@ _FAULTS = (
         "rate whole": ("written-is-read", "as Rate"),
         "second delete does nothing": ("deleted-is-gone", "after DeleteRecipe"),
     },
-    {"escaped twice": ("written-is-read", "&amp;"), "no maxInclusive": ("invalid-refused", "'10' at Tray")},
+    {
+        "escaped twice": ("written-is-read", "&amp;"),
+        "no maxInclusive": ("invalid-refused", "'10' at Tray"),
+        "id twice": ("created-is-there", "where an earlier thing is"),
+    },
     {"lost after refusal": ("written-is-read", "SetSettings"), "no maxLength": ("invalid-refused", "p' at Title")},
     {
         "utf-16 lost": ("written-is-read", 'Label "Gr??'),
@@ -49,7 +53,6 @@ _FAULTS = (
         "mode burst refused": ("valid-accepted", "SetSettings"),
     },
     {"refused creates": ("refused-keeps", "which is new")},
-    {"id twice": ("created-is-there", "where an earlier thing is")},
 )
 
 
