@@ -42,7 +42,7 @@ _UNITS: Final = {
 }  # fmt: skip
 # What the name of a way, a position or a velocity has beside the name of its axis.
 _BESIDE: Final = re.compile(
-    r"(?:^|_)(?:positions?|pos|distance|delta|offset|relative|target|velocity|vel|speed|rate|mm|cm|m|deg|degrees|rad|s)"
+    r"(?:^|_)(?:positions?|pos|distance|delta|offset|relative|steps?|target|velocity|vel|speed|rate|mm|cm|m|deg|degrees|rad|s)"
     r"(?=_|$)",
     re.IGNORECASE,
 )

@@ -224,7 +224,7 @@ def _with_values(operation: Operation, values: Mapping[str, str]) -> Operation:
 
 
 def stop_beside(operations: Sequence[Operation], drive: Operation) -> Operation | None:
-    """Return the nearest operation in the same folder, or one around it, called stop; else the DELETE of a move."""
+    """Return the nearest operation below the drive, in its folder or around it, called stop; else a move's DELETE."""
     path = drive.template.partition("?")[0]
     stops = [
         operation
@@ -232,7 +232,7 @@ def stop_beside(operations: Sequence[Operation], drive: Operation) -> Operation 
         if _STOPS.fullmatch(posixpath.basename(operation.template))
         and operation.method in {"POST", "PUT"}
         and not _LATCHES.search(operation.text)
-        and path.startswith(f"{posixpath.dirname(operation.template).rstrip('/')}/")
+        and f"{path}/".startswith(f"{posixpath.dirname(operation.template).rstrip('/')}/")
     ]
     found = max(stops, key=lambda operation: operation.template.count("/"), default=None)
     if found is None:
@@ -306,7 +306,7 @@ class Finder(ABC):
         self._begin()
         self._answer: Any = None
         self._left, self._used, self._is_accepted = plan.preparing, NOTHING, False
-        self._asked, self._words = 0.0, dict[str, Any]()
+        self._asked, self._words, self._last_words = 0.0, dict[str, Any](), dict[str, Any]()
         self._failed: tuple[str, Any] | None = None
         self._ready = Preparation(self._used, binding, self._exchange, clock)
 
@@ -380,16 +380,19 @@ class Finder(ABC):
     def _waits(self) -> bool:
         """Wait a little while the device gets ready; return whether it still has time for that."""
         self._clock.sleep(_PACE_S)
+        # What the device says before a command that it accepts, and not while it follows that.
+        self._last_words = self._states() if self._words else {}
         return bool(self._used.steps) and self._clock.now() < self._asked + READY_S
 
     def _note_ready(self) -> None:
         """Note what shows that the device is ready, if it had to be awaited after the last step: what changed since."""
         if self._is_accepted and self._used.steps and self._clock.now() > self._asked + _AT_ONCE_S and self._words:
-            words, read = self._states(), self._plan.reads[0].label
-            step, ends = self._used.steps[-1]
-            changed = [at for at, word in words.items() if self._words.get(at) != word]
-            if changed:
-                step = msgspec.structs.replace(step, read=read, at=changed[0], shows=words[changed[0]])
+            (step, ends), read = self._used.steps[-1], self._plan.reads[0].label
+            several = [*self._last_words.items(), *self._states().items()]
+            changed = [(at, word) for at, word in several if self._words.get(at) != word]
+            # "homing" and "moving" are not what shows that it is ready.
+            for at, word in sorted(changed, key=lambda one: str(one[1]).lower().endswith("ing"))[:1]:
+                step = msgspec.structs.replace(step, read=read, at=at, shows=word)
                 self._used = replace(self._used, steps=(*self._used.steps[:-1], (step, ends)))
         self._words = {}
 

@@ -79,6 +79,12 @@ def _worst(tries: Sequence[Moved]) -> Moved:
     return Moved(took_s, off, sigma, way, tuple(way for one in tries for way in one.ways))
 
 
+def _off(start: float, way: float, end: float, near: float) -> float:
+    """Return how far from its target an axis rests; 0 too if it went as far the wrong way, which is judged."""
+    wrong = way and min(abs(end - start + way), abs(end + start + way)) < near
+    return 0.0 if wrong else abs(end - start - way)
+
+
 def _spread(samples: Sequence[Sample]) -> float:
     return max(value for _, value in samples) - min(value for _, value in samples)
 
@@ -176,9 +182,10 @@ class PositionFinder(Finder):
             took_s = max((one.took_s for one in kept.values()), default=0.0)
             if part < 1 and took_s > _SLOW_S and len(numbers) == 1 and not self._lasts:
                 break
-            if is_free and part == 1 and found and took_s < _SEEN_S / 2:
+            share = 1.0 if len(numbers) == 1 else _TOGETHER
+            if is_free and part == 1 and found and share * took_s < _SEEN_S / 2:
                 # It is there too soon to be stopped under way.
-                parts.append(min(FARTHEST, _SEEN_S / took_s))
+                parts.append(min(FARTHEST, _SEEN_S / took_s / share))
             elif is_free and part == 1 and not found and all(number.turns for number in numbers):
                 # An angle that stays where it is may be one in degrees.
                 parts.append(FARTHEST)
@@ -277,7 +284,7 @@ class PositionFinder(Finder):
             goals = {name: start[name] + way for name, way in ways.items()}
         found: dict[str, Moved] = {}
         for name, way in ways.items():
-            off = abs(ends[name] - goals[name])
+            off = _off(start[name], way, ends[name], near[name])
             if off > near[name] or beside:
                 came = f"sent to {goals[name]:.4g}, it came to {ends[name]:.4g}"
                 self._why[name] = next(iter(beside.values()), came) if off <= near[name] else came

@@ -395,38 +395,34 @@ class MappedDevice:
 
     def leave_at_rest(self) -> str:
         """Stop the device, see that it rests, and release it; return why it may still move, or an empty text."""
-        problem = self._left_at_rest()
-        try:
-            self.ready.end()
-        except (NotPossibleError, NotPermittedError) as error:
-            return problem or str(error)
-        except NoAnswerError as none:
-            return problem or f"{self._request_text(none.unanswered)}: {none}"
-        return problem
+        problem, ended = self._left_at_rest(), self._problem_of(self.ready.end)
+        return problem or ended
 
     def _left_at_rest(self) -> str:
-        problem = ""
-        try:
-            command = self.halt()
-            if command is None:
-                problem = "the motion map has no stop that can be sent"
-            elif not command.is_ok:
-                problem = f"{self._request_text(command.exchange)} got {command.exchange.came}"
-        except NoAnswerError as none:
-            problem = f"{self._request_text(none.unanswered)}: {none}"
-        except NotPermittedError as refusal:
-            problem = str(refusal)
+        problem = self._problem_of(self._halted)
         if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
             return problem
+        # If a stop was not accepted, send it again soon.
+        velocity = self.motion.velocity
+        within_s = (velocity.settle_s if velocity else 0.0) if problem else None
+        moves = self._problem_of(partial(self.come_to_rest, stop=False, within_s=within_s))
+        return "; ".join(filter(None, (problem, moves))) if moves else ""
+
+    def _halted(self) -> str:
+        """Stop the device; return why it may still move, or an empty text."""
+        command = self.halt()
+        if command is None:
+            return "the motion map has no stop that can be sent"
+        return "" if command.is_ok else f"{self._request_text(command.exchange)} got {command.exchange.came}"
+
+    def _problem_of(self, act: Callable[[], str | None]) -> str:
+        """Return what an action returns, or why it failed; empty if it did not."""
         try:
-            # If a stop was not accepted, send it again soon.
-            velocity = self.motion.velocity
-            self.come_to_rest(stop=False, within_s=(velocity.settle_s if velocity else 0.0) if problem else None)
+            return act() or ""
         except (NotPossibleError, NotPermittedError) as error:
-            return "; ".join(filter(None, (problem, str(error))))
+            return str(error)
         except NoAnswerError as none:
-            return problem or f"{self._request_text(none.unanswered)}: {none}"
-        return ""
+            return f"{self._request_text(none.unanswered)}: {none}"
 
     @staticmethod
     def _request_text(attempt: Attempt) -> str:

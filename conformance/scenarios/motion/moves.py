@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from conformance.documents.openapi import matching
 from conformance.scenarios.motion.driving import with_room
 from conformance.scenarios.motion.mapped import STAYS_S, MappedDevice, Position
 from conformance.scenarios.motion.trace import Command, Leg, Reading
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError, NotSeenError, PartialTraceError, scenario
 from conformance.scenarios.stage import Need, Stage
 from conformance.statement.motion_map import Axis, Speed
-from conformance.transport.exchange import NoAnswerError
+from conformance.transport.exchange import NoAnswerError, NotPermittedError
 from conformance.verdict.effort import Effort
 from conformance.verdict.run import Run
 
@@ -28,8 +30,9 @@ TRIES: Final = 3
 # most _AT_MOST_S, s.
 _AT_LEAST_S: Final = 1.5
 _AT_MOST_S: Final = 5.0
-# _LONGER_S: time added to that of a displaced move, s. _COMMANDS: moves in a row.
-_LONGER_S: Final = 0.5
+# _LONGER_S: time added to that of a displaced move, s; _LONGEST_S: where its own resource is read, as a device ends a
+# move a while after it is there. _COMMANDS: moves in a row.
+_LONGER_S, _LONGEST_S = 0.5, 1.5
 _COMMANDS: Final = 100
 # A velocity with a longer hold time is always ended by a stop, s.
 _SHORT_HOLD_S: Final = 2.0
@@ -207,10 +210,10 @@ def _drive_before(mapped: MappedDevice) -> None:
 
 
 @scenario(needs=_NEEDS, stage=Stage.MOTION)
-def new_targets(mapped: MappedDevice, effort: Effort) -> tuple[Leg, ...]:
+def new_targets(mapped: MappedDevice, effort: Effort, run: Run) -> tuple[Leg, ...]:
     """Send the device back under way, and watch for as long as the first move would have taken, and longer."""
     need_positions(mapped)
-    return record_parts(_to_new_targets(mapped, effort))
+    return record_parts(_to_new_targets(mapped, effort, run))
 
 
 def need_positions(mapped: MappedDevice) -> None:
@@ -223,14 +226,24 @@ def need_positions(mapped: MappedDevice) -> None:
         raise NotDeclaredError("moves are relative: where they end when they come together, nobody declares")
 
 
-def _to_new_targets(mapped: MappedDevice, effort: Effort) -> Iterator[Leg]:
+def _to_new_targets(mapped: MappedDevice, effort: Effort, run: Run) -> Iterator[Leg]:
+    path = mapped.moves.send.partition(" ")[2]
+    has_get = run.contract is not None and matching(run.contract, "GET", path) is not None
+    longer_s = _LONGEST_S if has_get else _LONGER_S
+
+    def ask(_: object) -> None:
+        """Read the move's own resource, as a client does that waits for its end."""
+        with suppress(NotPermittedError):
+            if has_get:
+                mapped.get(f"GET {path}")
+
     for name in _axes(mapped, effort):
         way = _way(mapped, name)
         second = mapped.goto(way.behind)
         last = second if second.is_ok else way.command
         first_s = min(mapped.takes_s, way.lasts_s(name))
         seen = way.readings + mapped.follow(last)
-        seen += mapped.watch(max(mapped.clock.now(), way.command.answered + first_s) + _LONGER_S)
+        seen += mapped.watch(max(mapped.clock.now(), way.command.answered + first_s) + longer_s, ask)
         yield Leg(f"back, with {name} under way", way.start, (way.command, second), tuple(seen), mapped.due(last))
 
 

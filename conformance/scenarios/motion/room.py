@@ -85,12 +85,11 @@ class Room:
                 # The start of a drive is reached within the tolerance only.
                 free = axis.limits[1] - axis.limits[0] - 2 * self._motion.tolerance(name)
                 share = min(share, max(0.0, free) / (down + up))
-        for name, speed in ((name, speed) for choice in choices for name, speed in choice.items() if speed):
-            if share < 1 and share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name):
-                raise NotPossibleError(
-                    f"the limits of {', '.join(ways)} leave no room to drive {name} for {lasts_s:.1f} s: the slowest "
-                    f"response took {self.slowest_s:.2f} s"
-                )
+        if slow := self._too_slow(choices, share):
+            raise NotPossibleError(
+                f"the limits of {', '.join(ways)} leave no room to drive {slow} for {lasts_s:.1f} s: the slowest "
+                f"response took {self.slowest_s:.2f} s"
+            )
         limits = {name: self._axes[name].limits for name in ways}
         begin = {
             name: (limits[name][0] + share * down, limits[name][1] - share * up) for name, (down, up) in ways.items()
@@ -109,13 +108,13 @@ class Room:
             down, up = self._way(name, choices, _FASTER * (lasts_s + self._blind_s))
             for way, free in ((down, here[name] - axis.limits[0]), (up, axis.limits[1] - here[name])):
                 share = min(share, max(0.0, free) / way) if way > 0 else share
-        slow = any(
-            share * abs(speed) < MEASURABLE * self._motion.speed_tolerance(name)
-            for choice in choices
-            for name, speed in choice.items()
-            if speed
-        )
-        return 0.0 if share < 1 and slow else share
+        return 0.0 if self._too_slow(choices, share) else share
+
+    def _too_slow(self, choices: Sequence[Speeds], share: float) -> str:
+        """Return a velocity that cannot be measured at a share of it below 1; empty if there is none."""
+        least = {name: MEASURABLE * self._motion.speed_tolerance(name) for choice in choices for name in choice}
+        several = (one for choice in choices for one in choice.items() if share < 1 and one[1])
+        return next((name for name, speed in several if share * abs(speed) < least[name]), "")
 
     def note(self, speeds: Speeds, readings: Sequence[Reading]) -> None:
         """Learn from a drive how fast one velocity changes each axis; drives with several velocities do not tell."""

@@ -291,8 +291,8 @@ _NUMBER = {"type": "number"}
 class Slide:
     """A slide that is sent to a position; ``shows_end``: it tells where it is only once it has arrived."""
 
-    def __init__(self, clock, speed, *, shows_end=False, least=-1.0):
-        self.clock, self.speed, self.shows_end, self.least = clock, speed, shows_end, least
+    def __init__(self, clock, speed, *, shows_end=False, least=-1.0, sign=1):
+        self.clock, self.speed, self.shows_end, self.least, self.sign = clock, speed, shows_end, least, sign
         self.start = self.goal = self.since = 0.0
 
     def answer(self, method, path, octets):
@@ -300,7 +300,7 @@ class Slide:
         here = self.goal if done >= abs(way) else self.start + (0.0 if self.shows_end else math.copysign(done, way))
         if method == "PUT":
             self.start, self.since = here, self.clock.now()
-            self.goal = max(self.least, json.loads(octets)["x"]) if path == "/goto" else here
+            self.goal = max(self.least, self.sign * json.loads(octets)["x"]) if path == "/goto" else here
         return 200, {"x": here}
 
 
@@ -327,6 +327,10 @@ def test_a_slide_is_sent_so_far_that_it_can_be_stopped_from_an_end_of_its_travel
     motion, outcomes = _slide(speed, **how)
     assert motion.state.axes["x"].limits == pytest.approx(limits, abs=0.05)
     assert {getattr(one, "holds", None) for one in outcomes} == {True}
+
+
+def test_a_slide_that_goes_the_wrong_way_gets_a_map_by_which_it_is_judged():
+    assert _slide(0.5, sign=-1)[0].state.axes["x"].limits == (-0.05, 0.05)
 
 
 @pytest.mark.parametrize(("said", "most", "speed"), [("mm/s", 300, 300), ("percent of 500 mm/s", 100, None)])
@@ -405,7 +409,9 @@ def test_the_stop_is_the_nearest_one_and_else_the_end_of_a_move():
     move = {"requestBody": {"content": {"application/json": {"schema": _BODY}}}, "responses": {}}
     stop, read = {"post": {"responses": {}}}, {"get": {"responses": {"200": {"content": {"application/json": {}}}}}}
     paths = {"/arm/moves": {"post": move}, "/arm/moves/{id}": {"delete": {"responses": {}}}, "/state": read}
-    for more, found in ({}, "DELETE /arm/moves/{id}"), ({"/stop": stop, "/app/stop": stop}, "POST /stop"):
+    near = {"/stop": stop, "/app/stop": stop}
+    below = {**near, "/arm/moves/stop": stop, "/arm/moves/left/stop": stop}
+    for more, found in ({}, "DELETE /arm/moves/{id}"), (near, "POST /stop"), (below, "POST /arm/moves/stop"):
         operations = read_operations({"openapi": "3.1.0", "info": {}, "paths": {**paths, **more}})
         assert plan_of(operations, "POST /arm/moves", None, CallRules()).stop.label == found
     stop["post"]["summary"] = "Emergency stop, latched until it is reset"
