@@ -399,7 +399,7 @@ class MappedDevice:
         return problem or ended
 
     def _left_at_rest(self) -> str:
-        problem = self._problem_of(self._halted)
+        problem = self._problem_of(self._halt_problem)
         if is_drafting() or not (self.motion.state.axes or self.motion.speeds):
             return problem
         # If a stop was not accepted, send it again soon.
@@ -408,7 +408,7 @@ class MappedDevice:
         moves = self._problem_of(partial(self.come_to_rest, stop=False, within_s=within_s))
         return "; ".join(filter(None, (problem, moves))) if moves else ""
 
-    def _halted(self) -> str:
+    def _halt_problem(self) -> str:
         """Stop the device; return why it may still move, or an empty text."""
         command = self.halt()
         if command is None:
