@@ -43,7 +43,10 @@ _LEAST_S, _EACH_S, _MOST_S = 60.0, 2.0, 1800.0
 _BY_JUDGEMENT = "as in the run"
 _BY_STATUS = "by the status"
 _BY_SILENCE = "by the missing response"
-_ALONE = "from the request alone: give --statement, so that the requirement's own checks judge the device"
+_ALONE = (
+    "from the request alone: the failure shows only beside other responses. --statement FILE runs the requirement's "
+    "own checks again; `roaas certify --init FILE URL` writes such a file"
+)
 # Statuses by which a gateway or device says that the device is temporarily unavailable.
 _AWAY = frozenset({502, 503, 504})
 _SERVER_ERROR = 500
@@ -91,9 +94,6 @@ def replay(
     until: float = math.inf,
 ) -> Replayed:
     """Send one finding's requests again.
-
-    What one response shows is judged again by the new response: by a checker, a rule on the description, or as a
-    server error. Of others, one response cannot tell.
 
     Args:
         id_: id of the requirement.
