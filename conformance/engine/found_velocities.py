@@ -334,7 +334,7 @@ class VelocityFinder(Finder):
                 held_s = since - last
                 if response.is_position:
                     # Computed from the distance covered, because noise hides when the robot came to rest.
-                    held_s = (samples[-1][1] - samples[0][1]) / moving
+                    held_s = abs((samples[-1][1] - samples[0][1]) / moving)
                 self.notes.append(f"Let go, it came to rest {held_s:.2f} s after the last command.")
                 return max(0.1, math.ceil(held_s * 20) / 20)
         self.notes.append(f"Let go, it drove on for all of the {self._clock.now() - last:.1f} s of the watch.")

@@ -254,12 +254,31 @@ class Accelerating(Body):
         return dict(self.rates)
 
 
-def _simulated(body_type, noise=0.0, rule=stopped, scenario=velocities, text=""):
+class Backward(Rover):
+    """A rover whose velocities have the names of its axes, and take it the other way."""
+
+    DESCRIPTION = json.loads(json.dumps(rover.DESCRIPTION).replace('"ahead"', '"x"').replace('"left"', '"y"'))
+
+    def answer(self, method, path, octets):
+        speeds = json.loads(octets) if path == "/velocity" and octets else {}
+        if all(isinstance(speed, int | float) for speed in speeds.values()):
+            octets = json.dumps({"ahead": -speeds.get("x", 0), "left": -speeds.get("y", 0)}).encode()
+        status, said = super().answer(method, path, octets)
+        return status, dict(zip("xy", said["pose"], strict=True)) if path == "/pose" else said
+
+
+def _simulated(body_type, noise=0.0, rule=stopped, scenario=velocities, text="", device=Rover):
     """Return the map that is found of a simulated rover, and the failures of a rule, first that on its stops."""
     clock = SimulatedClock()
     body = body_type(rover.LIMITS, clock.now, clock.sleep, noise)
-    api = Api(Rover(body), clock, lambda: 0.002)
-    plan = plan_of(read_operations(rover.DESCRIPTION), "PUT /velocity", None, CallRules(), text=text)
+    api = Api(device(body), clock, lambda: 0.002)
+    plan = plan_of(
+        read_operations(getattr(device, "DESCRIPTION", rover.DESCRIPTION)),
+        "PUT /velocity",
+        None,
+        CallRules(),
+        text=text,
+    )
     motion = map_of("\n".join(VelocityFinder(api, Binding(api), plan, clock).find().lines))
     mapped = MappedDevice(api, motion, clock, Binding(api))
     given = {"mapped": mapped, "effort": Effort("quick"), "run": Run(), "motion": motion}
@@ -276,6 +295,12 @@ def test_what_stops_late_or_creeps_is_found_by_the_time_and_the_rest_of_a_right_
     assert failures
     assert motion.velocity is not None
     assert motion.velocity.settle_s < 0.5, "how late it stopped is no time that it needs"
+
+
+def test_how_long_a_rover_holds_a_velocity_is_found_though_it_drives_the_wrong_way():
+    motion, failures = _simulated(Body, rule=velocity, device=Backward)
+    assert motion.velocity.hold_s == pytest.approx(rover.HOLD_S, abs=0.1)
+    assert failures
 
 
 @pytest.mark.parametrize("rule", [stopped, velocity])
