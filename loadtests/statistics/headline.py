@@ -251,7 +251,7 @@ def _sureness(knee: Mapping[str, Any]) -> str:
         return f"; not sure: a step had {few:,} requests, and its criterion needs {needed:,}: longer --step-duration"
     if knee["searches"] == 1:
         return ", whose error only more searches show"
-    return "" if confidence >= _SURE else f", which enclose the true rate with a probability of {confidence:.0%}"
+    return "" if confidence >= _SURE else f", at {confidence:.0%} confidence"
 
 
 def _answered_text(found: Found) -> str:

@@ -142,7 +142,7 @@ def test_the_knee_leads_a_run_that_searched_for_it():
     ("known", "words"),
     [
         ({"searches": 1, "confidence": 0.0}, "in 1 search, whose error only more searches show)"),
-        ({"confidence": 0.75}, "in 3 searches, which enclose the true rate with a probability of 75%)"),
+        ({"confidence": 0.75}, "in 3 searches, at 75% confidence)"),
         ({"confidence": None, "step_requests": 75}, "not sure: a step had 75 requests, and its criterion needs 368"),
     ],
 )
