@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 from conformance.measures.samples import SEVERAL
 from conformance.scenarios.motion.mapped import MappedDevice, Position
 from conformance.scenarios.motion.room import MEASURABLE, Span
-from conformance.scenarios.motion.trace import Reading
+from conformance.scenarios.motion.trace import Reading, middle_of
 from conformance.scenarios.scenario import NotPossibleError
 
 # _BACK_SHARE: share of the limit at which the device drives back. _BACK_S: longest time for that, s.
@@ -16,6 +17,8 @@ _BACK_SHARE: Final = 0.4
 _BACK_S: Final = 20.0
 # How long a slow drive lasts that shows which axes it changes, s.
 _LEARNED_S: Final = 0.5
+# Tolerances by which a device that is driven back goes the wrong way.
+_WRONG: Final = 2
 # _TURNS: how often a device is turned at most to find a way back. _ALONG: share of its way that is along an axis then.
 _TURNS: Final = 8
 _ALONG: Final = 0.5
@@ -123,7 +126,7 @@ def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
     if not speeds:
         raise NotPossibleError(f"no velocity of the map takes {axis} back to where it has room for a drive")
     until, seen = mapped.clock.now() + _BACK_S, [mapped.read() for _ in range(SEVERAL)]
-    middle, ends = sum(span) / 2, False
+    middle, ends, begun = sum(span) / 2, False, mapped.where()[axis]
     starts_by = mapped.clock.now() + mapped.drives.settle_s + _LEARNED_S
     while not ends and mapped.clock.now() < until and not mapped.room.is_over(speeds, seen, mapped.drives.settle_s):
         if not mapped.drive(speeds[0]).is_ok:
@@ -131,6 +134,10 @@ def _drive_back(mapped: MappedDevice, axis: str, span: Span) -> bool:
         seen.append(mapped.read())
         if seen[-1].values and (seen[-1].values[axis] >= middle if forward else seen[-1].values[axis] <= middle):
             break
+        away = middle_of(seen[-SEVERAL:], axis) - begun if all(one.values for one in seen[-SEVERAL:]) else 0.0
+        if begun != math.inf and (-away if forward else away) > _WRONG * mapped.motion.tolerance(axis):
+            # It goes the wrong way, which is judged elsewhere: it is driven back by the other sign, once.
+            begun, speeds = math.inf, [{name: -speed for name, speed in speeds[0].items()}]
         ends = mapped.clock.now() > starts_by and mapped.room.ends(speeds[0], seen)
     mapped.drive({})
     mapped.come_to_rest()

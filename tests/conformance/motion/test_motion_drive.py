@@ -300,7 +300,7 @@ def test_what_stops_late_or_creeps_is_found_by_the_time_and_the_rest_of_a_right_
 def test_how_long_a_rover_holds_a_velocity_is_found_though_it_drives_the_wrong_way():
     motion, failures = _simulated(Body, rule=velocity, device=Backward)
     assert motion.velocity.hold_s == pytest.approx(rover.HOLD_S, abs=0.1)
-    assert failures
+    assert len(failures) > 2, "it is driven back to where there is room, and drives on"
 
 
 @pytest.mark.parametrize("rule", [stopped, velocity])
