@@ -109,9 +109,9 @@ class _Change(NamedTuple):
 
     @property
     def sent_value(self) -> Any:
-        """The JSON value of its body; of a list, an object with that."""
+        """The JSON value of its body; of a list or the like, an object with that."""
         value = read_json(self.write.request.body).value
-        return {WHOLE: value} if isinstance(value, list) and self.write.request.method == "PUT" else value
+        return value if isinstance(value, dict) or self.write.request.method != "PUT" else {WHOLE: value}
 
     @property
     def schema(self) -> Schema:
@@ -218,7 +218,7 @@ class Writes:
         writes, last = self._writes.get(path, []), self._last.get(path, {})
         if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
             value = read_json(request.body).value
-            self._accepted[path] = {WHOLE: value} if isinstance(value, list) else value
+            self._accepted[path] = value if isinstance(value, dict) else {WHOLE: value}
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]

@@ -108,12 +108,13 @@ def _write_values(writer: Writer, read: Operation, write: Operation) -> list[Wri
     if not is_json(media_type) or not before.response.ok or before.response.cut:
         return []
     schema = write.bodies[media_type].schema
-    if isinstance(value := read_json(before.response.body).value, list):
-        others = values_of(schema, value, writer.values.collections) if fits(schema, value) else ()
-        for one in (*others, value) if write.method == "PUT" else ():
-            writer.conditional(write, read, "", one)
-            writer.send(read)
-        return []
+    value = read_json(before.response.body).value
+    if not isinstance(value, dict):
+        others = list(values_of(schema, value, writer.values.collections)) if fits(schema, value) else []
+        sent = [(one, _write(writer, read, write, one, before)) for one in others if write.method == "PUT"]
+        restored = _write(writer, read, write, value, before) if sent else []
+        is_kept = bool(words_of(read.template) & _KEEPING) or any(made and not made[-1].other for _, made in sent)
+        return [one for _, made in (*sent, (value, restored)) for one in made] if is_kept else []
     parts = flat(schema).get("properties", {})
     first = {
         name: one

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from conformance.api.rest.inputs import request_of, usual_inputs, whole_body, with_new_values
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.samples import fits, other_texts
-from conformance.api.rest.things import another, as_answered, differences, doubt_of_write, object_in, with_items
+from conformance.api.rest.things import WHOLE, another, as_answered, differences, doubt_of_write, object_in, with_items
 from conformance.api.rest.values import Values
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json
@@ -231,9 +231,11 @@ class Writer:
     ) -> tuple[str, ...]:
         """Return the differences between a request's and a response's content; empty if they cannot be compared."""
         body, media_type = read_json(sent.request.body).value, sent.request.media_type
-        if not isinstance(body, dict) or not found.response.ok or media_type not in operation.bodies:
+        if body is None or not found.response.ok or media_type not in operation.bodies:
             return ()
         schema = operation.bodies[media_type].schema
+        if not isinstance(body, dict):
+            body, schema = {WHOLE: body}, {"properties": {WHOLE: schema}}
         told = as_answered(body, members(sent, body), members(before, body) if before else {}, schema)
         now, collections = members(found, body), self.values.collections
         differs = tuple(differences(body, now, schema, read.shape, collections))

@@ -195,7 +195,7 @@ def _send(api: RestInterface, method: str, path: str, was: bytes | None = None) 
     if was is not None:
         media_type = next(filter(is_json, operation.bodies), "")
         value = read_json(was).value
-        if media_type and isinstance(value, dict | list):
+        if media_type and value is not None:
             taken = flat(operation.bodies[media_type].schema).get("properties", {})
             if taken and isinstance(value, dict):
                 kept = {name for name, part in taken.items() if not flat(part).get("readOnly")}

@@ -19,8 +19,8 @@ from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 
 # Ends of path parameters whose value may be a member of another name: ``item_pk`` is the item's ``id``.
-# WHOLE: the member that a list is of itself.
-WHOLE: Final = "the list"
+# WHOLE: the member that a document is of itself, if it is a list, a number, a text or a boolean.
+WHOLE: Final = "the whole"
 _NUMBERED: Final = ("id", "uuid", "guid", "pk", "key", "number")
 # Members that a device sets itself or does not return. ``on`` alone is a switch; ``season``, ``format`` and ``standby``
 # are other words.
@@ -142,9 +142,9 @@ def identifier_of(value: Any, item: Operation) -> str:
 def object_in(value: Any, names: Collection[str]) -> dict[str, Any]:
     """Return the object of a response that has the most members of these plain names: the body, or one inside it.
 
-    Of a body that is a list, it has that as its only member (see `parts_of`).
+    Of a body that is no object, it has that as its only member (see `parts_of`).
     """
-    if isinstance(value, list) and plain_name(WHOLE) in names:
+    if not isinstance(value, dict) and value is not None and plain_name(WHOLE) in names:
         return {WHOLE: value}
     found = [value] if isinstance(value, dict) else []
     found += [item for item in value.values() if isinstance(item, dict)] if found else []
@@ -355,8 +355,9 @@ def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, 
 
 
 def parts_of(schema: Schema | None) -> dict[str, Any]:
-    """Return the members of a schema, or of the object in its envelope; a list is the only member of itself."""
-    if "array" in kinds_of(schema or {}):
+    """Return the members of a schema, or of the object in its envelope; what is no object is its own only member."""
+    kinds = kinds_of(schema or {})
+    if kinds - {"null"} and "object" not in kinds:
         return {WHOLE: schema}
     outer: dict[str, Any] = flat(schema or {}).get("properties", {})
     inner = [flat(item).get("properties", {}) for item in outer.values() if isinstance(item, dict)]

@@ -123,6 +123,7 @@ def test_a_value_that_the_description_of_a_409_calls_taken(contract, steps, brok
 
 _OCTETS, _NOTES = {"type": "string", "format": "binary"}, {"type": "array", "items": {"type": "string", "minLength": 1}}
 _PUMP, _ZONE = object_of("enabled", enabled={"type": "boolean"}), object_of("wet", wet={"type": "integer"})
+_GAIN = {"type": "integer", "minimum": 1, "maximum": 90}
 _ORDER = object_of("litres", litres={"type": "number", "minimum": 0, "maximum": 50})
 _SWITCHED, _STORED = {"200": answers(_PUMP), "4XX": REFUSED}, {"204": {"description": "stored"}, "4XX": REFUSED}
 _DEVICE = {
@@ -137,6 +138,7 @@ _DEVICE = {
         "get": {"responses": {"200": answers(_OCTETS, "application/octet-stream")}},
         "put": {"requestBody": body_of(_OCTETS, "application/octet-stream"), "responses": _STORED},
     },
+    "/settings/gain": {**reading(_GAIN), "put": {"requestBody": body_of(_GAIN), "responses": _STORED}},
     "/zones": reading({"type": "array", "items": {"type": "string"}}),
     "/zones/{id}": {
         "parameters": [_ID],
@@ -156,6 +158,7 @@ class _Garden:
     def __init__(self, fault):
         self.fault, self.ids, self.jobs = fault, itertools.count(1), {}
         self.notes, self.photo, self.zones, self.is_on = ["a"], b"none", {"a": 1}, False
+        self.gained = 7
 
     async def pump(self, request):
         if request.method == "POST":
@@ -199,6 +202,13 @@ class _Garden:
             return web.Response(status=204)
         return web.Response(body=self.photo, content_type="application/octet-stream")
 
+    async def gain(self, request):
+        body = await _json(request) if request.method == "PUT" else self.gained
+        if isinstance(body, bool) or not isinstance(body, int) or not 1 <= body <= 90:
+            return error(422, "no gain")
+        self.gained = min(body, 60) if self.fault == "gain is limited" else body
+        return web.json_response(body) if request.method == "GET" else web.Response(status=204)
+
     async def put_zone(self, request):
         body, name = await _json(request), request.match_info["id"]
         if not isinstance(body, dict) or not isinstance(body.get("wet"), int) or isinstance(body["wet"], bool):
@@ -225,6 +235,7 @@ class _Garden:
             "/pump": {"GET": self.pump}, "/pump/enable": {"POST": self.pump}, "/pump/disable": {"POST": self.pump},
             "/jobs": {"POST": self.begin}, "/jobs/{id}": {"GET": self.job}, "/jobs/{id}/cancel": {"POST": self.job},
             "/notes": {"GET": self.all_of, "PUT": self.put_notes}, "/zones": {"GET": self.all_of},
+            "/settings/gain": {"GET": self.gain, "PUT": self.gain},
             "/photo": {"GET": self.picture, "PUT": self.picture},
             "/zones/{id}": {"GET": self.zone, "PUT": self.put_zone, "DELETE": self.zone},
         }  # fmt: skip
@@ -243,6 +254,7 @@ _FAULTS = {
     "litres lost": {_READ},
     "notes are added": {_READ},
     "photo is kept": {_READ},
+    "gain is limited": {_READ},
     "created with 200": {_THERE},
 }
 
@@ -256,4 +268,4 @@ def test_commands_and_whole_documents_of_a_device(tmp_path, fault):
     assert {id_ for id_, verdict in seen.blamed.items() if verdict == "fail"} == _FAULTS.get(fault, set()), seen.text
     if not fault:
         # What a client had there before is there again, and nothing else.
-        assert (garden.notes, garden.photo, garden.zones) == (["a"], b"none", {"a": 1})
+        assert (garden.notes, garden.photo, garden.zones, garden.gained) == (["a"], b"none", {"a": 1}, 7)
