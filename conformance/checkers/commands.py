@@ -180,7 +180,7 @@ class Commands:
             state = command.state[0] if command.state is not None else ""
             kept = {name: one for name, one in was.items() if name == state or (read.label, name) not in self._moving}
             yield from self._judge(occasion, command, kept, now)
-        elif len(self._seen) < _MOST:
+        if path not in self._sent and len(self._seen) < _MOST:
             self._seen[path] = now
 
     def _judge(
