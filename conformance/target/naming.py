@@ -306,7 +306,7 @@ def _apply(declared: Statement, options: DeviceOptions, contract: Contract) -> S
             raise StatementError(f"{key.replace('_', '-')} {url!r} is no URL: it has to start with http:// or https://")
     if not where.interfaces:
         raise StatementError(
-            "no robot is named: give "
+            "no robot is named: give the URL of its description, as in `roaas certify http://robot:8000`, or "
             + advice("--rest, --publishers-wsdl or --subscribers-wsdl, or ")
             + "a STATEMENT with [endpoints]"
         )
