@@ -22,7 +22,7 @@ from conformance.checkers.occasion import Occasion
 from conformance.checkers.resources import Resources
 from conformance.checkers.texts import Texts
 from conformance.checkers.totals import Sublists
-from conformance.checkers.untouched import Untouched
+from conformance.checkers.untouched import Copied, Untouched
 from conformance.checkers.writes import Writes
 from conformance.contract.pack import Contract
 from conformance.documents.openapi import resource_at
@@ -51,10 +51,11 @@ class Histories:
         self._contract = contract
         self._memory, self._writes, self._changes = Memory(contract), Writes(contract), Changes(contract)
         self._untouched, self._answers, self._commands = Untouched(contract), Answers(contract), Commands(contract)
+        self._copied = Copied()
         self._checkers = (
             Conditional(), Lists(), Resources(), EntityTags(), Texts(), Identities(), self._memory,
             self._writes, Uniques(), self._changes, declared.WriteOnly(), Contents(), Transitions(contract),
-            self._untouched, Sublists(contract), Entries(contract), self._answers, self._commands,
+            self._untouched, Sublists(contract), Entries(contract), self._answers, self._commands, self._copied,
         )  # fmt: skip
 
     def forget(self, *, deletes: bool) -> None:
@@ -65,6 +66,7 @@ class Histories:
         self._untouched.forget()
         self._answers.forget()
         self._commands.forget()
+        self._copied.forget()
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""

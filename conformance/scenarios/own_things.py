@@ -17,7 +17,6 @@ from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import Listing, listing_of, page_of
 from conformance.api.rest.patches import same
 from conformance.api.rest.references import singular
-from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, identifier_of, path_chosen
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import NO_FORMAT, Kind, Variation
@@ -44,7 +43,7 @@ from conformance.scenarios.special_bodies import by_format, is_list_of_changes, 
 from conformance.scenarios.stage import Leaves, Need, Stage
 from conformance.scenarios.survey import Probe, Survey, Surveyor
 from conformance.scenarios.whole_list import read_numbers
-from conformance.scenarios.writing import Writer, members
+from conformance.scenarios.writing import Writer, members, takes_tags
 from conformance.transport.exchange import Exchange, NoAnswerError, NotPermittedError, Outgoing
 from conformance.transport.parallel import send_together
 
@@ -92,17 +91,22 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if not is_item and is_free(free[0], path):
                     kept.upload()
             if create is not None and thing_path:
-                thing = _Thing(surveyor, read, thing_path)
+                thing, near = _Thing(surveyor, read, thing_path), Outgoing("GET", path_of_usual(read, values))
+                others = [near] * (near.target != thing_path)
                 thing.try_undeclared()
                 if "206" in read.responses:
                     thing.in_parts(read, thing.target)
+                # What is written to this one must not be in another one.
+                list(map(api.send, others))
                 thing.write(changes)
+                list(map(api.send, others))
                 thing.upload()
                 thing.beside(create, delete)
                 thing.listed_below(operations, changes)
                 if values.unique.knows(create) and changes:
                     thing.made_alike(create, changes, delete)
                 thing.delete(delete, operations.get(("GET", collection_of(path))))
+                list(map(api.send, others))
     with api.run.limit.lift(), suppress(NoAnswerError):
         post_files(surveyor, operations)
         change_entries(surveyor, operations)
@@ -256,13 +260,13 @@ class _Thing:
             # Strong comparison: a weak tag matches none (RFC 9110 13.1.1).
             tried += [
                 (("If-Match", f"W/{self.tag}"),),
-                *([(("If-Match", _NEITHER),)] if _fits(change, _NEITHER) else []),
+                *([(("If-Match", _NEITHER),)] if takes_tags(change, _NEITHER) else []),
             ]
         if self.tag and "428" in change.responses:
             tried.append(())
         if self.tag and "if-none-match" in names:
             tried.append((("If-None-Match", "*"),))
-        if self._current() and "if-match" in names and change.method != "DELETE" and _fits(change, "*"):
+        if self._current() and "if-match" in names and change.method != "DELETE" and takes_tags(change, "*"):
             tried.append((("If-Match", "*"),))
         if "406" in change.responses:
             tried.append((("Accept", NO_FORMAT),))
@@ -537,7 +541,7 @@ class _Thing:
             second: for this operation it is the second of two tags, if the schema of the field allows a list.
         """
         tags = f"{NO_TAG}, {self.tag}"
-        tags = tags if second is not None and _fits(second, tags) else self.tag
+        tags = tags if second is not None and takes_tags(second, tags) else self.tag
         return (("If-Match", tags),) if self.tag and not self.tag.startswith("W/") else ()
 
     def delete(self, delete: Operation | None, lister: Operation | None) -> None:
@@ -589,10 +593,3 @@ class _Thing:
             if is_last or page is None or id_ not in {identifier_of(item, self.read) for item in page.items}:
                 return
             time.sleep(_PAUSE_S)
-
-
-def _fits(change: Operation, tags: str) -> bool:
-    """Return whether an operation's declared If-Match allows these tags."""
-    return all(
-        fits(parameter.schema, tags) for parameter in change.parameter("header") if parameter.name.lower() == "if-match"
-    )

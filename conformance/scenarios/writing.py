@@ -260,6 +260,13 @@ class Writer:
         return sent
 
 
+def takes_tags(change: Operation, tags: str) -> bool:
+    """Return whether an operation's declared If-Match allows these tags."""
+    return all(
+        fits(parameter.schema, tags) for parameter in change.parameter("header") if parameter.name.lower() == "if-match"
+    )
+
+
 def members(exchange: Exchange, names: Any) -> dict[str, Any]:
     """Return the members of the thing in a JSON response; names: those that it probably has."""
     value = read_json(exchange.response.body).value if is_json(exchange.response.media_type) else None

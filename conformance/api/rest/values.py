@@ -68,13 +68,14 @@ class Values:
         self._learn(value, 0)
         page = page_of(response, operation) if listing_of(operation) is not None else None
         items = page.items if page is not None else value if isinstance(value, list) else [value]
+        items = [*value] if isinstance(value, dict) and is_map(operation.shape) else items
         for item in items[:_REMEMBERED]:
             if isinstance(item, dict):
                 for name in IDS:
                     if isinstance(item.get(name), str | int):
                         self._learn_id(operation, item[name])
                         break
-            elif isinstance(item, str | int) and isinstance(value, list):
+            elif isinstance(item, str | int) and isinstance(value, list | dict):
                 self._learn_id(operation, item)
 
     def _note_deletion(self, operation: Operation, exchange: Exchange) -> None:
@@ -220,6 +221,13 @@ class Values:
         if isinstance(item, list):
             return known[: len(item)] if len(known) >= len(item) else item
         return known[0] if known else self.fill(item, schema, operation)
+
+
+def is_map(schema: Schema | None) -> bool:
+    """Return whether a schema is that of things by their identifiers: objects of any name, and no other members."""
+    given = flat(schema or {})
+    part = given.get("additionalProperties")
+    return not given.get("properties") and isinstance(part, dict) and "object" in kinds_of(part)
 
 
 def _last(template: str) -> str:

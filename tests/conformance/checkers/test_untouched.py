@@ -12,6 +12,7 @@ _BASE = "http://device:8000"
 _VALVE = {"type": "object", "properties": {"id": {}, "revision": {"type": "integer"}, "seen": {"type": "integer"}}}
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _KEPT, _SAFE, _INSIDE = "description/refused-keeps", "description/safe", "robustness/no-internals"
+_READ = "description/written-is-read"
 _OK = {"200": answers(_VALVE), "4XX": REFUSED}
 _PATHS = {
     "/valves/{id}": {
@@ -107,3 +108,46 @@ def test_what_should_change_nothing_is_judged(contracts, name):
 def test_what_may_change_is_not(contracts, name):
     steps, is_said = _RIGHT[name]
     assert _broken(contracts[is_said], steps) == set()
+
+
+def _written(texts, seen):
+    """Return reads of valve 1, between which valve 2 is sent texts, with what the reads show of the revision."""
+    steps = [("GET", "1", seen[0])]
+    for text, after in zip(texts, seen[1:], strict=True):
+        steps += [("PATCH", "2", text), ("GET", "1", after)]
+    return steps
+
+
+@pytest.mark.parametrize(
+    ("steps", "broken"),
+    [
+        (_written(["first text", "other text"], [1, "first text", "other text"]), {_READ}),
+        (_written(["first text", "other text"], [1, "first text", "first text"]), set()),  # once may be chance
+        (_written(["first text", "other text"], [1, 2, 3]), set()),
+        (_written(["first text", "other text"], [1, 1, 1]), set()),
+        ([*_written(["first text"], [1, "first text"]), ("PATCH", "1", "own text"), ("GET", "1", "own text")], set()),
+    ],
+)
+def test_what_one_thing_is_sent_is_not_in_another(contracts, steps, broken):
+    checkers, found = RestCheckers(contracts[False], _BASE), set()
+    for number, (method, id_, value) in enumerate(steps):
+        body = json.dumps({"id": id_, "revision": value}).encode()
+        kind = (("Content-Type", "application/json"),)
+        sent = body if method == "PATCH" else b""
+        request = Request(method, f"{_BASE}/valves/{id_}", (("Host", "device:8000"), *(kind if sent else ())), sent)
+        exchange = Exchange(request, Response(200, kind, body, 1.0, received_s=10.0 * number))
+        found |= {one.requirement for one in checkers(exchange) if not one.holds and "another" in one.cause}
+    assert found == broken
+
+
+def test_a_path_that_leads_to_the_last_thing_is_not_judged_by_it(contracts):
+    checkers, found = RestCheckers(contracts[False], _BASE), set()
+    writes = [step for text in ("text one", "text two") for step in (("PATCH", "2", text), ("GET", "latest", text))]
+    for number, (method, path, shown) in enumerate([("GET", "latest", "a text"), *writes]):
+        body, kind = json.dumps({"id": "2", "revision": shown}).encode(), (("Content-Type", "application/json"),)
+        request = Request(
+            method, f"{_BASE}/valves/{path}", (("Host", "device:8000"), *kind), body * (method == "PATCH")
+        )
+        answer = Response(200, kind, body, 1.0, received_s=10.0 * number)
+        found |= {one.requirement for one in checkers(Exchange(request, answer)) if "another" in one.cause}
+    assert found == set()
