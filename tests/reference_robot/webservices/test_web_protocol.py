@@ -150,8 +150,9 @@ async def test_the_event_loop_polls_after_requests_that_follow_at_once_and_only_
     now = time.perf_counter()
     assert await processor_time(now, now) < 0.01
     assert await processor_time(now + 1, now + 2) < 0.01  # a second after the last response
-    later = time.perf_counter() + 0.1  # polls until then
-    assert await processor_time(now + 2, later) > 0.01
+    idle = max([await processor_time(now + 1, now + 2) for _ in range(3)])
+    later = time.perf_counter() + 0.19  # polls until then, as far as other processes let it
+    assert await processor_time(now + 2, later) > max(0.003, 5 * idle)
     assert await processor_time(later + 1, later + 1) < 0.01
     load[0] = 2.1 * os.cpu_count()
     robot.port.tick()
