@@ -64,6 +64,8 @@ _TEXTS: Final = tuple(f"roaas {word}\n two  words\r\n\ttab\n".encode() * 200 + b
 _TURN: Final = 98
 # Members that are written singly after all together, to see whether the others stay.
 _SINGLES: Final = 4
+# Things beside it that are read, the oldest that are known.
+_OTHERS: Final = 4
 
 
 @scenario(needs={Need.REST}, leaves=Leaves.UNTOUCHED, stage=Stage.EFFECT)
@@ -91,8 +93,10 @@ def own_things(api: RestInterface, values: Values) -> Survey:
                 if not is_item and is_free(free[0], path):
                     kept.upload()
             if create is not None and thing_path:
-                thing, near = _Thing(surveyor, read, thing_path), Outgoing("GET", path_of_usual(read, values))
-                others = [near] * (near.target != thing_path)
+                thing, own = _Thing(surveyor, read, thing_path), thing_path.rstrip("/")
+                ids = values.known_ids(read, read.parameter("path")[-1])
+                paths = (f"{own.rpartition('/')[0]}/{quote(str(one), safe='')}" for one in ids)
+                others = [Outgoing("GET", one) for one in paths if one != own][-_OTHERS:]
                 thing.try_undeclared()
                 if "206" in read.responses:
                     thing.in_parts(read, thing.target)
