@@ -65,8 +65,8 @@ class Command(NamedTuple):
     Attributes:
         operation: a POST.
         read: the GET of the thing.
-        switch: the boolean that it sets, and its value then; empty: none.
-        state: the member with the thing's state, and the states from which the command leads to another; empty: none.
+        switch: the boolean that it sets, and its value then; None: it sets none.
+        state: the member with the thing's state, and the states from which the command leads to another; None: none.
     """
 
     operation: Operation
@@ -90,8 +90,10 @@ class Command(NamedTuple):
         told = object_in(answer, {plain_name(name) for name in now})
         if self.read.parameter("path") and id_member(told, self.read) != id_member(now, self.read):
             return ""
-        own = parts_of(self.operation.shape)
-        names = (name for name in parts_of(self.read.shape) if name in own and name in told and name in before)
+        own, shape = parts_of(self.operation.shape), parts_of(self.read.shape)
+        # A response such as {"status": "ok"} is on the command itself.
+        is_thing = len(shape) > 1 and all(flat(own.get(name, {})) == flat(part) for name, part in shape.items())
+        names = (name for name in shape if is_thing and name in told and name in before)
         return next(
             (name for name in names if same(before[name], now.get(name)) and not same(told[name], now.get(name))), ""
         )

@@ -34,6 +34,7 @@ _JOB = object_of(
 )
 _ID = {"name": "id", "in": "path", "required": True, "schema": {"type": "string"}}
 _DONE = {"200": answers(_JOB), "202": {"description": "later"}, "4XX": REFUSED}
+_CHECKED = _DONE | {"200": answers(object_of("status", status={"type": "string"}))}
 _READ, _STATES, _THERE = (f"description/{name}" for name in ("written-is-read", "states", "created-is-there"))
 _ROW = object_of("row", row={"type": "integer"}, label={"type": "string"})
 _TAKEN = {"201": answers(_ROW), "409": {**REFUSED, "description": "The row is taken in this bed"}}
@@ -44,10 +45,13 @@ _PATHS = {
         "200": answers(_JOB), "201": answers(_JOB), "4XX": REFUSED,
     }}},
     **{
-        f"/jobs/{{id}}/{name}": {"parameters": [_ID], "post": {"summary": text, "responses": _DONE}}
+        f"/jobs/{{id}}/{name}": {"parameters": [_ID], "post": {
+            "summary": text,
+            "responses": _CHECKED if name == "check" else _DONE,
+        }}
         for name, text in (
             ("cancel", "Cancel it"), ("lock", "Lock it"), ("unlock", "Unlock it"), ("fill", "Fill it up"),
-            ("pause", "It pauses when it can"),
+            ("pause", "It pauses when it can"), ("check", "Check it"),
         )
     },
 }  # fmt: skip
@@ -93,6 +97,7 @@ def _broken(contract, steps):
         ([_get(), _do("fill", litres=9), _get(4)] * 2, {_READ}),
         ([_get(), _do("fill", litres=9), _get(4, litres=9)] * 2, set()),
         ([_get(), _do("fill", litres=9, id="2"), _get(4)] * 2, set()),  # another thing
+        ([_get(), _do("check", status="ok"), _get(4)] * 2, set()),  # the outcome of the command itself
         # What changes by itself tells nothing.
         ([_get(litres=1), _get(litres=2), _do("fill", litres=9), _get(4, litres=2)] * 2, set()),
     ],
