@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,6 +24,7 @@ _AS_SOAP: Final = {
     "list-order": "lists", "list-pages": "lists", "list-limit": "lists", "list-total": "lists",
     "defaults": "written-is-read", "read-only": "written-is-read",
 }  # fmt: skip
+_STATUS: Final = re.compile(r" status 2\d\d$")
 # End of what is expected of a state that no operation has changed.
 _BY_ITSELF: Final = "as it was read before"
 
@@ -60,8 +62,9 @@ class SoapThings:
         occasion = Occasion(contract, seen, context, is_allowed) if context is not None else None
         for found in self._histories(occasion) if occasion is not None else ():
             name = _AS_SOAP.get(found.requirement.partition("/")[2], "")
-            # A WSDL seldom says whether a message replaces what it leaves out.
-            if name and not (found.requirement.endswith("/defaults") and found.doubt):
+            # A WSDL seldom says whether a message replaces what it leaves out; and SOAP has no status of a creation.
+            is_open = (found.requirement.endswith("/defaults") and found.doubt) or _STATUS.search(found.cause)
+            if name and not is_open:
                 case = self._resources.in_soap(found)
                 # An axis, which always exists, may leave any state by itself.
                 is_alone = name == "states" and found.expected.endswith(_BY_ITSELF) and not self._is_created(seen)
