@@ -100,6 +100,19 @@ class Gateway:
                 )
             WALL_CLOCK.sleep(PACE_S)
 
+    def check_alone(self) -> None:
+        """Hear once more whether anybody else is the robot; a node may be discovered late.
+
+        Raises:
+            NotPossibleError: somebody is.
+        """
+        self._is_alone = False
+        try:
+            self._check_alone(self.robot)
+        except ProbeError as error:
+            self._problem = f"the suite's ROS node in domain {self.ros.domain}: {error}"
+            raise NotPossibleError(self._problem) from error
+
     def _check_alone(self, robot: Robot) -> None:
         """Hear whether anybody publishes what the suite is to publish: a gateway would be blamed for that.
 
@@ -116,8 +129,12 @@ class Gateway:
                 # That a type is not installed is told where it is needed.
                 with suppress(ProbeError):
                     robot.tell("listen", topic=topic, type=type_)
-            until = WALL_CLOCK.now() + bool(types) * _ALONE_S
-            while WALL_CLOCK.now() < until:
+            began = WALL_CLOCK.now()
+            until = began + bool(types) * _ALONE_S
+            while WALL_CLOCK.now() < until or (
+                # A publisher that is known, and not heard yet, may only be discovered late.
+                WALL_CLOCK.now() < began + _DISCOVERY_S / 3 and any(robot.count(one, "publishers") for one in types)
+            ):
                 if found := next((topic for topic in types if robot.take_heard(topic)), ""):
                     raise ProbeError(
                         f"another node publishes on {found}: with --ros-play the suite is the robot, so end the real "

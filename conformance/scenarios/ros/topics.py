@@ -103,6 +103,7 @@ def topic_reads(gateway: Gateway, effort: Effort) -> Topics:
     """Publish messages of extreme values on topics, and read them through the gateway."""
     if not gateway.plays:
         raise NoOccasionError("the suite is not the robot, whose messages it would know: --ros-play")
+    gateway.check_alone()
     shown: list[Shown] = []
     definitions: dict[str, Definition] = {}
     with partial_trace(lambda: Topics(tuple(shown), definitions)):
