@@ -36,7 +36,8 @@ _LATER: Final = re.compile(
     r"\b(?:asynchron\w*|eventual\w*|later|schedul\w*|background|once|when|if|unless|previous(?:ly)?|before|after|request)\b",
     re.IGNORECASE,
 )
-_LIVE: Final = frozenset({"running", "active", "executing", "inprogress", "started", "moving", "working"})
+#: States of an activity that goes on.
+LIVE: Final = frozenset({"running", "active", "executing", "inprogress", "started", "moving", "working"})
 _WAITING: Final = frozenset({"queued", "pending", "scheduled", "created", "new", "waiting", "accepted", "paused"})
 # Commands that keep an activity from its end, and states after that.
 _ENDS: Final = frozenset({"cancel", "abort"})
@@ -51,8 +52,8 @@ _SWITCHES: Final = {
     "arm": ("armed",), "mute": ("muted",), "on": ("on",),
 }  # fmt: skip
 _STATES: Final = {
-    "cancel": ({"cancelled", "canceled"}, _LIVE | _WAITING), "abort": ({"aborted"}, _LIVE | _WAITING),
-    "pause": ({"paused"}, _LIVE), "stop": ({"stopped"}, _LIVE), "resume": (_LIVE, {"paused"}),
+    "cancel": ({"cancelled", "canceled"}, LIVE | _WAITING), "abort": ({"aborted"}, LIVE | _WAITING),
+    "pause": ({"paused"}, LIVE), "stop": ({"stopped"}, LIVE), "resume": (LIVE, {"paused"}),
     "lock": ({"locked"}, {"unlocked"}), "unlock": ({"unlocked"}, {"locked"}), "open": ({"open", "opened"}, {"closed"}),
     "close": ({"closed"}, {"open", "opened"}), "enable": ({"enabled"}, {"disabled"}),
     "disable": ({"disabled"}, {"enabled"}), "arm": ({"armed"}, {"disarmed"}), "disarm": ({"disarmed"}, {"armed"}),

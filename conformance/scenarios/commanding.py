@@ -15,7 +15,7 @@ from conformance.api.rest.listing import items_of
 from conformance.api.rest.things import collection_of, creator_of, identifier_of, object_in, parts_of
 from conformance.api.rest.variations import Kind, Variation
 from conformance.checkers.changes import ENDING, barred_by
-from conformance.checkers.commands import SETTLES_S, Command, commands_of
+from conformance.checkers.commands import LIVE, SETTLES_S, Command, commands_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation
 from conformance.documents.parameters import plain_name
@@ -41,8 +41,6 @@ def send_commands(surveyor: Surveyor, operations: Mapping[tuple[str, str], Opera
     known = [one for one in commands_of([*operations.values()]) if is_free(one.operation, one.operation.template)]
     sender, again = _Sender(surveyor, operations, known[:_MOST]), list[tuple[Operation, Outgoing]]()
     began = time.monotonic()
-    with suppress(NoAnswerError):
-        sender.calm_all()
     for turn in range(_TURNS):
         for command in sender.known:
             with suppress(NoAnswerError):  # the survey reports a broken connection
@@ -80,6 +78,8 @@ class _Sender:
     surveyor: Surveyor
     operations: Mapping[tuple[str, str], Operation]
     known: list[Command]
+    # Whether what ran was ended, as it may keep other things from running.
+    is_calm: bool = False
 
     def send(self, command: Command, turn: int) -> Outgoing | None:
         """Send a command, and read its thing until it has acted; return that read, or None if it has not."""
@@ -124,7 +124,10 @@ class _Sender:
             if now is None or str(now.get(name)) in states:
                 break
             if other.read is command.read and other is not command:
-                self._act(other.operation, other.read, whole, 0)
+                if self._act(other.operation, other.read, whole, 0).status in FULL and not self.is_calm:
+                    self.is_calm = True
+                    self._calm_all()
+                    self._act(other.operation, other.read, whole, 0)
                 now = self._read(command.read, whole)
         name = command.state[0] if command.state is not None else ""
         for method in ("PUT", "DELETE") if name else ():
@@ -135,15 +138,15 @@ class _Sender:
                 now = self._read(command.read, whole)
         return now
 
-    def calm_all(self) -> None:
-        """End what a list shows as begun by earlier scenarios: it may keep others from running."""
+    def _calm_all(self) -> None:
+        """End what a list shows as running, from earlier scenarios."""
         for command in {one.read.label: one for one in self.known if one.state is not None}.values():
             (name, states), above = command.state or ("", frozenset()), collection_of(command.read.template)
             lister = self.operations.get(("GET", above))
             is_usable = lister is not None and not lister.parameter("path")
             listed = self.surveyor.send(lister, _AGAIN).exchange if is_usable and lister is not None else None
             for item in items_of(read_json(listed.response.body).value) or () if listed is not None else ():
-                if isinstance(item, dict) and str(item.get(name)) in states:
+                if isinstance(item, dict) and plain_name(str(item.get(name))) in LIVE & set(map(plain_name, states)):
                     whole = request_of(command.read, usual_inputs(command.read, self.surveyor.values)[0])
                     id_ = quote(identifier_of(item, command.read), safe="")
                     self._calm(command.read, replace(whole, target=f"{above}/{id_}"))
