@@ -28,14 +28,15 @@ _SPACE, _SEPARATOR = re.compile(r"\s+"), re.compile(r"[\W_]+")
 
 
 class _Write(NamedTuple):
-    """A write whose texts a read must show: the request, its non-ASCII texts, and the state before.
+    """A write whose texts a read must show: the request, its non-ASCII texts, the state and earlier texts.
 
-    For a thing without a place of its own that is its ``id`` in the list in which it was created.
+    A thing without a place of its own has its ``id`` in the list in which it was created.
     """
 
     request: Request
     texts: dict[str, str]
     before: dict[str, Any]
+    earlier: frozenset[str]
     id: Any = None
 
 
@@ -45,6 +46,8 @@ class Texts:
     def __init__(self) -> None:
         self._shown: dict[str, dict[str, Any]] = {}
         self._written: dict[str, _Write] = {}
+        # By URL: texts that earlier writes gave, which a device that stores later may still show.
+        self._earlier: dict[str, frozenset[str]] = {}
 
     def __call__(self, occasion: Occasion) -> Iterator[Case]:
         """Yield the cases of one exchange."""
@@ -73,12 +76,16 @@ class Texts:
                 at = ""
             self._written.clear()
             if texts and at and answer.status != HTTPStatus.ACCEPTED:
-                self._written[at] = _Write(request, texts, self._shown.get(at, {}) if id_ is None else {}, id_)
+                before = self._shown.get(at, {}) if id_ is None else {}
+                self._written[at] = _Write(request, texts, before, self._earlier.get(at, frozenset()), id_)
+            if at and len(self._earlier) < _MOST:
+                given = [one for one in sent.values() if isinstance(one, str)][:_MOST]
+                self._earlier[at] = frozenset(given) | self._earlier.get(at, frozenset())
 
     def _read(self, occasion: Occasion, write: _Write, value: dict[str, Any]) -> Iterator[Case]:
         for name, text in write.texts.items():
             seen = value.get(name)
-            if not isinstance(seen, str) or seen == write.before.get(name):
+            if not isinstance(seen, str) or seen == write.before.get(name) or seen in write.earlier:
                 continue
             expected = f"{name} {clip(text)}, as {write.request.method} {urlsplit(write.request.url).path} wrote it"
             # A device may add something to a text, or make a slug of it; a list may show only its beginning.

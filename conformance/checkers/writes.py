@@ -18,7 +18,7 @@ from email.utils import parsedate_to_datetime
 from http import HTTPStatus
 from typing import Any, Final, NamedTuple
 
-from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same
+from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, merged, partly_patched, patched, same, shows_new
 from conformance.api.rest.references import collections_of, is_free_text
 from conformance.api.rest.statuses import refuses
 from conformance.api.rest.things import (
@@ -215,13 +215,14 @@ class Writes:
                 self._writes[at].append(occasion)
             return
         state = self._states.get(path) if item is not None else None
-        writes, last = self._writes.get(path, []), self._last.get(path, {})
+        writes, last, late = self._writes.get(path, []), self._last.get(path, {}), self._late.get(path)
         if item is not None and len(request.body) <= _MOST_OCTETS and len(self._accepted) < _MOST:
             value = read_json(request.body).value
             self._accepted[path] = value if isinstance(value, dict) else {WHOLE: value}
         self.forget()
         if state is not None and occasion.response.ok and request.method in {"PUT", "PATCH"} and request.raw is None:
             self._states[path], self._writes[path] = state, [*writes, occasion]
+            self._late |= {path: late} if late is not None else {}
         if item is not None and occasion.response.ok and request.method == "PATCH":
             yield from self._answer(occasion, item, last)
 
@@ -250,7 +251,9 @@ class Writes:
                     occasion, item, one, _Sandwich(state.members, now, frozenset(), is_old=True)
                 )
             write = writes[0] if len(writes) == 1 else late if not writes and not changed else None
-            if write is not None and (state.at_s <= write.sent_s or write is late):
+            # What an earlier write gave, and the read after that did not show yet.
+            is_late = writes and late is not None and shows_new(read_json(late.request.body).value, state.members, now)
+            if write is not None and (state.at_s <= write.sent_s or write is late) and not is_late:
                 moving = frozenset(one for one in names if (item.template, one) in self._moving)
                 is_old = sent_s - write.response.received_s > _SETTLES_S
                 if is_old or write is not late:

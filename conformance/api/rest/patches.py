@@ -87,6 +87,12 @@ def same(one: Any, other: Any) -> bool:
     return isinstance(one, bool) is isinstance(other, bool) and bool(one == other)
 
 
+def shows_new(given: Any, before: dict[str, Any], now: dict[str, Any]) -> bool:
+    """Return whether an object shows a member as it was given, which it did not show before."""
+    members = given.items() if isinstance(given, dict) else ()
+    return any(same(now.get(name), one) and not same(before.get(name), one) for name, one in members)
+
+
 def _steps(path: str, says: str) -> list[str]:
     """Return the steps of a JSON pointer (RFC 6901)."""
     if path and not path.startswith("/"):

@@ -235,3 +235,9 @@ def test_texts_that_read_as_they_were_written(tmp_path, seen):
 def test_texts_that_read_in_another_way(tmp_path, seen):
     assert "description/written-is-read" in _all(tmp_path, _wrote(seen))
     assert "description/written-is-read" not in _all(tmp_path, _wrote(seen, line="PUT /tubes/1 422"))
+
+
+def test_a_text_that_an_earlier_write_gave_may_come_late(tmp_path):
+    earlier = one("PUT /tubes/1 200", {}, {"label": "first"}, content_type="application/json")
+    assert "description/written-is-read" not in _all(tmp_path, [earlier, *_wrote("first")])
+    assert "description/written-is-read" in _all(tmp_path, [earlier, *_wrote("fir")])

@@ -319,6 +319,10 @@ RIGHT = {
     "a member of the device's that changes": [_get(level=1), _get(level=2), _put(**_FIRST, level=9), _get(level=9)],
     "defaults applied": [_get(), _put(gain=2.5), _get(gain=2.5, count=5, mode="on", loud=False)],
     "a PUT that acts later": [_get(), _put(gain=2.5, told={"count": 5, "mode": "on", "loud": False}), _get()],
+    "a list of an earlier PUT that acts later": [
+        *(_get(), _put(**_WHOLE, stops=[{"x": 1}]), _get()),
+        *(_put(**_WHOLE, stops=[{"x": 1}, {"x": 2}]), _get(stops=[{"x": 1}])),
+    ],
     "a PUT that is accepted": [_get(), _put(status=202, gain=2.5), _get(gain=2.5)],
     "a PUT that takes effect after a refused one": [
         _get(),
