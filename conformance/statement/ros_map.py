@@ -52,7 +52,8 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         at: where the message is in the body; empty: the body is the message.
         fields: position in the web's message = position in the ROS message, where their names differ. What is under the
             position goes with it. Without it, all names are those of the message.
-        values: values of the parameters in the path, by name.
+        values: values of the parameters in the path or query, by name: "PUT /speed?x={x}" has the parameter x.
+        parameters: other parameters there = position in the ROS message; the body then has the rest of it, or nothing.
         body: other members of the body that the operation gets.
         failure: how a 2xx response says that its request failed; None: by no value.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
@@ -64,9 +65,15 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     at: Pointer = ""
     fields: dict[Pointer, Pointer] = {}
     values: dict[str, Any] = {}
+    parameters: dict[str, Pointer] = {}
     body: dict[str, Any] = {}
     failure: Failure | None = None
     timeout_s: Positive | None = None
+
+    @property
+    def places(self) -> tuple[Pointer, ...]:
+        """Return the positions in the ROS message that a request has; empty: it has all."""
+        return (*self.fields.values(), *self.parameters.values())
 
     @property
     def within_s(self) -> float:
@@ -116,14 +123,16 @@ class State(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the state of a goal or a call is read.
 
     Attributes:
-        read: the operation, a template: "{id}" is the id.
+        read: the operation, a template: "{id}" is the id; without it, there is one goal at a time.
         at: where the word for the state is in the response.
+        ended: where the word for the end is in the response of a device that has no goal any more, of any status.
         running, succeeded, aborted, canceled, rejected: these words; an empty list: not judged.
         body: of the request, a template as well.
     """
 
     read: Call
     at: Pointer
+    ended: Pointer | None = None
     running: tuple[str, ...] = ()
     succeeded: tuple[str, ...] = ()
     aborted: tuple[str, ...] = ()
@@ -188,6 +197,7 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         at: where the array is in the body.
         name: where the full name is in an item; empty: the item is the name.
         type: where its type, or the list of its types, is in an item; None: nowhere.
+        of: the type whose names it has, where it has no others; empty: it has all.
         hidden: whether names that are hidden (with a part that begins with "_") are listed; None: either.
         timeout_s: time in which a change of the graph has to show, s.
     """
@@ -196,6 +206,7 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     at: Pointer = ""
     name: Pointer = ""
     type: Pointer | None = None
+    of: str = ""
     hidden: bool | None = None
     timeout_s: Positive = _USUAL_S
 
@@ -337,12 +348,10 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
         found = f"has {' and '.join(kinds)}" if kinds else "has none"
         raise error(f"{place}: one key of {', '.join(KINDS)} must say what it is; it {found}")
     made = fit(table, KINDS[kinds[0]], place, error)
-    if isinstance(made, Acts | Calls):
-        cancel = (made.cancel, made.cancel_body) if isinstance(made, Acts) else ("", {})
-        state = (made.state.read, made.state.body) if made.state else ("", {})
-        for name, path, body in (("state.read", *state), ("cancel", *cancel)):
-            if path and "{id}" not in path + str(body) and "/{" not in path:
-                raise error(f"{place}: {name} = {path!r} must name what it is about by {{id}}, or its body must")
+    if isinstance(made, Calls) and made.state:
+        path, body = made.state.read, made.state.body
+        if "{id}" not in path + str(body) and "/{" not in path:
+            raise error(f"{place}: state.read = {path!r} must name what it is about by {{id}}, or its body must")
     elif isinstance(made, Reads) and not call.startswith(("GET ", "POST ")):
         raise error(f"{place}: topic = {made.topic!r} is read by GET, or by an operation of a WSDL")
     return made

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import msgspec
 
-from conformance.scenarios.ros.definition import Definition, put_at, value_at
-from conformance.scenarios.ros.web import changes, differences, document_of, is_success
+from conformance.scenarios.ros.definition import Definition
+from conformance.scenarios.ros.web import changes, differences, document_of, fields_in, is_success
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange
 
@@ -33,14 +33,6 @@ def change_text(content: dict[str, object], sent: str, body: Body) -> str:
     """Return how what arrived is not the message that was sent; empty: it is."""
     found = next(changes(fields_in(content, body), fields_in(json.loads(sent), body)), None)
     return f"{found[0]} is {found[1]} in place of {found[2]}" if found else ""
-
-
-def fields_in(message: dict[str, object], body: Body) -> dict[str, object]:
-    """Return the fields of a ROS message that an operation's body has."""
-    found: dict[str, object] = {}
-    for own in body.fields.values():
-        found = put_at(found, own, value_at(message, own))
-    return found if body.fields else message
 
 
 def fails_as(exchange: Exchange, body: Body, declared: Sequence[int]) -> bool:

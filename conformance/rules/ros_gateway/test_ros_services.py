@@ -7,10 +7,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from typing import Any, Final
 
-from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, fields_in, statuses
+from conformance.rules.ros_gateway.judging import change_text, differing, fails_as, statuses
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.services import ROUNDS, Called, Crowd, Server, Services, is_held, service_calls
-from conformance.scenarios.ros.web import is_success
+from conformance.scenarios.ros.web import fields_in, is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
 from conformance.statement.ros_map import Body, RosMap
 from conformance.transport.exchange import Exchange

@@ -8,7 +8,6 @@ from dataclasses import replace
 from statistics import median_low
 from typing import Final
 
-from conformance.rules.ros_gateway.judging import fields_in
 from conformance.scenarios.ros.samples import Kind
 from conformance.scenarios.ros.topics import (
     Burst,
@@ -20,7 +19,7 @@ from conformance.scenarios.ros.topics import (
     topic_refusals,
     topic_writes,
 )
-from conformance.scenarios.ros.web import Difference, changes, differences, document_of, equal, is_success
+from conformance.scenarios.ros.web import Difference, changes, differences, document_of, equal, fields_in, is_success
 from conformance.scenarios.rule import Note, NotTested, Outcome, rule
 from conformance.statement.ros_map import Publishes, Reads, RosMap
 from conformance.transport.exchange import Exchange

@@ -216,6 +216,9 @@ class _Sender:
     def _two(self) -> list[Goal]:
         """Send two goals, cancel the first, and follow both; then cancel the second."""
         robot, body = self._gateway.robot, self._body
+        if "{id}" not in f"{body.cancel}{body.cancel_body}" and "/{" not in body.cancel:
+            # There is one goal at a time: another one takes its place.
+            return []
         steps = [{"end": "never", "result": self._new("Result")} for _ in range(2)]
         first = self._begin_goal(Course.FIRST, *steps)
         value, exchange = self._send()
@@ -244,8 +247,10 @@ class _Sender:
             sent = WALL_CLOCK.now()
             exchange = self._gateway.send(made, self._body.response_s)
             received = WALL_CLOCK.now()
-            value = document_of(exchange.response.body).value if exchange.response.ok else None
-            word = value_at(value, state.at)
+            value = document_of(exchange.response.body).value
+            word = None if state.ended is None else value_at(value, state.ended)
+            value = value if exchange.response.ok else None
+            word = value_at(value, state.at) if word is None else word
             pointers = (self._body.feedback, self._body.result)
             has = [pointer is not None and value_at(value, pointer) is not None for pointer in pointers]
             looks.append(Look(sent, received, exchange, "" if word is None else str(word), *has))

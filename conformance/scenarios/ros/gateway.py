@@ -18,7 +18,7 @@ from conformance.scenarios.motion.templates import fill
 from conformance.scenarios.ros.definition import Definition, value_at
 from conformance.scenarios.ros.robot import ProbeError, Robot
 from conformance.scenarios.ros.samples import Maker
-from conformance.scenarios.ros.web import document_for, document_of, with_texts
+from conformance.scenarios.ros.web import document_for, document_of, parameters_for, with_texts
 from conformance.scenarios.scenario import NotDeclaredError, NotPossibleError
 from conformance.statement.motion_calls import NAME
 from conformance.statement.ros_map import KINDS, Acts, Body, Calls, Publishes, Reads, RosMap
@@ -207,18 +207,19 @@ class Gateway:
 
     def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:
         """Return the request of an operation; ``value``: of the ROS message that it gets."""
-        document = None
+        document, values = None, body.values
         if self.ros.rosbridge:
             # Its id identifies the response to this message.
             body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
             document = document_for(value, self.definition(body.type + _PARTS.get(type(body), "")), body, self.ros)
-        return self.binding.make(fill(call, body.values), document)
+            values = {**parameters_for(value, body), **values}
+        return self.binding.make(fill(call, values), document)
 
     def send_texts(self, call: str, body: Body) -> None:
         """Send an invalid request, if JSON makes one: a gateway that refuses it may treat the next one otherwise."""
         name = body.type + _PARTS.get(type(body), "")
-        if self.binding.syntax == "JSON" and not body.fields and self.maker(self.definition(name)).has_numbers:
+        if self.binding.syntax == "JSON" and not body.places and self.maker(self.definition(name)).has_numbers:
             made = self.request(call, body, self.usual(name))
             with suppress(NoAnswerError):
                 self.send(replace(made, body=with_texts(made.body, body)), body.response_s)
@@ -226,7 +227,12 @@ class Gateway:
     def following(
         self, exchange: Exchange, body: Acts | Calls, template: str, content: dict[str, Any]
     ) -> Outgoing | None:
-        """Return the request of an operation on a goal or a call; None: the response does not name it."""
+        """Return the request of an operation on a goal or a call; None: the response does not name it.
+
+        Without an id in the template, it is about the only goal.
+        """
+        if not (NAME.search(template) or "{id}" in str(content)):
+            return self.binding.make(template, content or None)
         name = (exchange.response.header("Location") or "").rstrip("/").rpartition("/")[2] or None
         if body.id is not None:
             name = value_at(document_of(exchange.response.body).value, body.id)

@@ -260,7 +260,7 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
     for call, body in gateway.of(Lists):
         if body.lists not in _KINDS:
             continue
-        kind, part = _KINDS[body.lists], secrets.token_hex(4)
+        kind, part = body.of or _KINDS[body.lists], secrets.token_hex(4)
         names = {f"/roaas_{part}": True, f"/roaas_{part}/inner/name": True}
         # A name that is hidden comes first: when the others are listed, it would be.
         if body.hidden is not None:
@@ -303,7 +303,7 @@ def _types_in(exchange: Exchange, body: Lists) -> dict[str, list[str]]:
     items = value_at(document_of(exchange.response.body).value, body.at)
     found: dict[str, list[str]] = {}
     for item in items if isinstance(items, list) else []:
-        types = value_at(item, body.type) if body.type is not None else list(_KINDS.values())
+        types = value_at(item, body.type) if body.type is not None else [body.of, *_KINDS.values()]
         found[str(value_at(item, body.name))] = [str(one) for one in (types if isinstance(types, list) else [types])]
     return found
 

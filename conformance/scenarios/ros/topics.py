@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
+import msgspec
+
 from conformance.observe.clock import WALL_CLOCK
 from conformance.scenarios.ros.definition import Definition
 from conformance.scenarios.ros.gateway import CROWD, PACE_S, PATIENCE_S, Gateway
@@ -21,6 +23,7 @@ from conformance.scenarios.ros.web import (
     differing,
     document_of,
     equal,
+    fields_in,
     is_out_of_range,
     is_success,
     with_texts,
@@ -353,12 +356,12 @@ class _Writer:
         """Yield the messages until that of a request, or until it surely comes no more."""
         if not one.accepted:
             return
-        wanted, clock = json.loads(one.value), WALL_CLOCK
+        wanted, clock = fields_in(json.loads(one.value), self.body), WALL_CLOCK
         until = clock.now() + self.body.within_s
         while (left_s := until - clock.now()) > 0:
             came = self.gateway.robot.take_heard(self.body.publishes, 1, left_s)
             yield from came
-            if any(equal(each.content, wanted) for each in came):
+            if any(equal(fields_in(each.content, self.body), wanted) for each in came):
                 return
             if came:
                 until = min(until, clock.now() + _MORE_S)
@@ -395,11 +398,16 @@ class _Writer:
 
     def send_malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, with their outcome."""
+        if self.body.parameters and not self.body.fields:
+            for name in self.body.parameters:
+                yield from self.malformed_as(f"a text as {name}", self.with_text(name), is_wrong=self.is_number(name))
+            yield self.late()
+            return
         right = self.request(self.maker.usual())
         wrong = {"no body": b""}
         is_wrong = {"half of the body": right.body[: len(right.body) // 2]}
         # Of a map with `fields`, the body may lack what is wrong.
-        is_whole = not self.body.fields
+        is_whole = not self.body.places
         if is_whole and self.gateway.plays and (beyond := self.maker.beyond()) is not None:
             is_wrong[beyond.what] = self.gateway.request(self.call, self.body, beyond.value).body
         if self.gateway.binding.syntax == "JSON":
@@ -418,6 +426,16 @@ class _Writer:
             if not heard:
                 break
         yield self.late()
+
+    def with_text(self, name: str) -> Outgoing:
+        """Return a request with a text as one of its parameters in the path or query."""
+        body = msgspec.structs.replace(self.body, values={**self.body.values, name: "x"})
+        return self.gateway.request(self.call, body, self.value(self.maker.usual()))
+
+    def is_number(self, name: str) -> bool:
+        """Return whether the field that a parameter gives is a number or a boolean."""
+        shape = self.definition.at(self.body.parameters[name])
+        return shape is not None and not shape.is_text
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:
         """Yield an invalid request with its outcome, apart from messages that the gateway publishes by itself."""

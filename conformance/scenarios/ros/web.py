@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from http import HTTPStatus
 from typing import Any, Final
+from urllib.parse import quote
 
 from conformance.documents.xml import NotXmlError, elements, local, parse
 from conformance.documents.xsd_shapes import value_of
@@ -114,14 +115,30 @@ def document_of(octets: bytes) -> Document:
 
 
 def document_for(value: dict[str, Any], definition: Definition, body: Body, ros: RosMap) -> Any:
-    """Return the request document for sending a message, in the map's form or plain JSON."""
+    """Return the request document for sending a message, in the map's form or plain JSON; None: it has no body."""
     message = _web(value, Shape(definition.root), definition, ros)
-    if body.fields:
+    if body.places:
         mapped: Any = {}
         for web, own in body.fields.items():
             mapped = put_at(mapped, web, value_at(message, own))
         message = mapped
+        if not (body.fields or body.body):
+            return None
     return _merge(body.body, put_at({}, body.at, message))
+
+
+def parameters_for(value: dict[str, Any], body: Body) -> dict[str, str]:
+    """Return the parameters of a path or query that sends a message."""
+    found = {name: value_at(value, own) for name, own in body.parameters.items()}
+    return {name: quote(one if isinstance(one, str) else json.dumps(one), "") for name, one in found.items()}
+
+
+def fields_in(message: dict[str, Any], body: Body) -> dict[str, Any]:
+    """Return the fields of a ROS message that an operation's request has."""
+    found: dict[str, Any] = {}
+    for own in body.places:
+        found = put_at(found, own, value_at(message, own))
+    return found if body.places else message
 
 
 def with_texts(octets: bytes, body: Body) -> bytes:
