@@ -16,8 +16,11 @@ Each command is an object with "do"; each gets one answer. Times are of CLOCK_MO
   "succeed" | "abort" | "never", "result": value, "refuse_cancel": true, "cancel_s": s}`. Events: `goal`, `rejected`,
   `feedback`, `cancel`, `end`.
 - `script` (name, script): what the served service or action does from now on.
+- `hold` (node, values, refuses): be a node of this name with parameters, each `[type, value]` by name, which change at
+  once; with `refuses`, others may not change them. Events of the node: `set`, with the values that somebody set.
+- `held` (node): the values of its parameters.
 - `forget` (name): leave a topic, service or action.
-- `graph`: topics with types and counts, services, actions and nodes.
+- `graph`: topics with types and counts, services, how many clients these have, actions and nodes.
 """
 
 import threading
@@ -28,6 +31,7 @@ from functools import partial
 from typing import Any, Final
 
 import rclpy
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.action import ActionServer, CancelResponse, GoalResponse, get_action_names_and_types
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
@@ -39,10 +43,11 @@ from rclpy.executors import (
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from ros_probe.values import described, message_of, plain, type_of
+from ros_probe.values import described, message_of, octets_of, plain, plain_parameter, type_of
 
 # Messages that came and were not asked for yet, of one topic; then the oldest are lost, and that is said.
 _KEPT: Final = 20_000
@@ -76,6 +81,7 @@ class Player:
         self._apart: dict[str, Node] = {}
         self._steps: dict[str, _Steps] = {}
         self._timers: dict[str, Any] = {}
+        self._nodes: dict[str, _Holder] = {}
         self._came: dict[str, deque[Event]] = defaultdict(partial(deque, maxlen=_KEPT))
         self._news = threading.Condition()
         self._commands: dict[str, Callable[..., dict[str, Any]]] = {
@@ -87,6 +93,8 @@ class Player:
             "serve": self._serve,
             "act": self._act,
             "script": self._script,
+            "hold": self._hold,
+            "held": lambda node: {"values": self._nodes[node].values()},
             "forget": self._forget,
             "graph": self._graph,
         }
@@ -108,7 +116,7 @@ class Player:
             executor.shutdown(timeout_sec=1)
         for topic in list(self._apart):
             self._forget(topic)
-        for node in filter(None, (self._servant, self._node)):
+        for node in filter(None, (*(holder.node for holder in self._nodes.values()), self._servant, self._node)):
             node.destroy_node()
         self._context.try_shutdown()
 
@@ -135,6 +143,16 @@ class Player:
             self._servant = self._made(f"{self._name}_server")
             self._spin(MultiThreadedExecutor(_THREADS, context=self._context), self._servant)
         return self._servant
+
+    def _hold(self, node: str, values: dict[str, tuple[str, Any]], *, refuses: bool = False) -> dict[str, Any]:
+        if node not in self._nodes:
+            space, _, name = node.rpartition("/")
+            made = Node(name, namespace=space or "/", context=self._context, enable_rosout=False)
+            self._nodes[node] = _Holder(made, partial(self._note, node))
+            self._server()
+            self._executors[-1].add_node(made)
+        self._nodes[node].hold(values, refuses=refuses)
+        return {}
 
     def _note(self, name: str, what: str, value: Any, at_ns: int | None = None) -> None:
         with self._news:
@@ -246,6 +264,9 @@ class Player:
 
     def _forget(self, name: str) -> dict[str, Any]:
         self._stop_repeating(name)
+        if (holder := self._nodes.pop(name, None)) is not None:
+            self._executors[-1].remove_node(holder.node)
+            holder.node.destroy_node()
         if (apart := self._apart.pop(name, None)) is not None:
             del self._entities[f"publish {name}"]
             apart.destroy_node()
@@ -276,6 +297,7 @@ class Player:
         return {
             "topics": topics,
             "services": dict(node.get_service_names_and_types()),
+            "clients": {name: node.count_clients(name) for name, _ in node.get_service_names_and_types()},
             "actions": dict(get_action_names_and_types(node)),
             "nodes": [name for name in nodes if name not in own],
         }
@@ -312,6 +334,46 @@ class _Steps:
         """Return the next step."""
         with self._lock:
             return self._left.popleft() if len(self._left) > 1 else self._left[0]
+
+
+class _Holder:
+    """A node with parameters.
+
+    Args:
+        node: the node.
+        note: keeps an event.
+    """
+
+    def __init__(self, node: Node, note: Callable[[str, Any], None]) -> None:
+        self.node, self._note = node, note
+        self._kinds: dict[str, str] = {}
+        self._refuses, self._is_own = False, False
+        node.add_on_set_parameters_callback(self._decide)
+
+    def hold(self, values: dict[str, tuple[str, Any]], *, refuses: bool) -> None:
+        """Have parameters of some types and values."""
+        self._refuses, self._is_own = refuses, True
+        try:
+            for name, (kind, value) in values.items():
+                type_ = Parameter.Type[kind.upper()]
+                if not self.node.has_parameter(name):
+                    self.node.declare_parameter(name, type_)
+                self._kinds[name] = kind
+                if isinstance(value, dict):
+                    value = octets_of(value)  # noqa: PLW2901 - as ROS has it
+                self.node.set_parameters([Parameter(name, type_, value)])
+        finally:
+            self._is_own = False
+
+    def values(self) -> dict[str, Any]:
+        """Return the values by name."""
+        return {name: plain_parameter(kind, self.node.get_parameter(name).value) for name, kind in self._kinds.items()}
+
+    def _decide(self, parameters: list[Parameter]) -> SetParametersResult:
+        if not self._is_own:
+            values = {item.name: plain_parameter(item.type_.name.lower(), item.value) for item in parameters}
+            self._note("set", values)
+        return SetParametersResult(successful=self._is_own or not self._refuses, reason="it was told to refuse")
 
 
 class _Goals:

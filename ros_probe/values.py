@@ -85,6 +85,18 @@ def _plain(value: Any, declared: str) -> Any:
     return value.tolist() if hasattr(value, "tolist") else list(value)
 
 
+def plain_parameter(kind: str, value: Any) -> Any:
+    """Return the JSON value of a parameter of a kind, such as "byte_array", whose octets are a list of bytes."""
+    if not kind.endswith("_array") or value is None:
+        return value
+    return {"b64": base64.b64encode(b"".join(value)).decode()} if kind == "byte_array" else list(value)
+
+
+def octets_of(value: dict[str, str]) -> list[bytes]:
+    """Return the octets in a JSON value as a parameter has them."""
+    return list(_singly(base64.b64decode(value["b64"])))
+
+
 def message_of(name: str, value: dict[str, Any]) -> Any:
     """Return the message that a JSON value stands for; fields that it lacks have their defaults.
 

@@ -32,7 +32,7 @@ from conformance.history.writing import HISTORY_NAME, HistoryWriter
 from conformance.scenarios.scenario import NotPossibleError
 from conformance.statement.motion_calls import NAME, names_operation
 from conformance.statement.motion_map import MotionMap
-from conformance.statement.ros_map import Publishes, RosMap, followers
+from conformance.statement.ros_map import Parameter, Publishes, RosMap, followers
 from conformance.transport.client import Connection, HttpClient
 from conformance.transport.exchange import OF_GATEWAY, Attempt, Exchange, NoAnswer, NoAnswerError, Request
 from conformance.transport.pace import Hangs
@@ -42,7 +42,8 @@ from conformance.verdict.run import Run
 
 # By kind of operation: the words for its ROS side in messages.
 _DOES: Final = {
-    "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to", "lists": "lists",
+    "topic": "reads", "publishes": "publishes on", "service": "calls", "action": "sends goals to",
+    "parameter": "gets or sets", "lists": "lists",
 }  # fmt: skip
 _TIDY_S: Final = 10.0  # longest time for deleting what the run created, and writing back what it changed
 #: Requirements that expect the web API's value, and observe ROS's.
@@ -96,7 +97,8 @@ class RosEnds:
                 for each in sorted(of_ros, key=lambda each: each.number)
                 if call in calls_of[each.number] or any(names_operation(call, label) for label in each.operations)
             ]
-            row = {"operation": call, "does": _DOES[key], "name": getattr(one, key), "compared": self._compared[call]}
+            name = getattr(one, key) + (f" of {one.node}" if isinstance(one, Parameter) else "")
+            row = {"operation": call, "does": _DOES[key], "name": name, "compared": self._compared[call]}
             row |= {"type": one.type} if key != "lists" else {}
             if mine:
                 web, ros = mine[0].observed, f"expected: {mine[0].expected}"

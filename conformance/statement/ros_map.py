@@ -53,7 +53,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         fields: position in the web's message = position in the ROS message, where their names differ. What is under the
             position goes with it. Without it, all names are those of the message.
         values: values of the parameters in the path or query, by name: "PUT /speed?x={x}" has the parameter x.
-        parameters: other parameters there = position in the ROS message; the body then has the rest of it, or nothing.
+        in_url: other parameters there = position in the ROS message; the body then has the rest of it, or nothing.
         body: other members of the body that the operation gets.
         failure: how a 2xx response says that its request failed; None: by no value.
         timeout_s: time that the gateway has for a response, and for what the response stands for, s; None: 5 s, and how
@@ -65,7 +65,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     at: Pointer = ""
     fields: dict[Pointer, Pointer] = {}
     values: dict[str, Any] = {}
-    parameters: dict[str, Pointer] = {}
+    in_url: dict[str, Pointer] = {}
     body: dict[str, Any] = {}
     failure: Failure | None = None
     timeout_s: Positive | None = None
@@ -73,7 +73,7 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     @property
     def places(self) -> tuple[Pointer, ...]:
         """Return the positions in the ROS message that a request has; empty: it has all."""
-        return (*self.fields.values(), *self.parameters.values())
+        return (*self.fields.values(), *self.in_url.values())
 
     @property
     def within_s(self) -> float:
@@ -189,6 +189,27 @@ class Acts(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
     rejected: tuple[Status, ...] = ()
 
 
+class Parameter(Body, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An operation on a parameter of a node: by GET it returns the value, by another method it sets it.
+
+    Attributes:
+        parameter: its name.
+        node: the node's full name.
+        type: of its value, as rcl_interfaces/msg/ParameterType names it, in small letters.
+        sets: whether it sets the value; None: if its method is not GET.
+        refused: the statuses when the node refuses a value; empty: any error.
+    """
+
+    parameter: Annotated[str, Meta(pattern=r"^\S+$")]
+    node: Topic
+    type: Literal[
+        "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array",
+        "string_array",
+    ]  # fmt: skip
+    sets: bool | None = None
+    refused: tuple[Status, ...] = ()
+
+
 class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """An operation that lists names on the graph.
 
@@ -211,10 +232,10 @@ class Lists(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     timeout_s: Positive = _USUAL_S
 
 
-Operation = Reads | Publishes | Calls | Acts | Lists
+Operation = Reads | Publishes | Calls | Acts | Parameter | Lists
 #: By the key that says so: what an operation is.
 KINDS: Final[dict[str, type[Operation]]] = {
-    "topic": Reads, "publishes": Publishes, "service": Calls, "action": Acts, "lists": Lists,
+    "topic": Reads, "publishes": Publishes, "service": Calls, "action": Acts, "parameter": Parameter, "lists": Lists,
 }  # fmt: skip
 
 
@@ -222,6 +243,11 @@ def followers(one: Operation) -> tuple[str, ...]:
     """Return the operations that read the state of a goal or call, and cancel it."""
     state = one.state.read if isinstance(one, Acts | Calls) and one.state else ""
     return tuple(filter(None, (state, one.cancel if isinstance(one, Acts) else "")))
+
+
+def is_setter(call: str, one: Operation) -> bool:
+    """Return whether an operation sets a parameter."""
+    return isinstance(one, Parameter) and (one.sets if one.sets is not None else not call.startswith("GET "))
 
 
 class _Forms(msgspec.Struct, frozen=True, kw_only=True):
@@ -273,7 +299,8 @@ class RosMap(_Forms, frozen=True):
     @property
     def acts(self) -> tuple[str, ...]:
         """The operations that send something to the robot."""
-        return tuple(call for call, one in self.operations.items() if isinstance(one, Publishes | Calls | Acts))
+        found = self.operations.items()
+        return tuple(call for call, one in found if isinstance(one, Publishes | Calls | Acts) or is_setter(call, one))
 
 
 class _Rosbridge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -348,6 +375,9 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
         found = f"has {' and '.join(kinds)}" if kinds else "has none"
         raise error(f"{place}: one key of {', '.join(KINDS)} must say what it is; it {found}")
     made = fit(table, KINDS[kinds[0]], place, error)
+    if isinstance(made, Parameter):
+        # Its message is the value alone.
+        made = msgspec.structs.replace(made, fields={"": "/value"})
     if isinstance(made, Calls) and made.state:
         path, body = made.state.read, made.state.body
         if "{id}" not in path + str(body) and "/{" not in path:

@@ -8,16 +8,19 @@ from typing import Final
 from conformance.rules.ros_gateway.judging import fails_as, statuses
 from conformance.scenarios.ros.presence import (
     Absence,
+    Grown,
     Growth,
     Listed,
     Presence,
     Publishers,
+    graph_grows,
     graph_lists,
     many_reads,
     publishers_end,
     publishers_of_each_quality,
     topics_at_first,
 )
+from conformance.scenarios.ros.services import Services, service_calls
 from conformance.scenarios.ros.topics import Burst, topic_bursts
 from conformance.scenarios.ros.web import is_success
 from conformance.scenarios.rule import NotClaimed, NotTested, Outcome, rule
@@ -99,6 +102,32 @@ def lists(trace: tuple[Listed, ...]) -> Iterator[Outcome]:
             expected = f"no {listing.name}, a hidden name"
         cause = f"{listing.there} {bool(listing.found)}"
         yield Case(listing.right, listing.exchange, expected, listing.found or "no such name", cause)
+
+
+@rule("ros-gateway/lists", on=(graph_grows,))
+def lists_grow(trace: Grown) -> Iterator[Outcome]:
+    """Judge whether lists have many new topics, and none of them after they have gone."""
+    for wrong, exchange in trace.lacking:
+        expected, found = f"all of {trace.count} new topics", f"{trace.count - wrong} of them"
+        yield Case(not wrong, exchange, expected, found, "lacks many")
+    for wrong, exchange in trace.left:
+        yield Case(
+            not wrong, exchange, f"none of {trace.count} topics that have gone", f"{wrong} of them", "keeps many"
+        )
+
+
+@rule("ros-gateway/recovers", on=(graph_grows,))
+def serves_beside(trace: Grown) -> Iterator[Outcome]:
+    """Judge whether topics are read while the graph has many others."""
+    yield from _judge_heard(trace.presences)
+
+
+@rule("ros-gateway/subscriptions", on=(service_calls,))
+def clients(trace: Services) -> Iterator[Outcome]:
+    """Judge whether calls leave no clients of their service behind."""
+    for one in trace.clients:
+        expected = f"at most {one.count // 2} more clients of {one.body.service} after {one.count} calls in a row"
+        yield Case(one.more <= one.count // 2, one.attempt, expected, f"{one.more} more", "clients")
 
 
 @rule("ros-gateway/subscriptions", on=(many_reads,))

@@ -205,14 +205,17 @@ class Gateway:
         """Return a message of a type, or of a part of it, that differs from all others."""
         return self.complete(name, self.maker(self.definition(name)).usual().value)
 
-    def request(self, call: str, body: Body, value: dict[str, Any] | None = None) -> Outgoing:
-        """Return the request of an operation; ``value``: of the ROS message that it gets."""
+    def request(
+        self, call: str, body: Body, value: dict[str, Any] | None = None, definition: Definition | None = None
+    ) -> Outgoing:
+        """Return the request of an operation; ``value``: of the ROS message that it gets, by the map's type."""
         document, values = None, body.values
         if self.ros.rosbridge:
             # Its id identifies the response to this message.
             body = msgspec.structs.replace(body, body={**body.body, "id": f"roaas-{next(self._numbers)}"})
         if value is not None:
-            document = document_for(value, self.definition(body.type + _PARTS.get(type(body), "")), body, self.ros)
+            definition = definition or self.definition(body.type + _PARTS.get(type(body), ""))
+            document = document_for(value, definition, body, self.ros)
             values = {**parameters_for(value, body), **values}
         return self.binding.make(fill(call, values), document)
 

@@ -29,9 +29,12 @@ _REPEAT_S: Final = 0.1
 # For a message on its way, and a late gateway: wait this long after a message's greatest age, s.
 _LATE_S: Final = 1.0
 _ROUNDS: Final = 5
-# Reads, and clients of a stream, that show whether subscriptions are never closed.
-_READS: Final = {"quick": 20, "standard": 40, "deep": 200}
+# Reads of all topics, and clients of a stream, that show whether subscriptions are never closed.
+_READS: Final = {"quick": 20, "standard": 200, "deep": 10_000}
 _CLIENTS: Final = 6
+# Topics by which the graph grows, and types of which one is no other topic's.
+_TOPICS: Final = {"quick": 30, "standard": 300, "deep": 300}
+_OTHERS: Final = ("std_msgs/msg/ColorRGBA", "std_msgs/msg/Empty")
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,8 @@ def publishers_end(gateway: Gateway) -> Publishers:
     presences += topics.publish_all("a publisher that fell silent before")
     absences += topics.let_age("whose publisher left", topics.leave)
     presences += topics.publish_all("a publisher in place of one that left")
+    topics.change_type()
+    presences += topics.publish_all("a publisher after one of another type")
     absences += topics.let_age("whose publisher was killed", gateway.kill)
     presences += topics.publish_all("a publisher in place of one that was killed")
     topics.leave()
@@ -202,6 +207,15 @@ class _Topics:
             self._gateway.robot.tell("forget", name=body.topic)
         WALL_CLOCK.sleep(_LATE_S)
 
+    def change_type(self) -> None:
+        """Publish messages of another type on all topics for a while, and leave."""
+        self.leave()
+        for topic, kind in {body.topic: body.type for body in self._reads.values()}.items():
+            other = next(one for one in _OTHERS if one != kind)
+            self._gateway.robot.publish(topic, other, {}, repeat_s=_REPEAT_S, apart=True)
+        WALL_CLOCK.sleep(_LATE_S)
+        self.leave()
+
     def let_age(self, when: str, end: Callable[[], object]) -> Iterator[Absence]:
         """Stop publishing, and yield the gateway's responses when the last messages are too old."""
         judged = {call: body for call, body in self._reads.items() if body.max_age_s is not None}
@@ -246,10 +260,12 @@ class Listed:
     exchange: Exchange
 
 
+# By what is listed: the type of what is put on the graph; nodes have none.
 _KINDS: Final = {
     "topics": "std_msgs/msg/ColorRGBA",
     "services": "std_srvs/srv/Trigger",
     "actions": "nav2_msgs/action/NavigateToPose",
+    "nodes": "",
 }
 
 
@@ -258,8 +274,6 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
     """Put names on the graph and take them off again, and read the lists each time."""
     found: list[Listed] = []
     for call, body in gateway.of(Lists):
-        if body.lists not in _KINDS:
-            continue
         kind, part = body.of or _KINDS[body.lists], secrets.token_hex(4)
         names = {f"/roaas_{part}": True, f"/roaas_{part}/inner/name": True}
         # A name that is hidden comes first: when the others are listed, it would be.
@@ -272,9 +286,59 @@ def graph_lists(gateway: Gateway) -> tuple[Listed, ...]:
         for name in names:
             gateway.robot.tell("forget", name=name)
         found += [_read_list(gateway, call, body, name, kind, there=False) for name in names]
-    if not found:
-        raise NotPossibleError("the map has no list of topics, services or actions")
     return tuple(found)
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Lists and reads while the graph had many topics more.
+
+    Attributes:
+        count: how many.
+        lacking: by list of topics: how many of them it came to lack, and the last read.
+        left: the same for those that it still had, after they had gone.
+        presences: what operations on topics returned meanwhile.
+    """
+
+    count: int
+    lacking: tuple[tuple[int, Exchange], ...]
+    left: tuple[tuple[int, Exchange], ...]
+    presences: tuple[Presence, ...]
+
+
+@scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
+def graph_grows(gateway: Gateway, effort: Effort) -> Grown:
+    """Put many topics on the graph, read lists and topics, take them off again, and read the lists."""
+    if not gateway.plays:
+        raise NotDeclaredError(NO_PLAY)
+    part, robot = secrets.token_hex(4), gateway.robot
+    names = {f"/roaas_{part}/topic_{number}" for number in range(_TOPICS[effort.name])}
+    lists = [(call, one) for call, one in gateway.ros.operations.items() if isinstance(one, Lists)]
+    lists = [(call, one) for call, one in lists if one.lists == "topics"]
+    topics = _Topics(gateway)
+    for name in sorted(names):
+        robot.publish(name, lists[0][1].of or _KINDS["topics"] if lists else _KINDS["topics"])
+    lacking = tuple(_read_until_listed(gateway, call, one, names, there=True) for call, one in lists)
+    presences = tuple(topics.publish_all(f"a publisher beside {len(names)} new topics"))
+    topics.leave()
+    for name in sorted(names):
+        robot.tell("forget", name=name)
+    left = tuple(_read_until_listed(gateway, call, one, names, there=False) for call, one in lists)
+    return Grown(len(names), lacking, left, presences)
+
+
+def _read_until_listed(
+    gateway: Gateway, call: str, body: Lists, names: set[str], *, there: bool
+) -> tuple[int, Exchange]:
+    """Read a list until it has all names, or none; return how many are wrong, and the last read."""
+    until = WALL_CLOCK.now() + body.timeout_s + PATIENCE_S
+    while True:
+        exchange = gateway.send(gateway.binding.make(call, None), body.timeout_s + PATIENCE_S)
+        found = names & _types_in(exchange, body).keys()
+        wrong = len(names - found) if there else len(found)
+        if not wrong or WALL_CLOCK.now() > until:
+            return wrong, exchange
+        WALL_CLOCK.sleep(PACE_S)
 
 
 def _put(gateway: Gateway, lists: str, name: str, kind: str) -> None:
@@ -282,8 +346,10 @@ def _put(gateway: Gateway, lists: str, name: str, kind: str) -> None:
         gateway.robot.publish(name, kind)
     elif lists == "services":
         gateway.robot.tell("serve", service=name, type=kind, script=[{}])
-    else:
+    elif lists == "actions":
         gateway.robot.tell("act", action=name, type=kind, script=[{}])
+    else:
+        gateway.robot.tell("hold", node=name, values={})
 
 
 def _read_list(gateway: Gateway, call: str, body: Lists, name: str, kind: str, *, there: bool) -> Listed:
@@ -328,16 +394,17 @@ class Growth:
 @scenario(needs=_NEEDS, leaves=Leaves.UNTOUCHED, stage=Stage.SETTLING)
 def many_reads(gateway: Gateway, effort: Effort) -> tuple[Growth, ...]:
     """Read a topic many times, or have clients of its stream come and go, and count its subscriptions."""
-    read = []
+    read, mapped = [], dict(gateway.of(Reads))
+    reads = max(_READS["quick"], _READS[effort.name] // len(mapped))
     with ExitStack() as stack:
-        for call, body in gateway.of(Reads):
+        for call, body in mapped.items():
             gateway.read(call, body)
             before = gateway.robot.count(body.topic, "subscribers")
             if body.stream and gateway.plays:
                 stack.enter_context(gateway.robot.publishing(body.topic))
                 exchanges = [_follow(gateway, call, body) for _ in range(_CLIENTS)]
             else:
-                exchanges = [gateway.read(call, body) for _ in range(_READS[effort.name])]
+                exchanges = [gateway.read(call, body) for _ in range(reads)]
             read.append((body, len(exchanges), before, exchanges[-1]))
         # The graph shows a new subscription a moment later.
         WALL_CLOCK.sleep(_LATE_S)

@@ -97,6 +97,10 @@ class Robot(RosProcess):
         """Return how many "publishers" or "subscribers" a topic has on the graph."""
         return int(self.tell("graph")["topics"].get(topic, {}).get(ends, 0))
 
+    def count_clients(self, service: str) -> int:
+        """Return how many clients a service has on the graph."""
+        return int(self.tell("graph")["clients"].get(service, 0))
+
     @contextmanager
     def publishing(self, topic: str) -> Iterator[None]:
         """Leave a topic in the end."""

@@ -40,10 +40,13 @@ _BESIDE: Final = 4
 _HELD_S, _HELD = 0.8, 5.0
 # A request that a call holds up ends at most this long before the call's response, s.
 _TOGETHER_S: Final = 0.25
-# _OVERTAKEN_S: how much earlier every second concurrent call is answered, s. _FEW: of these at quick. _CALLS: in a row.
+# _OVERTAKEN_S: how much earlier every second concurrent call is answered, s. _FEW: of these at quick. _CALLS: calls
+# with values of their own.
 _OVERTAKEN_S: Final = 0.1
 _FEW: Final = 4
+# _ROW: calls in a row that show whether clients are never closed.
 _CALLS: Final = {"quick": 3, "standard": 6, "deep": 24}
+_ROW: Final = {"quick": 10, "standard": 20, "deep": 1000}
 
 
 class Server(StrEnum):
@@ -153,12 +156,30 @@ class Crowd:
 
 
 @dataclass(frozen=True)
+class Clients:
+    """How many clients more a service had after calls in a row.
+
+    Attributes:
+        body: its map.
+        count: how many calls.
+        more: how many clients more it had after them.
+        attempt: the last call's response.
+    """
+
+    body: Calls
+    count: int
+    more: int
+    attempt: Attempt
+
+
+@dataclass(frozen=True)
 class Services:
     """Calls, and definitions of their responses, by operation."""
 
     probes: tuple[Called, ...]
     responses: dict[str, Definition]
     crowds: tuple[Crowd, ...] = ()
+    clients: tuple[Clients, ...] = ()
 
 
 @scenario(needs=_NEEDS, leaves=Leaves.AT_REST, stage=Stage.ACTING)
@@ -169,6 +190,7 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
     probes: list[Called] = []
     responses: dict[str, Definition] = {}
     crowds: list[Crowd] = []
+    clients: list[Clients] = []
     with partial_trace(lambda: Services(tuple(probes), responses)):
         for call, body in gateway.of(Calls):
             request = gateway.definition(f"{body.type}#Request")
@@ -176,8 +198,9 @@ def service_calls(gateway: Gateway, effort: Effort) -> Services:
             with gateway.robot.publishing(body.service):
                 caller = _Caller(gateway, call, body, request, responses[call])
                 probes.extend(caller.calls(effort))
+                clients.append(caller.in_a_row(_ROW[effort.name]))
                 crowds.append(caller.of_many(_FEW if effort.name == "quick" else CROWD))
-    return Services(tuple(probes), responses, tuple(crowds))
+    return Services(tuple(probes), responses, tuple(crowds), tuple(clients))
 
 
 class _Caller:
@@ -209,6 +232,20 @@ class _Caller:
         yield self._call_server(Server.GONE, {})
         self._serve([{"answer": {}}])
         yield self._reach_server(Server.BACK)
+
+    def in_a_row(self, number: int) -> Clients:
+        """Call one call after another, and count the service's clients."""
+        robot, body = self._gateway.robot, self._body
+        robot.tell("script", name=body.service, script=[{"answer": {}}])
+        made = self._gateway.request(self._call, body, self._complete("Request", {}))
+        attempt, before = self._send(made, body.within_s + _LATE_S), robot.count_clients(body.service)
+        for _ in range(number):
+            attempt = self._send(made, body.within_s + _LATE_S)
+        # A client that leaves late leaves all the same.
+        until = WALL_CLOCK.now() + body.within_s
+        while (more := robot.count_clients(body.service) - before) > 1 and WALL_CLOCK.now() < until:
+            WALL_CLOCK.sleep(PACE_S)
+        return Clients(body, number, more, attempt)
 
     def of_many(self, number: int) -> Crowd:
         """Call from many clients at once. It comes last, as calls that were given up may still reach the server."""

@@ -398,8 +398,8 @@ class _Writer:
 
     def send_malformed(self) -> Iterator[Burst]:
         """Yield requests that a gateway is likely to refuse, with their outcome."""
-        if self.body.parameters and not self.body.fields:
-            for name in self.body.parameters:
+        if self.body.in_url and not self.body.fields:
+            for name in self.body.in_url:
                 yield from self.malformed_as(f"a text as {name}", self.with_text(name), is_wrong=self.is_number(name))
             yield self.late()
             return
@@ -434,7 +434,7 @@ class _Writer:
 
     def is_number(self, name: str) -> bool:
         """Return whether the field that a parameter gives is a number or a boolean."""
-        shape = self.definition.at(self.body.parameters[name])
+        shape = self.definition.at(self.body.in_url[name])
         return shape is not None and not shape.is_text
 
     def malformed_as(self, what: str, made: Outgoing, *, is_wrong: bool) -> Iterator[Burst]:

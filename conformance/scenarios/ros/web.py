@@ -129,7 +129,7 @@ def document_for(value: dict[str, Any], definition: Definition, body: Body, ros:
 
 def parameters_for(value: dict[str, Any], body: Body) -> dict[str, str]:
     """Return the parameters of a path or query that sends a message."""
-    found = {name: value_at(value, own) for name, own in body.parameters.items()}
+    found = {name: value_at(value, own) for name, own in body.in_url.items()}
     return {name: quote(one if isinstance(one, str) else json.dumps(one), "") for name, one in found.items()}
 
 

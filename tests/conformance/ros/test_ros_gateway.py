@@ -24,6 +24,8 @@ FAULTS = {
         "stream reorders": "stream-order",
         "stream repeats": "stream-once",
         "subscriptions of streams left": "subscriptions",
+        "parameter as text": "parameter-exact",
+        "parameter refusal ignored": "parameter-refused",
     },
     ("flask", "quick"): {
         "NaN as 0": "read-exact write-exact",
@@ -34,6 +36,7 @@ FAULTS = {
         "cancel lost": "goal-cancel",
         "reliable only": "qualities",
         "publishers left": "subscriptions",
+        "parameter set twice": "parameter-exact",
     },
     ("aiohttp", "quick"): {
         "ascii": "read-exact write-exact",
@@ -56,17 +59,19 @@ FAULTS = {
         "fields swapped": "read-exact write-exact",
         "empty at first": "absent",
         "stale": "stale",
+        "list cut": "lists",
+        "clients left": "subscriptions",
         "last response in a crowd": "service-response",
         "reordered in a crowd": "order",
     },
 }
 #: What the map of each of these runs keeps, so that no time is spent where nothing is wrong.
 ENDS = {
-    ("fastapi", "quick"): "/odom /scan /counts /say /offsets /cmd_vel /enable /navigate topics",
-    ("flask", "quick"): "/odom /cmd_vel /enable /navigate",
+    ("fastapi", "quick"): "/odom /scan /counts /say /offsets /cmd_vel /enable /navigate max_speed topics",
+    ("flask", "quick"): "/odom /cmd_vel /enable /navigate modes",
     ("aiohttp", "quick"): "/scan /status /note /say /route /navigate",
     ("rosbridge", "quick"): "/odom /cmd_vel /enable",
-    ("flask", "standard"): "/odom /note /say /cmd_vel /enable",
+    ("flask", "standard"): "/odom /note /say /cmd_vel /enable topics",
 }
 #: What is judged of values and messages.
 CORE = ("read-exact", "read-fresh", "read-newest", "write-exact", "once", "order", "refused-nothing")

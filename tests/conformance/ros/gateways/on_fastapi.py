@@ -11,7 +11,7 @@ from fastapi import FastAPI, HTTPException, Request
 from fastapi.responses import JSONResponse, StreamingResponse
 from messages import RefusedError, interface, parsed
 from ros_end import Goal, begun
-from surface import ACTION, PUBLISHES, READS, SERVICES, STYLES, End, openapi
+from surface import ACTION, PARAMETERS, PUBLISHES, READS, SERVICES, STYLES, End, openapi
 
 _STATES = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",
@@ -23,7 +23,9 @@ _BODY_BYTES = 2_000_000
 ros, port = begun("fastapi")
 app = FastAPI(openapi_url=None)
 _sent: list[str] = []
-_reads, _publishes, _services = ({end.name: end for end in ends} for ends in (READS, PUBLISHES, SERVICES))
+_reads, _publishes, _services, _parameters = (
+    {end.name: end for end in ends} for ends in (READS, PUBLISHES, SERVICES, PARAMETERS)
+)
 
 
 def _found(ends: dict[str, End], name: str) -> End:
@@ -124,6 +126,26 @@ async def call(name: str, request: Request) -> Any:
     end = _found(_services, name)
     message = _read(await _body(request), interface(end.type).Request, end)
     return JSONResponse({"result": ros.forms.write(await _within(ros.call(end, message)))})
+
+
+@app.get("/api/v1/parameters/{name}")
+async def parameter(name: str) -> Any:
+    """Return a parameter."""
+    return JSONResponse({"value": await _within(ros.get_parameter(_found(_parameters, name)))})
+
+
+@app.put("/api/v1/parameters/{name}", status_code=204)
+async def set_parameter(name: str, request: Request) -> None:
+    """Set a parameter."""
+    body = await _body(request)
+    if not isinstance(body, dict) or body.keys() != {"value"}:
+        raise HTTPException(422, "expected one member, value")
+    try:
+        is_taken = await _within(ros.set_parameter(_found(_parameters, name), body["value"]))
+    except RefusedError as error:
+        raise HTTPException(422, str(error)) from error
+    if not is_taken:
+        raise HTTPException(409, "the node refuses it")
 
 
 @app.post("/api/v1/goals", status_code=202)

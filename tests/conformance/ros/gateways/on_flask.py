@@ -8,7 +8,7 @@ from action_msgs.msg import GoalStatus
 from flask import Flask, Response, abort, request
 from messages import RefusedError, interface, parsed
 from ros_end import Goal, begun
-from surface import ACTION, PUBLISHES, READS, SERVICES, STYLES, End, openapi
+from surface import ACTION, PARAMETERS, PUBLISHES, READS, SERVICES, STYLES, End, openapi
 from werkzeug.exceptions import HTTPException
 from werkzeug.serving import WSGIRequestHandler
 
@@ -20,7 +20,10 @@ _PHASES = {
 }
 ros, port = begun("flask")
 app = Flask(__name__)
-_ends = {kind: {end.name: end for end in ends} for kind, ends in zip("rps", (READS, PUBLISHES, SERVICES), strict=True)}
+_ends = {
+    kind: {end.name: end for end in ends}
+    for kind, ends in zip("rpsn", (READS, PUBLISHES, SERVICES, PARAMETERS), strict=True)
+}
 
 
 def _json(value: Any, status: int = 200) -> Response:
@@ -106,6 +109,21 @@ def call(name: str) -> Response:
     end = _end("s", name)
     message = ros.read(_body(), interface(end.type).Request, end)
     return _json({"ok": True, "answer": ros.forms.write(_of(ros.call(end, message)))})
+
+
+@app.get("/params/<name>")
+def parameter(name: str) -> Response:
+    """Return a parameter."""
+    return _json({"value": _of(ros.get_parameter(_end("n", name)))})
+
+
+@app.put("/params/<name>")
+def set_parameter(name: str) -> Response:
+    """Set a parameter."""
+    body = _body()
+    if not isinstance(body, dict) or list(body) != ["value"]:
+        abort(422)
+    return Response(status=204) if _of(ros.set_parameter(_end("n", name), body["value"])) else abort(409)
 
 
 @app.post("/tasks")

@@ -37,6 +37,15 @@ PUBLISHES = (
     End("setting", "/setting", "rcl_interfaces/msg/ParameterValue"),
 )
 SERVICES = (End("enable", "/enable", "std_srvs/srv/SetBool"), End("route", "/route", "nav_msgs/srv/GetPlan"))
+# Parameters of a node: their names, the node, and their types.
+PARAMETERS = (
+    End("max_speed", "/base", "double"),
+    End("count", "/base", "integer"),
+    End("on", "/base", "bool"),
+    End("modes", "/base/inner", "string_array"),
+    End("key", "/base/inner", "byte_array"),
+)
+_ITEMS = {"bool": "boolean", "integer": "integer", "double": "number", "string": "string", "byte": "string"}
 ACTION = End("navigate", "/navigate", "nav2_msgs/action/NavigateToPose")
 
 
@@ -51,6 +60,7 @@ class Style:
     goals: str
     cancel: str
     topics: str
+    parameters: str = ""
     read_at: str = ""
     publish_at: str = ""
     call_at: str = ""
@@ -91,6 +101,7 @@ STYLES = {
         goal_at="/goal",
         cancel="POST /api/v1/goals/{id}/cancel",
         topics="/api/v1/topics",
+        parameters="/api/v1/parameters/{}",
         topics_at="/topics",
         states=_WORDS,
         streams={"/api/v1/topics/{}/events": "sse"},
@@ -137,6 +148,7 @@ STYLES = {
         cancel="POST /tasks/{id}/abort",
         cancelled=200,
         topics="/topics",
+        parameters="/params/{}",
         states={
             "running": ["running"],
             "succeeded": ["done"],
@@ -206,6 +218,11 @@ def ros_map(style: Style, domain_id: int) -> str:
             "result": style.result_at,
             "timeout_s": 2.5 * DEADLINE_S,
         }
+    for end in PARAMETERS if style.parameters else ():
+        parameter = {"parameter": end.name, "node": end.ros, "type": end.type, "at": "/value"}
+        path = style.parameters.format(end.name)
+        operations[f"GET {path}"] = parameter
+        operations[f"PUT {path}"] = parameter | {"refused": [409]}
     goals = style.goals.format(ACTION.name)
     operations[f"POST {goals}"] = {
         "action": ACTION.ros,
@@ -263,6 +280,13 @@ def openapi(style: Style) -> dict[str, Any]:
         body = _wrapped(style.call_at, forms.schema(kind.Request, sent=True))
         result = _wrapped(style.result_at, forms.schema(kind.Response, sent=False))
         _put(paths, "post", style.services.format(end.name), {200: result} | _REFUSED | _UNREACHED, body)
+    for end in PARAMETERS if style.parameters else ():
+        item, _, array = end.type.partition("_")
+        one: dict[str, Any] = {"type": _ITEMS[item]}
+        value = _wrapped("/value", {"type": "array", "items": one} if array and item != "byte" else one)
+        path = style.parameters.format(end.name)
+        _put(paths, "get", path, {200: value} | _UNREACHED)
+        _put(paths, "put", path, {204: None, 409: _ERROR} | _REFUSED | _UNREACHED, value)
     kind = interface(ACTION.type)
     path = style.goals.format(ACTION.name)
     state = {"enum": [word for words in style.states.values() for word in words]}
