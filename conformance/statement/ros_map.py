@@ -378,10 +378,17 @@ def _operation(call: str, table: dict[str, Any], where: str, error: type[TomlFil
     if isinstance(made, Parameter):
         # Its message is the value alone.
         made = msgspec.structs.replace(made, fields={"": "/value"})
-    if isinstance(made, Calls) and made.state:
-        path, body = made.state.read, made.state.body
-        if "{id}" not in path + str(body) and "/{" not in path:
-            raise error(f"{place}: state.read = {path!r} must name what it is about by {{id}}, or its body must")
+    strange = [name for name in getattr(made, "in_url", ()) if f"{{{name}}}" not in call]
+    if strange:
+        raise error(f"{place}: in_url has {strange[0]!r}, but the path and query have no {{{strange[0]}}}")
+    if isinstance(made, Acts | Calls):
+        asked = [("state.read", made.state.read, made.state.body)] if made.state else []
+        asked += [("cancel", made.cancel, made.cancel_body)] if isinstance(made, Acts) and made.cancel else []
+        nameless = [(name, path) for name, path, body in asked if "{id}" not in path + str(body) and "/{" not in path]
+        # A device with one goal at a time gives it no id.
+        if nameless and not (isinstance(made, Acts) and made.id is None and len(nameless) == len(asked)):
+            name, path = nameless[0]
+            raise error(f"{place}: {name} = {path!r} must name what it is about by {{id}}, or its body must")
     elif isinstance(made, Reads) and not call.startswith(("GET ", "POST ")):
         raise error(f"{place}: topic = {made.topic!r} is read by GET, or by an operation of a WSDL")
     return made

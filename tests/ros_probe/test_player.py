@@ -11,6 +11,8 @@ from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
@@ -209,3 +211,25 @@ def test_an_action_follows_its_script(players, client):
     kinds = [what for _, what, _ in robot.heard("/count", 12)]
     assert kinds[:7] == ["rejected", "goal", "feedback", "feedback", "end", "goal", "end"]
     assert kinds[-3:] == ["goal", "cancel", "end"]
+
+
+def test_a_node_holds_parameters_and_refuses_others(players, client):
+    robot, (node, done) = players[0], client
+    octets = {"b64": base64.b64encode(b"\0\xff").decode()}
+    values = {"speed": ["double", 0.5], "count": ["integer", 2**60 + 1], "key": ["byte_array", octets]}
+    robot.tell("hold", node="/lab/base", values=values)
+    caller = AsyncParameterClient(node, "/lab/base")
+    assert caller.wait_for_services(20)
+    read = done(caller.get_parameters(["count", "key"])).values
+    assert (read[0].integer_value, list(read[1].byte_array_value)) == (2**60 + 1, [b"\0", b"\xff"])
+    taken, strange = done(caller.set_parameters([Parameter("speed", value=0.7), Parameter("count", value="x")])).results
+    assert (taken.successful, strange.successful) == (True, False)
+    robot.tell("hold", node="/lab/base", values={"key": ["byte_array", {"b64": ""}]}, refuses=True)
+    assert not done(caller.set_parameters([Parameter("speed", value=0.9)])).results[0].successful
+    assert robot.tell("held", node="/lab/base")["values"] == {"speed": 0.7, "count": 2**60 + 1, "key": {"b64": ""}}
+    assert [event[1:] for event in robot.heard("/lab/base", 2)] == [["set", {"speed": 0.7}], ["set", {"speed": 0.9}]]
+    robot.tell("forget", name="/lab/base")
+    until = time.monotonic() + 20
+    while "/lab/base" in players[1].tell("graph")["nodes"]:
+        assert time.monotonic() < until, "the node stays on the graph"
+        node.executor.spin_once(0.05)

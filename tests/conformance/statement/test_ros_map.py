@@ -5,7 +5,7 @@ import tomllib
 import pytest
 
 from conformance.contract.toml_file import TomlFileError
-from conformance.statement.ros_map import Acts, Calls, Failure, Lists, Publishes, Reads, read_ros_map
+from conformance.statement.ros_map import Acts, Calls, Failure, Lists, Parameter, Publishes, Reads, read_ros_map
 
 FULL = """
 domain_id = 7
@@ -15,7 +15,9 @@ bytes = "base64"
 
 [operations]
 "GET /api/v1/pose" = { topic = "/odom", type = "nav_msgs/msg/Odometry", absent = [404, 503], max_age_s = 2.0 }
-"POST /api/v1/velocity" = { publishes = "/cmd_vel", type = "geometry_msgs/msg/Twist", fields = { "/x" = "/linear/x" } }
+"POST /api/v1/speed?x={x}" = { publishes = "/cmd_vel", type = "geometry_msgs/msg/Twist", in_url = { x = "/linear/x" } }
+"PUT /params/speed" = { parameter = "speed", node = "/base", type = "double", at = "/value" }
+"POST /Port/GetSpeed" = { parameter = "speed", node = "/base", type = "double", sets = false }
 "POST /api/v1/reset" = { service = "/reset", type = "std_srvs/srv/SetBool", failure = { at = "/ok", values = [false] } }
 "GET /api/v1/topics" = { lists = "topics", at = "/topics", name = "/name", type = "/type" }
 
@@ -37,12 +39,22 @@ def _read(text):
 
 def test_a_full_map():
     ros = _read(FULL)
-    assert [type(one) for one in ros.operations.values()] == [Reads, Publishes, Calls, Lists, Acts]
+    assert [type(one) for one in ros.operations.values()] == [
+        Reads,
+        Publishes,
+        Parameter,
+        Parameter,
+        Calls,
+        Lists,
+        Acts,
+    ]
     assert (ros.domain, ros.non_finite, ros.integers, ros.bytes) == (7, "null", "string", "base64")
     assert ros.operations["GET /api/v1/pose"].absent == (404, 503)
     assert ros.operations["POST /api/v1/reset"].failure == Failure("/ok", (False,))
     assert {one.timeout_s for one in ros.operations.values() if not isinstance(one, Lists)} == {None}
-    assert ros.acts == ("POST /api/v1/velocity", "POST /api/v1/reset", "POST /api/v1/goals")
+    assert ros.acts == (
+        "POST /api/v1/speed?x={x}", "PUT /params/speed", "POST /api/v1/reset", "POST /api/v1/goals",
+    )  # fmt: skip
     assert "POST /api/v1/goals/{id}/cancel" in ros.calls
     assert "GET /api/v1/goals/{id}" in ros.calls
 
@@ -71,7 +83,8 @@ def test_the_domain_is_that_of_the_environment(monkeypatch):
         ('topic = "/odom"', 'topic = "odom"', "topic = 'odom' must be a full ROS name"),
         ("nav_msgs/msg/Odometry", "nav_msgs/Odometry", "type = 'nav_msgs/Odometry' must be a message type such as"),
         ("absent = [404, 503]", "absent = [200]", "must be a whole number from 400 to 599"),
-        ('topic = "/odom"', 'topics = "/odom"', "one key of topic, publishes, service, action, lists must"),
+        ('topic = "/odom"', 'topics = "/odom"', "one key of topic, publishes, service, action, parameter, lists must"),
+        ("POST /api/v1/speed?x={x}", "PUT /v?x={y}", "in_url has 'x', but the path and query have no {x}"),
         ('topic = "/odom"', 'topic = "/odom", service = "/a"', "it has topic and service"),
         ("values = [false]", "value = [false]", "unknown key 'value'"),
         ("max_age_s", "max_age", "unknown key 'max_age'; known are"),
@@ -88,3 +101,8 @@ def test_what_is_wrong_is_named(old, new, said):
         _read(FULL.replace(old, new))
     assert said in str(error.value)
     assert "gateway.toml: [ros" in str(error.value)
+
+
+def test_one_goal_at_a_time_needs_no_id():
+    text = FULL.replace("/{id}", "").replace('id = "/id"', "")
+    assert _read(text).operations["POST /api/v1/goals"].cancel == "POST /api/v1/goals/cancel"
