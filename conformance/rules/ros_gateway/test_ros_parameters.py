@@ -50,7 +50,7 @@ def _judge_set(put: Put) -> Iterator[Outcome]:
 
 
 @rule("ros-gateway/parameter-refused", on=(node_parameters,))
-def refused(trace: Parameters) -> Iterator[Outcome]:
+def refusals(trace: Parameters) -> Iterator[Outcome]:
     """Judge whether a value that the node refuses, or does not get, is told as a failure, and changes nothing."""
     for got in trace.gets:
         if not got.value:

@@ -192,16 +192,16 @@ class _End:
 
     def put(self, case: Case, value: dict[str, Any] | None, made: Outgoing | None = None) -> Put:
         """Send a request to set the parameter."""
-        robot, node, before = self.gateway.robot, self.body.node, self.held(case)
+        robot, node, before = self.gateway.robot, self.body.node, self.value_at_node(case)
         robot.take_heard(node)
         exchange = self.gateway.send(made or self.request(value), self.body.response_s)
         count = int(is_success(exchange, self.body)) + 1
         heard = robot.take_heard(node, count, _MORE_S)
         values = tuple(json.dumps({"value": each.content.get(self.body.parameter)}) for each in heard)
         text = "" if value is None else json.dumps(value)
-        return Put(self.call, self.body, case, text, exchange, values, before, self.held(case))
+        return Put(self.call, self.body, case, text, exchange, values, before, self.value_at_node(case))
 
-    def held(self, case: Case) -> str:
+    def value_at_node(self, case: Case) -> str:
         """Return JSON of what the node has."""
         if case is Case.MISSING:
             return ""
