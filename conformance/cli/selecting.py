@@ -22,8 +22,10 @@ def select_ids(
     select: Iterable[str] = (),
     exclude: Iterable[str] = (),
     among: frozenset[str] | None = None,
-) -> frozenset[str] | None:
-    """Return the ids of the selected requirements; None if nothing was selected.
+) -> tuple[frozenset[str], frozenset[str]] | None:
+    """Return the ids of the selected requirements, and those whose checks are played; None if nothing was selected.
+
+    Checkers judge a requirement by the exchanges of its whole class, so the checks of its class are played with it.
 
     Args:
         ledger: the requirements by id.
@@ -42,11 +44,12 @@ def select_ids(
     chosen = frozenset(judged) if among is None else among & frozenset(judged)
     if select:
         chosen &= frozenset().union(*(_fitting(pattern, judged, "--select") for pattern in select))
-    for pattern in exclude:
-        chosen -= _fitting(pattern, judged, "--exclude")
+    excluded = frozenset().union(*(_fitting(pattern, judged, "--exclude") for pattern in exclude))
+    chosen -= excluded
     if not chosen:
         raise SelectionError("--select and --exclude leave no requirement to judge")
-    return chosen
+    classes = {name for id_ in chosen for name in judged[id_].classes}
+    return chosen, frozenset(id_ for id_, item in judged.items() if not classes.isdisjoint(item.classes)) - excluded
 
 
 def _fitting(pattern: str, judged: Mapping[str, Requirement], option: str) -> frozenset[str]:

@@ -120,10 +120,15 @@ class ChecksPlugin:
             return
         run = self._robot().run
         ledger = run.contract.ledger
-        claimed = {
-            id_ for id_, requirement in ledger.items() if requirement.binds(run.claims) and run.selection.has(id_)
-        }
-        kept = [item for item in items if not is_check(item) or not claimed.isdisjoint(self.ids_of(item))]
+        claimed = {id_ for id_, requirement in ledger.items() if requirement.binds(run.claims)}
+        chosen = {id_ for id_ in claimed if run.selection.has(id_)}
+        played = claimed if run.selection.played is None else claimed & run.selection.played
+        kept = [
+            item
+            for item in items
+            if not is_check(item)
+            or not (chosen if item.get_closest_marker("motion") else played).isdisjoint(self.ids_of(item))
+        ]
         dropped = [item for item in items if item not in kept]
         config.hook.pytest_deselected(items=dropped)
         for item in kept:

@@ -25,11 +25,13 @@ class Selection:
 
     Attributes:
         ids: of the requirements; None: all.
+        played: ids of these and of others whose checks are played for them, unless they move the device; None: all.
         exit_first: whether nothing further is tested once a MUST is found to fail.
         accepted: ids whose failures the baseline accepts, so that they end no run.
     """
 
     ids: frozenset[str] | None = None
+    played: frozenset[str] | None = None
     exit_first: bool = False
     accepted: frozenset[str] = frozenset()
 
