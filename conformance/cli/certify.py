@@ -239,7 +239,7 @@ def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, opti
     # Before the run, so that a key that cannot sign is reported at once.
     notary = door.notary(Path(options.key), str(contract.directory)) if options.key else None
     if options.plan:
-        return _plan(chosen, options, contract)
+        return _plan(judged, options)
     if chosen.motion_map is not None and not contract.is_claimed:
         from conformance.engine.map_text import check_map  # noqa: PLC0415 - of a map alone
 
@@ -284,12 +284,14 @@ def _write_baseline(path: Path, outcome: Certification, contract: Contract, old:
     click.echo(f"baseline: {path}, {count_of(len(found), 'failure')}. {told}", err=True)
 
 
-def _plan(chosen: Statement, options: CertifyOptions, contract: Contract) -> CommandResult:
-    """Print the plan of the run."""
+def _plan(judged: Judged, options: CertifyOptions) -> CommandResult:
+    """Print the plan of the run, and to stderr by which description it is made."""
     from conformance.engine.planning import plan_of  # noqa: PLC0415 - only --plan needs it
     from conformance.engine.robot_under_test import RobotUnderTest  # noqa: PLC0415 - as above
 
-    for line in plan_of(RobotUnderTest(_run(chosen, options, contract))):
+    for remark in judged.remarks:
+        click.echo(inert(remark), err=True)
+    for line in plan_of(RobotUnderTest(_run(judged.statement, options, judged.contract))):
         click.echo(line)
     return CommandResult(ExitCode.PASSED)
 

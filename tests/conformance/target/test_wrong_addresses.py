@@ -135,10 +135,12 @@ def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
         done = CliRunner().invoke(
             roaas.main, ["certify", f"http://{place}/docs", "--effort", "quick", "--out", str(tmp_path)]
         )
+        planned = CliRunner().invoke(roaas.main, ["certify", f"http://{place}/docs", "--plan"])
     assert f"The description was found at http://{place}/openapi.json." in done.stderr
     assert any(
         "The description was found" in note for note in json.loads((tmp_path / "result.json").read_text())["notes"]
     )
+    assert f"The description was found at http://{place}/openapi.json." in planned.stderr
 
 
 def test_options_of_the_papers_robot_are_no_options_of_a_described_one(tmp_path):
