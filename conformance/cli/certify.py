@@ -358,14 +358,14 @@ def _run(chosen: Statement, options: CertifyOptions, contract: Contract) -> Run:
     claims = tuple(name for name in chosen.claims_of(contract) if name in known)
     try:
         among = failed_before(options.out / "result.json") if options.last_failed else None
-        chosen_ids = select_ids(contract.ledger, claims, options.select, options.exclude, among) or (None, None)
+        ids, played = select_ids(contract.ledger, claims, options.select, options.exclude, among) or (None, None)
     except SelectionError as error:
         raise click.UsageError(str(error)) from error
     return Run(
         statement=chosen,
         contract=contract,
         claims=claims,
-        selection=Selection(*chosen_ids, options.exit_first),
+        selection=Selection(ids, played, options.exit_first),
         allow_motion=options.allow_motion,
         ros="play" if options.ros_play else "watch" if options.ros else "",
         seed=options.seed if options.nonce is None else seed_of_nonce(options.nonce),
