@@ -216,12 +216,6 @@ def certify(door: FrontDoor, /, targets: tuple[str, ...], **given: Any) -> Comma
 def _carry_out(door: FrontDoor, source: str | None, statement: Path | None, options: CertifyOptions) -> CommandResult:
     """Carry out the options for one robot: write a first statement, print the plan, or certify.
 
-    Args:
-        door: signs the result.
-        source: URL or file of the device's own description, or None.
-        statement: the robot's statement, or None.
-        options: of the command.
-
     Raises:
         StatementError, ContractError, DescriptionError: one of the files cannot be used.
         UnreachableError: the server of the description does not respond.

@@ -255,14 +255,7 @@ def _operation_named(operations: Sequence[Operation], label: str, option: str) -
 
 
 def _reads(operations: Sequence[Operation], rules: CallRules, drive: str, names: frozenset[str]) -> Iterator[Operation]:
-    """Yield readable operations with JSON: first those with these names, those in the same folder, or a state.
-
-    Args:
-        operations: of the description.
-        rules: what may be called.
-        drive: the path of the operation that commands.
-        names: of the numbers that it commands, in lower case.
-    """
+    """Yield readable operations with JSON: with a commanded name, in the folder of the command's path, or a state."""
     found = [
         operation
         for operation in operations

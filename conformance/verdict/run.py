@@ -25,7 +25,7 @@ class Selection:
 
     Attributes:
         ids: of the requirements; None: all.
-        played: ids of these and of others whose checks are played for them, unless they move the device; None: all.
+        played: ids whose checks are played unless they move the device; None: all.
         exit_first: whether nothing further is tested once a MUST is found to fail.
         accepted: ids whose failures the baseline accepts, so that they end no run.
     """
@@ -44,8 +44,7 @@ class Selection:
         return self.exit_first and self.has(requirement) and requirement not in self.accepted
 
 
-# _NEXT_TO_ALL: if more of the cases than this share were sent, the verdict's first line does not mention the time
-# limit.
+# _NEXT_TO_ALL: if more of the cases than this share were sent, the verdict does not mention the time limit.
 _NEXT_TO_ALL = 0.99
 _FEWEST_SHARE = 0.04
 
@@ -187,8 +186,7 @@ class Run:
         """Whether so many cases were tried that a verdict can rest on them.
 
         An exploration has up to 100 cases, and at least three. A fault that every fifth value shows is missed by three
-        cases more often than not (0.8 ** 3 = 0.51), and found by four. Nothing rests on operations that were not called
-        for want of time.
+        cases more often than not (0.8 ** 3 = 0.51), and found by four. Operations that were not called support nothing.
         """
         return self.share >= _FEWEST_SHARE and not self.limit.uncalled
 

@@ -132,10 +132,8 @@ def test_what_is_neither_a_file_nor_an_address_is_told(tmp_path, monkeypatch, ta
 
 def test_a_description_that_is_found_elsewhere_is_said(tmp_path):
     with server("good") as place:
-        done = CliRunner().invoke(
-            roaas.main, ["certify", f"http://{place}/docs", "--effort", "quick", "--out", str(tmp_path)]
-        )
-        planned = CliRunner().invoke(roaas.main, ["certify", f"http://{place}/docs", "--plan"])
+        command = ["certify", f"http://{place}/docs", "--effort", "quick", "--out", str(tmp_path)]
+        done, planned = (CliRunner().invoke(roaas.main, [*command, *more]) for more in ((), ("--plan",)))
     assert f"The description was found at http://{place}/openapi.json." in done.stderr
     assert any(
         "The description was found" in note for note in json.loads((tmp_path / "result.json").read_text())["notes"]
