@@ -12,21 +12,12 @@ from urllib.parse import quote
 from conformance.api.rest.patches import same
 from conformance.api.rest.references import collections_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import (
-    collection_of,
-    differences,
-    id_member,
-    is_devices,
-    is_shared,
-    object_in,
-    parts_of,
-)
+from conformance.api.rest.things import collection_of, differences, id_member, is_devices, is_shared, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
-from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.verdict.evidence import Case
 
@@ -42,11 +33,7 @@ _MOST: Final = 200
 
 
 class Answers:
-    """Judges the response to each PUT, PATCH and creating POST by the next read of what was written.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges the response to each PUT, PATCH and creating POST by the next read of what was written."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -95,7 +82,7 @@ class Answers:
     def _judge_numbers(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
         """Judge whether a number is shown as it was sent; a device may limit it or round it, and say so by that."""
         sent: dict[str, Any] = read_json(occasion.request.body).value
-        told = object_in(read_json(occasion.response.body).value, {plain_name(name) for name in sent})
+        told = occasion.members(sent)
         parts = parts_of(next(iter(operation.bodies.values())).schema)
         for name in (name for name in sent if name in parts and not is_devices(name, parts[name], self._collections)):
             if not (_is_number(sent[name]) and _is_number(told.get(name))):
@@ -118,9 +105,8 @@ class Answers:
             return
         own, shape = parts_of(operation.shape), parts_of(item.shape)
         sent: dict[str, Any] = read_json(write.request.body).value
-        schema, names = operation.bodies[write.request.media_type].schema, {plain_name(name) for name in shape}
-        told = object_in(read_json(answer.body).value, names)
-        now = object_in(read_json(occasion.response.body).value, names)
+        schema = operation.bodies[write.request.media_type].schema
+        told, now = write.members(shape), occasion.members(shape)
         is_later = answer.status == HTTPStatus.ACCEPTED
         for name in own.keys() & shape.keys() & sent.keys() & told.keys() & now.keys():
             seen, key = {name: now[name]}, (operation.label, name)

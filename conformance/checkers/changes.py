@@ -16,7 +16,7 @@ from urllib.parse import unquote
 from conformance.api.call_rules import words_of
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, object_in
+from conformance.api.rest.things import collection_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import Schema, is_number, kinds_of
@@ -71,8 +71,8 @@ FINAL: Final = _CANCELLED | _DONE
 _AWAY: Final = frozenset({"archived", "expired", "deleted", "removed", "purged"})
 #: Operations that end or interrupt an activity.
 ENDING: Final = frozenset({"cancel", "abort", "stop", "pause", "halt", "interrupt"})
-#: Phrases in a description which say that an operation is refused while another thing is in a certain state.
-ANOTHER: Final = re.compile(r"\b(?:while|if|when) (?:another\b|one is\b)[^.;]*", re.IGNORECASE)
+# Phrases in a description which say that an operation is refused while another thing is in a certain state.
+_ANOTHER: Final = re.compile(r"\b(?:while|if|when) (?:another\b|one is\b)[^.;]*", re.IGNORECASE)
 # Words in such a phrase for things that share something: two that do not share it may be in that state.
 _SHARING: Final = re.compile(r"\b(?:same|its|this|that|each|per|on|of|for|in|with|by|not)\b", re.IGNORECASE)
 # Phrases in a description which say that a number never decreases.
@@ -120,11 +120,7 @@ class _State:
 
 
 class Changes:
-    """Judges each read of a resource by the requests before it.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges each read of a resource by the requests before it."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -139,18 +135,19 @@ class Changes:
             if (said := _final(reads[template], name, operations))
         }
         # By operation: states that only one thing at a time may be in. Below: accepted operations since the last read.
+        things = {name: _states_of(reads[name], member) for name, member in self._states.items()}
         self._alone = {
             operation.label: found
             for operation in operations
-            if "409" in operation.responses and (found := _alone(operation))
+            if (found := _alone(operation, things.get(operation.template.rpartition("/")[0], ())))
         }
         # By the thing's path template: such states, by what the description says of its creation.
         self._single = {
             template: found
             for operation in operations
-            for template in self._states
+            for template, states in things.items()
             if (operation.method, operation.template.rstrip("/")) == ("POST", collection_of(template))
-            if (found := _alone_states(operation, _states_of(reads[template], self._states[template])))
+            if (found := _alone_states(operation, states))
         }
         # By operation: the state to which it leads by its description.
         self._leads = {
@@ -332,8 +329,7 @@ class Changes:
     def _judge_growth(self, occasion: Occasion, template: str, path: str) -> Iterator[Case]:
         """Judge the members of a thing that never decrease, by the description."""
         names, answer = self._growing.get(template, frozenset()), occasion.response
-        value = read_json(answer.body).value if names and is_json(answer.media_type) else None
-        now = {name: one for name, one in object_in(value, names).items() if name in names and is_number(one)}
+        now = {name: one for name, one in occasion.members(names).items() if name in names and is_number(one)}
         before, at_s = self._grown.get(path, ({}, 0.0))
         if occasion.sent_s >= at_s and now:
             for name in now.keys() & before.keys():
@@ -379,18 +375,21 @@ def state_of(read: Operation) -> str:
     return next(named, "")
 
 
-def _condition_text(operation: Operation) -> str:
-    return " ".join(found[0] for found in ANOTHER.finditer(operation.text))
+def another_of(operation: Operation) -> str:
+    """Return the states of another thing in which an operation is refused, as its description puts it."""
+    is_conflict = operation.conflict.lower().startswith("another ")
+    return " ".join([found[0] for found in _ANOTHER.finditer(operation.text)] + [operation.conflict] * is_conflict)
 
 
-def _alone(operation: Operation) -> frozenset[str]:
-    """Return the words in backticks for the state of another thing in which an operation is refused."""
-    return frozenset(re.findall(r"`([\w -]+)`", _condition_text(operation)))
+def _alone(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
+    """Return the states of another thing in which an operation is refused, also those that are words in backticks."""
+    said = re.findall(r"`([\w -]+)`", another_of(operation)) if "409" in operation.responses else ()
+    return _alone_states(operation, states).union(said)
 
 
 def _alone_states(operation: Operation, states: tuple[str, ...]) -> frozenset[str]:
-    """Return the states that one thing alone may have, by what the description says of a creation."""
-    said = _condition_text(operation)
+    """Return the states that one thing alone may have, by what the description says."""
+    said = another_of(operation)
     if "409" not in operation.responses or _SHARING.search(said.partition(",")[0]):
         return frozenset()
     return frozenset(state for state in states if _word(state).search(said))
@@ -437,9 +436,7 @@ def _final(read: Operation, name: str, operations: Iterable[Operation]) -> froze
 
 
 def _state_in(occasion: Occasion, name: str) -> str:
-    body = occasion.response.body
-    value = read_json(body).value if is_json(occasion.response.media_type) and len(body) <= _MOST_OCTETS else None
-    found = object_in(value, {plain_name(name)}).get(name)
+    found = occasion.members([name]).get(name) if len(occasion.response.body) <= _MOST_OCTETS else None
     return found if isinstance(found, str) else ""
 
 
@@ -454,11 +451,7 @@ _TWICE: Final = 2
 
 
 class Transitions:
-    """Judges operations in states in which they are refused by the description, by the read before them.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges operations in states in which they are refused by the description, by the read before them."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -521,7 +514,7 @@ class Transitions:
         answer, read = occasion.response, self._reads.get(template)
         is_usable = read is not None and answer.ok and is_json(answer.media_type) and len(answer.body) <= _MOST_OCTETS
         shape = flat(read.shape or {}).get("properties", {}) if read is not None else {}
-        now = object_in(read_json(answer.body).value, {plain_name(name) for name in shape}) if is_usable else {}
+        now = occasion.members(shape) if is_usable else {}
         self._seen.pop(path, None)
         if now and len(self._seen) < _MOST_THINGS:
             self._seen[path] = now

@@ -39,6 +39,7 @@ _LATER: Final = re.compile(
 #: States of an activity that goes on.
 LIVE: Final = frozenset({"running", "active", "executing", "inprogress", "started", "moving", "working"})
 _WAITING: Final = frozenset({"queued", "pending", "scheduled", "created", "new", "waiting", "accepted", "paused"})
+_IDLE: Final = frozenset({"idle", "ready", "stopped"})
 # Commands that keep an activity from its end, and states after that.
 _ENDS: Final = frozenset({"cancel", "abort"})
 _DONE: Final = frozenset({"done", "finished", "completed", "complete", "succeeded"})
@@ -53,7 +54,8 @@ _SWITCHES: Final = {
 }  # fmt: skip
 _STATES: Final = {
     "cancel": ({"cancelled", "canceled"}, LIVE | _WAITING), "abort": ({"aborted"}, LIVE | _WAITING),
-    "pause": ({"paused"}, LIVE), "stop": ({"stopped"}, LIVE), "resume": (LIVE, {"paused"}),
+    "pause": ({"paused"}, LIVE), "stop": ({"stopped", *_IDLE}, LIVE), "resume": (LIVE, {"paused"}),
+    "start": (LIVE, _IDLE | {"created", "new", "paused"}),
     "lock": ({"locked"}, {"unlocked"}), "unlock": ({"unlocked"}, {"locked"}), "open": ({"open", "opened"}, {"closed"}),
     "close": ({"closed"}, {"open", "opened"}), "enable": ({"enabled"}, {"disabled"}),
     "disable": ({"disabled"}, {"enabled"}), "arm": ({"armed"}, {"disarmed"}), "disarm": ({"disarmed"}, {"armed"}),
@@ -130,15 +132,13 @@ def _state(verb: str, read: Operation) -> tuple[str, frozenset[str]] | None:
     states = {str(one): plain_name(str(one)) for one in flat(parts_of(read.shape).get(name, {})).get("enum", ())}
     to, start = _STATES.get(verb, (frozenset(), frozenset()))
     usable = frozenset(one for one, plain in states.items() if plain in start)
-    return (name, usable) if usable and to & set(states.values()) else None
+    # An activity that was started and is over may be idle again, where no state tells its end.
+    is_told = verb != "start" or bool(_DONE & set(states.values()))
+    return (name, usable) if usable and is_told and to & set(states.values()) else None
 
 
 class Commands:
-    """Judges the first reads after a command.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges the first reads after a command."""
 
     def __init__(self, contract: Contract) -> None:
         known = commands_of([*operations_of(contract)] if contract.openapi_path else [])
@@ -172,9 +172,7 @@ class Commands:
                 self._sent[above] = occasion, before
 
     def _read(self, occasion: Occasion, read: Operation, path: str) -> Iterator[Case]:
-        response = occasion.response
-        value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
-        now, before = object_in(value, {plain_name(name) for name in parts_of(read.shape)}), self._seen.get(path, {})
+        now, before = occasion.members(parts_of(read.shape)), self._seen.get(path, {})
         sent, was = self._sent.get(path, (None, {}))
         self._moving |= {(read.label, name) for name in before if not sent and not same(before[name], now.get(name))}
         if sent is not None and sent.operation is not None and sent.response.received_s <= occasion.sent_s:

@@ -58,11 +58,7 @@ class _Entry(NamedTuple):
 
 
 class Entries:
-    """Judges each whole list by the creations before it.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges each whole list by the creations before it."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()

@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 
 from conformance.api.rest.listing import items_of
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, identifier_of, may_create, object_in
+from conformance.api.rest.things import collection_of, identifier_of, may_create
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
@@ -167,8 +167,7 @@ class Uniques:
         elif method == "GET" and answer.ok and is_json(answer.media_type) and self._bodies.get(path):
             yield from self._judge_list(occasion, operation, self._bodies[path])
         elif method == "GET" and answer.ok and self._unique[above] and occasion.context.plain:
-            value = read_json(answer.body).value if is_json(answer.media_type) else None
-            now = {name: one for name, one in object_in(value, self._unique[above]).items() if _is_plain(one)}
+            now = {name: one for name, one in occasion.members(self._unique[above]).items() if _is_plain(one)}
             yield from self._judge_read(occasion, operation, above, last, now)
             self._read[above][last] = now
 

@@ -97,11 +97,8 @@ class Lists:
         """Yield the cases of one exchange."""
         if occasion.request.method not in SAFE:
             self._totals.note_change(occasion.response.received_s)
-            self._longest.clear()
-            self._whole.clear()
-            self._missed.clear()
-            self._shown.clear()
-            self._cut.clear()
+            for memory in (self._longest, self._whole, self._missed, self._shown, self._cut):
+                memory.clear()
         operation = occasion.operation
         listing = listing_of(operation) if operation is not None and operation.method == "GET" else None
         if listing is None or occasion.request.method != "GET" or not occasion.context.is_usual_in_any_coding:
@@ -113,16 +110,11 @@ class Lists:
         yield from self._cursor(occasion, listing, page, sent)
         if not (listing.operation.parameters or page.totals):
             return
-        yield from self._judge_cut(occasion, listing, page, sent)
-        yield from self._limit(occasion, listing, page, sent)
-        yield from self._filters(occasion, listing, page, sent)
-        yield from self._bounds(occasion, listing, page, sent)
-        yield from self._judge_included(occasion, listing, page, sent)
-        yield from self._order(occasion, listing, page, sent)
-        yield from self._totals(occasion, listing, page, sent)
-        yield from self._search(occasion, listing, page, sent)
-        yield from self._judge_missed(occasion, listing, page, sent)
-        yield from _links(occasion, listing, page, sent)
+        for judge in (
+            self._cuts, self._limit, self._filters, self._bounds, self._includes, self._order, self._totals,
+            self._search, self._misses, _links,
+        ):  # fmt: skip
+            yield from judge(occasion, listing, page, sent)
         self._learn(listing, page)
 
     def _cursor(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
@@ -155,7 +147,7 @@ class Lists:
         there = [one for one, item in own.items() if name in item and item[name] is value]
         return [one for one in there if hash((listing.operation.label, one, name, str(value))) in self._seen]
 
-    def _judge_cut(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
+    def _cuts(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge that a limit takes away only what is beyond it, where no parameter or link leads to the rest."""
         most, count, places = listing.most(sent), len(page.items), (listing.offset, listing.page, listing.cursor)
         if listing.limit is None or most <= 0 or page.goes_on or any(places):
@@ -228,6 +220,8 @@ class Lists:
             values = list(self._known_values(listing, page, name))
             wrong = self._wrong(listing, name, asked, values)
             doubt = ""
+            if not wrong and says_whole(parameter):
+                wrong, doubt = [one for one in values if isinstance(one, str) and not _holds(one, asked)][:1], SENTENCE
             if not wrong and _choices(parameter) and self._known(listing, page, name, None):
                 wrong, doubt = ["null"], "what has no value may belong to each"
             if wrong is None:
@@ -236,9 +230,7 @@ class Lists:
             found, cause = f"an item with {', '.join(wrong)}", f"{listing.operation.label} {parameter.name}"
             yield occasion.case("description/list-filter", not wrong, expected, found, cause=cause, doubt=doubt)
 
-    def _judge_included(
-        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]
-    ) -> Iterator[Case]:
+    def _includes(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge that a list has no items of a kind that a parameter such as `include_archived` would add."""
         for name, parameter in listing.includes.items():
             text = sent.get(parameter.name, text_of(flat(parameter.schema).get("default")))
@@ -265,7 +257,8 @@ class Lists:
                 is_sure |= steps == sorted(steps) and len(set(steps)) > 1
             if is_sure and values:
                 wrong = [value for value in values if bound.excludes(text, value)]
-                side = "at least" if bound.is_least else "at most"
+                side = ("more than " if bound.is_least else "less than ") if bound.is_strict else ""
+                side = side or ("at least" if bound.is_least else "at most")
                 expected = f"items with {bound.member} {side} {text}, which the parameter {name} asks for"
                 found = f"an item with {text_of(wrong[0])}" if wrong else ""
                 cause = f"{listing.operation.label} {name}"
@@ -309,9 +302,7 @@ class Lists:
             found, doubt = f"the item {''.join(other[:1])}", "a search may find similar words too"
             yield occasion.case(id_, not other, expected, found, cause=cause, doubt=doubt)
 
-    def _judge_missed(
-        self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]
-    ) -> Iterator[Case]:
+    def _misses(self, occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
         """Judge that a filter or search keeps each item with what it asks for, in the whole list before and after."""
         items = {one: members_of(item) for one, item in zip(page.identities, page.items, strict=True)}
         path, count = occasion.context.target.partition("?")[0], len(items)
@@ -400,32 +391,52 @@ def is_cut(listing: Listing, page: Page, sent: Mapping[str, str]) -> bool:
     return is_said or (total != count and count >= _LEAST and count % _ROUND == 0)
 
 
+# Phrases in a description of a list: for items in groups, for the member by which it is in order, for a filter by the
+# whole value of a member, and for one by a part of it.
 _GROUPED: Final = re.compile(r"\b(?:first|groups?|each)\b", re.IGNORECASE)
+_BY: Final = re.compile(r"\b(?:ordered|sorted|in (?:the )?order) (?:by|of) (?:their |its )?`?(\w+)", re.IGNORECASE)
+_WHOLE: Final = re.compile(
+    r"\b(?:of|with|in|from|by|for|at|on) (?:this|that|the (?:given|same))\b|\bexact|\bequal", re.IGNORECASE
+)
+_PART: Final = re.compile(r"\b(?:part|prefix|like|similar|begin\w*|start\w*|match\w*|contain\w*|wildcard\w*|below)\b")
+
+
+def says_whole(parameter: Parameter) -> bool:
+    """Return whether a filter chooses items by the whole value of a member, by its description."""
+    return bool(_WHOLE.search(parameter.says)) and not _PART.search(parameter.says.lower())
 
 
 def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[str, str]) -> Iterator[Case]:
-    """Judge the order in time that the description of a list tells, by the one time that all its items have."""
+    """Judge the order that the description of a list tells: by a member, or by the one time that all items have."""
     text = listing.operation.text
-    said = IN_TIME.search(text)
+    said, by = IN_TIME.search(text), _BY.search(text)
+    found = said or by
+    member, descending = _timed(listing) if said is not None else "", said is not None and said[1] is not None
     # "Pinned notes first, in both groups the newest first": the newest of all need not come first.
-    if (
-        said is None
-        or _GROUPED.search(text[: said.start()].rpartition(".")[2])
-        or (listing.sort is not None and listing.sort.name in sent)
-        or listing.direction is not None
-    ):
+    if said is not None and _GROUPED.search(text[: said.start()].rpartition(".")[2]):
         return
+    if said is None and by is not None and "enum" not in flat(listing.members.get(plain_name(by[1]), {"enum": ()})):
+        member = plain_name(by[1])
+    is_sorted = listing.direction is not None or (listing.sort is not None and listing.sort.name in sent)
+    if found is None or not member or is_sorted:
+        return
+    values = [members_of(item).get(member) for item in page.items[:_COMPARED]]
+    pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
+    # Without a direction, the order may be descending.
+    is_open = said is None and not any(before for _, _, before in pairs)
+    wrong = [(one, other) for one, other, before in pairs if before is descending and not is_open]
+    if any(before is not None for _, _, before in pairs) and not _comes_first(page, member, said and descending):
+        expected = f"items {found[0].lower()}, by the description of the list"
+        other = f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])} as {member}" if wrong else ""
+        cause = f"{listing.operation.label} {member} said"
+        yield occasion.case("description/list-order", not wrong, expected, other, cause=cause, doubt=SENTENCE)
+
+
+def _timed(listing: Listing) -> str:
+    """Return the member with the time of an item, or an empty text."""
     dated = [name for name, one in listing.members.items() if flat(one).get("format") == "date-time"]
     made = [name for name in dated if plain_name(name).startswith("created")] or (dated if len(dated) == 1 else [])
-    values = [members_of(item).get(made[0]) for item in page.items[:_COMPARED]] if made else []
-    pairs = [(one, other, is_before(one, other)) for one, other in combinations(values, 2)]
-    descending = said[1] is not None
-    wrong = [(one, other) for one, other, before in pairs if before is descending]
-    if any(before is not None for _, _, before in pairs) and not _comes_first(page, made[0], descending):
-        expected = f"the {said[0].lower()}, by the description of the list"
-        found = f"{text_of(wrong[0][0])} before {text_of(wrong[0][1])} as {made[0]}" if wrong else ""
-        cause = f"{listing.operation.label} {made[0]} said"
-        yield occasion.case("description/list-order", not wrong, expected, found, cause=cause, doubt=SENTENCE)
+    return next(iter(made), "")
 
 
 def _asking(listing: Listing, parameter: str, text: str) -> Callable[[Mapping[str, Any]], bool] | None:

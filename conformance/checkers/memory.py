@@ -29,7 +29,6 @@ from conformance.api.rest.things import (
     is_devices,
     is_marked_deleted,
     is_shared,
-    object_in,
     parts_for,
     parts_of,
     says_exactly,
@@ -125,11 +124,7 @@ class _Thing:
 
 
 class Memory:
-    """Judges each read of a thing by what the run has created, written and deleted before.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges each read of a thing by what the run has created, written and deleted before."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -343,13 +338,12 @@ class Memory:
     def _defaults(self, occasion: Occasion, operation: Operation) -> Iterator[Case]:
         """Judge whether omitted members of a created thing have their defaults; a single failure may be chance."""
         body, sent = operation.bodies.get(occasion.request.media_type), _sent_of(occasion)
-        answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         if body is None or not occasion.request.body or not occasion.is_valid:
             return
         parts = flat(body.schema).get("properties", {})
         given = {name: flat(one).get("default") for name, one in parts.items() if name not in sent}
         given = {name: one for name, one in given.items() if isinstance(one, str | int | float) and one != ""}
-        now = object_in(answer, {plain_name(name) for name in (*sent, *given)})
+        now = occasion.members((*sent, *given))
         for name, one in ((name, one) for name, one in given.items() if name in now):
             other = next(differences({name: one}, now, body.schema, operation.shape, self._collections), "")
             key = operation.label, name
@@ -371,9 +365,8 @@ class Memory:
     def _devices(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         """Judge whether a request has written members that the device sets, or members that never change."""
         own = self._own[item.template.rstrip("/")]
-        answer = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
         shape = flat(item.shape or {}).get("properties", {})
-        now = object_in(answer, {plain_name(name) for name in shape})
+        now = occasion.members(shape)
         now = {name: one for name, one in now.items() if len(str(one)) <= _SHOWN}
         before, sent = self._last.pop(path, ({}, {}))
         if len(self._last) < _MOST_THINGS:
@@ -476,8 +469,7 @@ class Memory:
 
     def _compare(self, occasion: Occasion, item: Operation, thing: _Thing, age_s: float) -> Iterator[Case]:
         """Judge whether the members of a thing read as they were written."""
-        value = read_json(occasion.response.body).value if is_json(occasion.response.media_type) else None
-        now = object_in(value, {plain_name(name) for name in thing.written})
+        now = occasion.members(thing.written)
         if now:
             self._has[item.template] |= {name for name, one in now.items() if one not in _NOTHING}
             yield from self._lacks(occasion, item, thing, now)
@@ -575,7 +567,4 @@ def _body_of(occasion: Occasion, operation: Operation) -> dict[str, Any] | None:
     is_first, value = occasion.request.media_type == next(iter(operation.bodies), None), _sent_of(occasion)
     if not (is_first and value and occasion.is_valid):
         return None
-    response = occasion.response
-    answer = read_json(response.body).value if is_json(response.media_type) else None
-    shown = object_in(answer, {plain_name(name) for name in value})
-    return as_answered(value, shown, {}, operation.bodies[occasion.request.media_type].schema)
+    return as_answered(value, occasion.members(value), {}, operation.bodies[occasion.request.media_type].schema)

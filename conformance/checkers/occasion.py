@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from conformance.api.rest.request_context import RequestContext
+from conformance.api.rest.things import object_in
 from conformance.api.rest.validity import VALID, Validity, validity
 from conformance.contract.pack import Contract
-from conformance.documents.openapi import Operation
+from conformance.documents.json_text import read_json
+from conformance.documents.openapi import Operation, is_json
+from conformance.documents.parameters import plain_name
 from conformance.transport.exchange import Exchange, Request, Response
 from conformance.verdict.evidence import Case
 
@@ -52,6 +56,11 @@ class Occasion:
     def sent_s(self) -> float:
         """When the request was sent, s of the monotonic clock."""
         return self.response.received_s - self.response.elapsed_ms / 1000
+
+    def members(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return the object in the JSON response that has the most members of these names; empty without one."""
+        is_whole = is_json(self.response.media_type) and not self.response.cut
+        return object_in(read_json(self.response.body).value if is_whole else None, {*map(plain_name, names)})
 
     @cached_property
     def validity(self) -> Validity:

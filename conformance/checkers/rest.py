@@ -41,11 +41,7 @@ _STORED: Final = frozenset(f"description/{name}" for name in ("written-is-read",
 
 
 class Histories:
-    """Judges exchanges by the earlier ones of a run.
-
-    Args:
-        contract: by which they are judged.
-    """
+    """Judges exchanges by the earlier ones of a run."""
 
     def __init__(self, contract: Contract) -> None:
         self._contract = contract

@@ -8,11 +8,10 @@ from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
 
 from conformance.api.rest.listing import items_of
-from conformance.api.rest.things import object_in, parts_of
+from conformance.api.rest.things import parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.documents.json_text import clip, read_json
 from conformance.documents.openapi import is_json
-from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
 from conformance.transport.exchange import SAFE_METHODS, Request
 from conformance.transport.reach import joined
@@ -106,7 +105,7 @@ def whole(occasion: Occasion) -> Iterator[Case]:
     if operation is None or occasion.request.method in SAFE_METHODS or not is_told or not occasion.is_valid:
         return
     sent, parts = _members(occasion.request.body, occasion.request.media_type), parts_of(operation.shape)
-    told = object_in(read_json(answer.body).value, {plain_name(name) for name in sent})
+    told = occasion.members(sent)
     for name, value in sent.items():
         now, most = told.get(name), flat(parts.get(name) or {}).get("maxLength", 0)
         if isinstance(value, str) and isinstance(now, str):

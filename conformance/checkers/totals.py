@@ -14,11 +14,10 @@ from typing import Any, Final
 from conformance.api.rest.listing import COUNTS, TOTALS, Listing, Page, listing_of, members_of, number_of, page_of
 from conformance.api.rest.references import singular
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import collection_of, object_in, parts_of
+from conformance.api.rest.things import collection_of, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_schema import is_number, kinds_of
-from conformance.documents.json_text import read_json
 from conformance.documents.openapi import SAFE, Operation, is_json, operations_of
 from conformance.documents.parameters import plain_name
 from conformance.documents.representation import flat
@@ -279,11 +278,7 @@ def numbers_by_items(numbers: dict[str, str], thing: dict[str, Any], items: Sequ
 
 
 class Sublists:
-    """Judges lists below a thing: they have as many items as the thing says, and stay when it is written.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges lists below a thing: they have as many items as the thing says, and stay when it is written."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -319,7 +314,7 @@ class Sublists:
         if template in self._numbers and (page := page_of(answer, operation)) is not None:
             yield from self._list(occasion, operation, path, page)
         elif template in self._above and is_json(answer.media_type):
-            self._things[path] = object_in(read_json(answer.body).value, {*map(plain_name, parts_of(operation.shape))})
+            self._things[path] = occasion.members(parts_of(operation.shape))
         for key in [key for key in self._lists if path in {key, key.rpartition("/")[0]}]:
             (template, page), thing = self._lists[key], self._things.get(key.rpartition("/")[0], {})
             for name, number in numbers_by_items(self._numbers[template], thing, page.items).items():

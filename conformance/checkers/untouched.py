@@ -15,7 +15,7 @@ from urllib.parse import unquote
 
 from conformance.api.rest.patches import same
 from conformance.api.rest.statuses import refuses
-from conformance.api.rest.things import identifier_of, is_shared, object_in, parts_of
+from conformance.api.rest.things import identifier_of, is_shared, parts_of
 from conformance.checkers.occasion import Occasion
 from conformance.contract.pack import Contract
 from conformance.documents.json_text import clip, read_json
@@ -61,11 +61,7 @@ class _Seen(NamedTuple):
 
 
 class Untouched:
-    """Judges each plain GET by the one before, if no request between them may have changed anything.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges each plain GET by the one before, if no request between them may have changed anything."""
 
     def __init__(self, contract: Contract) -> None:
         self._keeps_all = keeps_all(contract)
@@ -186,7 +182,7 @@ class Copied:
     def _read(self, occasion: Occasion, operation: Operation, path: str) -> Iterator[Case]:
         answer, (before, sent) = occasion.response, self._seen.pop(path, ({}, []))
         is_usable = answer.ok and is_json(answer.media_type) and len(answer.body) < _OCTETS and bool(operation.shape)
-        now = object_in(read_json(answer.body).value, {plain_name(one) for one in parts_of(operation.shape)})
+        now = occasion.members(parts_of(operation.shape))
         if not is_usable or not now or not operation.template.rstrip("/").endswith("}"):
             return
         name = unquote(path.rpartition("/")[2]).casefold()

@@ -30,7 +30,6 @@ from conformance.api.rest.things import (
     is_shared,
     leaves_of,
     left_out_of,
-    object_in,
     parts_of,
     says_exactly,
 )
@@ -137,9 +136,7 @@ class _Change(NamedTuple):
     @property
     def shown_members(self) -> dict[str, Any]:
         """The members that its response shows."""
-        response = self.write.response
-        answer = read_json(response.body).value if is_json(response.media_type) else None
-        return object_in(answer, {plain_name(text) for text in self.now})
+        return self.write.members(self.now)
 
     def is_settled(self, name: str, names: Any) -> bool:
         """Return whether the device has acted by the second read, which a device that acts later has not.
@@ -156,11 +153,7 @@ class _Change(NamedTuple):
 
 
 class Writes:
-    """Judges each read that follows one write of the same resource.
-
-    Args:
-        contract: the description's.
-    """
+    """Judges each read that follows one write of the same resource."""
 
     def __init__(self, contract: Contract) -> None:
         operations = operations_of(contract) if contract.openapi_path else ()
@@ -237,8 +230,7 @@ class Writes:
 
     def _read(self, occasion: Occasion, item: Operation, path: str) -> Iterator[Case]:
         response = occasion.response
-        value = read_json(response.body).value if is_json(response.media_type) and not response.cut else None
-        now = object_in(value, {plain_name(name) for name in parts_of(item.shape)})
+        now = occasion.members(parts_of(item.shape))
         state, writes = self._states.pop(path, None), self._writes.pop(path, [])
         sent_s, late = occasion.sent_s, self._late.pop(path, None)
         if state is not None and state.at_s <= sent_s and len(response.body) <= _MOST_OCTETS:

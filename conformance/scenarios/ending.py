@@ -21,7 +21,7 @@ from conformance.api.rest.references import singular, thing_of
 from conformance.api.rest.samples import fits
 from conformance.api.rest.things import collection_of, creator_of, id_member, object_in
 from conformance.api.rest.values import Values
-from conformance.checkers.changes import ANOTHER, ENDING, FINAL, leads_to, state_member, state_of
+from conformance.checkers.changes import ENDING, FINAL, another_of, leads_to, state_member, state_of
 from conformance.checkers.untouched import KEEPS, OFTEN
 from conformance.documents.json_schema import is_number, kinds_of
 from conformance.documents.json_text import read_json
@@ -188,7 +188,7 @@ def _fresh(writer: Writer, operations: _Operations, name: str, count: int) -> li
 
 def _is_single(create: Operation) -> bool:
     """Return whether a creation is refused by its description while another thing is active."""
-    return "409" in create.responses and bool(ANOTHER.search(create.text))
+    return "409" in create.responses and bool(another_of(create))
 
 
 def _end_active(writer: Writer, kind: Ended, path: str) -> None:

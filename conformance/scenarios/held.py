@@ -15,7 +15,7 @@ from conformance.api.rest.statuses import HELD
 from conformance.api.rest.things import collection_of
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind, Variation
-from conformance.checkers.changes import ANOTHER
+from conformance.checkers.changes import another_of
 from conformance.documents.openapi import Operation
 from conformance.scenarios.creating import created_path
 from conformance.scenarios.scenario import scenario
@@ -35,7 +35,7 @@ def held_operations(api: RestInterface, values: Values) -> Survey:
     callable_ = {key: one for key, one in callable_operations(api).items() if not one.motion}
     surveyor, actions = Surveyor(api, values), [one for one in callable_.values() if _acts(one)]
     is_held = {one.label: api.usual_status.get(one.label) in HELD and one.label not in api.working for one in actions}
-    for operation in [one for one in actions if is_held[one.label] or ANOTHER.search(one.text)][:_HELD]:
+    for operation in [one for one in actions if is_held[one.label] or another_of(one)][:_HELD]:
         api.run.limit.check()
         with api.run.limit.lift(), suppress(NoAnswerError):
             _Held(surveyor, callable_, operation, actions).call()
@@ -84,7 +84,7 @@ class _Held:
             self._call(other, path)
             if is_done := self._call(self.operation, path).ok:
                 break
-        second = self._create() if is_done and path and ANOTHER.search(self.operation.text) else ""
+        second = self._create() if is_done and path and another_of(self.operation) else ""
         if second:
             self._read(path)
             self._call(self.operation, second)

@@ -15,7 +15,7 @@ from urllib.parse import quote, unquote, urlsplit
 from conformance.api.rest.applicable import callable_operations
 from conformance.api.rest.interface import RestInterface
 from conformance.api.rest.listing import items_of
-from conformance.api.rest.samples import fits
+from conformance.api.rest.samples import entry_of, fits
 from conformance.api.rest.statuses import HELD, held_text
 from conformance.api.rest.things import (
     collection_of,
@@ -414,6 +414,8 @@ class _Cycle:
         write = None if not absent.response.ok else self.writer.read_back(self.create, self.read, path, created)
         found = absent if write is None else write.found
         found_id = str(id_member(read_json(found.response.body).value, self.read)[1] or "") if write else ""
+        if self.living.lister is not None and entry_of(self.living.lister.shape) is not None:
+            found_id = unquote(path.rstrip("/").rpartition("/")[2])
         writes = (write,) if write else ()
         life = Life(self.create.label, self.read.label, created, found, id=id_, found_id=found_id, writes=writes)
         thing = Thing(path, life, found, state=State.ALIVE if found.response.ok else State.UNKNOWN)

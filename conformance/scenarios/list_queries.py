@@ -9,6 +9,7 @@ from itertools import combinations, islice
 from typing import Any, Final
 
 from conformance.api.rest.listing import CASED, CASELESS, Listing, Page, fitting, members_of
+from conformance.checkers.lists import says_whole
 from conformance.documents.json_schema import kinds_of
 from conformance.documents.parameters import Parameter
 from conformance.documents.representation import flat
@@ -38,7 +39,10 @@ def queries_of(
     """Yield values of filters and of the sort, every second one with a limit; ``whole``: a limit that cuts nothing."""
     rows: list[dict[str, Any]] = []
     for name, parameter in listing.filters.items():
-        rows += [{parameter.name: value} for value in choices_of(parameter, name, page)[:most]]
+        values = choices_of(parameter, name, page)[:most]
+        # A part of a value finds nothing where a filter goes by the whole of it.
+        texts = [one[:-1] for one in values[:1] if isinstance(one, str) and len(one) > 1 and says_whole(parameter)]
+        rows += [{parameter.name: one} for one in (*values, *texts) if one in values or fitting(parameter, one)]
     rows += _together(listing, page)
     whole = whole or whole_query(listing, page)
     for bound in listing.bounds:
@@ -79,9 +83,11 @@ def queries_of(
 
 
 def whole_query(listing: Listing, page: Page) -> dict[str, Any]:
-    """Return a limit with which the whole list comes, by its total; nothing where it is not known or not needed."""
+    """Return a limit with which the whole list comes, by its total or as many as may be; nothing where not needed."""
     total, limit = max(page.totals.values(), default=0) + _MORE, listing.limit
     is_cut = len(page.items) + _MORE < total or 0 < listing.most({}) <= len(page.items)
+    most = flat(limit.schema).get("maximum") if limit is not None and not page.totals else None
+    total = min(most, _MOST_ITEMS) if isinstance(most, int) else total
     return {limit.name: total} if limit is not None and is_cut and fitting(limit, total) else {}
 
 

@@ -161,7 +161,7 @@ def pages_below(api: RestInterface, values: Values, listing: Listing, path: str)
     reader = Reader(api, values, listing, path=path)
     yield from _Parts(reader).all(reader.until)
     page = reader.page()
-    for query in islice(queries_of(listing, page, _FEWEST), _PAGES) if page is not None and page.items else ():
+    for query in islice(queries_of(listing, page, _FEWEST), 2 * _PAGES) if page is not None and page.items else ():
         reader.read(query)
 
 

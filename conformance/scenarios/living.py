@@ -39,6 +39,7 @@ _MANY: Final = 10
 _PAGE: Final = 2
 # Why a list may lack a thing that was changed since it was created.
 _LEFT_OUT: Final = "a list may leave out things in some states"
+_IN_SHORT: Final = "a list may show its items in short"
 # Newest things that a collection keeps: it drops older ones.
 _RING: Final = 3
 
@@ -376,7 +377,8 @@ class Living:
         listing, wrong = self.writer.until(read, lambda one: not one[1])
         self._is_shown_otherwise = bool(wrong)
         if not is_stored(listing.exchange):
-            self.note(Kind.SHOWN, operation, listing.exchange, expected, "; ".join(wrong), thing)
+            doubt = _IN_SHORT if all(text.startswith(("[]", '""')) for text in wrong) else ""
+            self.note(Kind.SHOWN, operation, listing.exchange, expected, "; ".join(wrong), thing, doubt)
 
     def look_at_older(self) -> None:
         """Check whether the list has the things created before that can still be read and have a listed state."""
@@ -434,7 +436,8 @@ def alike_members(read: Operation, lister: Operation) -> frozenset[str]:
     """Return the members that a list and its items have by the same schema, and that read alike wherever they are."""
     own, whole = parts_of(read.shape or {}), flat(lister.shape or {})
     inner = [whole, *(flat(item) for item in whole.get("properties", {}).values() if isinstance(item, dict))]
-    items: Schema = next((item["items"] for item in inner if isinstance(item.get("items"), dict)), {})
+    kinds = [item.get(key) for item in inner for key in ("items", "additionalProperties")]
+    items: Schema = next((item for item in kinds if isinstance(item, dict)), {})
     listed = flat(items).get("properties", {})
     return frozenset(
         name
@@ -450,7 +453,7 @@ def otherwise(found: Exchange, listing: WholeList, id_: str, names: frozenset[st
     return [
         f"{clip(item[name])} as {name}"
         for name in sorted(names & item.keys() & now.keys())
-        if _is_other(now[name], item[name])
+        if _is_other(now[name], item[name]) or (item[name] in ("", []) and now[name])
     ]
 
 

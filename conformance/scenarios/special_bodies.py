@@ -12,8 +12,8 @@ from conformance.api.rest.inputs import Inputs, usual_inputs
 from conformance.api.rest.invalid_variations import invalid_variations
 from conformance.api.rest.patches import JSON_PATCH, MERGE, PatchError, patched, same
 from conformance.api.rest.references import is_free_text
-from conformance.api.rest.samples import TEXTS, alike_and_apart, fits, sample
-from conformance.api.rest.things import another, entry_of, is_devices, parts_of, says_exactly
+from conformance.api.rest.samples import TEXTS, alike_and_apart, entry_of, fits, sample
+from conformance.api.rest.things import another, is_devices, parts_of, says_exactly
 from conformance.api.rest.values import Values
 from conformance.api.rest.variations import Kind
 from conformance.checkers.writes import GONE
@@ -250,7 +250,7 @@ def _nulls(
     changed = telling({"properties": parts}, {name: usable[name] for name in usable if name not in own}, 1, frozenset())
     for name in [text for text in changed if isinstance(changed[text], list) and changed[text] != usable[text]][:1]:
         yield from ({name: usable[name]}, {name: changed[name]})
-    for name, given in ((text, entry_of(flat(parts[text]))) for text in usable if text not in own):
+    for name, given in ((text, entry_of(parts[text])) for text in usable if text not in own):
         # Add two entries to a map; remove one of them beside another new one; then remove all.
         entry = sample(given) if given is not None else None
         if entry is not None and fits(parts[name], dict.fromkeys(_KEYS, entry)):

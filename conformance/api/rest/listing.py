@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 from conformance.api.rest.references import in_link
-from conformance.api.rest.samples import fits
+from conformance.api.rest.samples import entry_of, fits
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import read_json
 from conformance.documents.openapi import Operation, is_json, is_xml
@@ -157,9 +157,7 @@ class Listing:
     @cached_property
     def known_names(self) -> frozenset[str]:
         """The names of all parameters whose part is known."""
-        parts = (
-            self.limit, self.offset, self.page, self.cursor, self.sort, self.direction,
-        )  # fmt: skip
+        parts = (self.limit, self.offset, self.page, self.cursor, self.sort, self.direction)
         return self.selecting | {parameter.name for parameter in parts if parameter is not None}
 
     @cached_property
@@ -282,11 +280,8 @@ def _find_list(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | No
     if len(lists) == 1 or usual:
         chosen = (usual or lists)[0]
         return (chosen,), value[chosen]
-    inner = (
-        [(name, _find_list(one, depth + 1)) for name, one in named.items() if isinstance(one, dict)]
-        if not lists
-        else []
-    )
+    around = [] if lists else [(name, one) for name, one in named.items() if isinstance(one, dict)]
+    inner = [(name, _find_list(one, depth + 1)) for name, one in around]
     found = [(name, one) for name, one in inner if one is not None]
     usual = [one[0] for wrapper in _WRAPPERS for one in found if plain_name(one[0]) == wrapper]
     for name, one in found:
@@ -298,6 +293,8 @@ def _find_list(value: Any, depth: int) -> tuple[tuple[str, ...], list[Any]] | No
 def page_of(response: Response, operation: Operation | None = None) -> Page | None:
     """Return the list in a successful JSON response, or in an XML response by the operation's schema, or None."""
     value: Any = _value_of(response, operation) if response.ok and response.body and not response.cut else None
+    if operation is not None and isinstance(value, dict) and entry_of(operation.shape) is not None:
+        value = [{"id": key, "name": key, **one} for key, one in value.items() if isinstance(one, dict)]
     found = _find_list(value, 0)
     if found is None:
         return None
@@ -436,17 +433,27 @@ _MOST: Final = frozenset(
 _SAYS_LEAST: Final = re.compile(
     r"at least|or (?:more|later|after|newer|above|greater|higher|heavier|longer|larger|warmer|faster)"
     r"|not (?:before|below|less)|minimum|lower bound"
-    r"|greater than|more than|later than|newer than|higher than|since|\bfrom\b|>=?",
+    r"|greater than|more than|later than|newer than|higher than|since|\bfrom\b|>=?"
+    r"|\ba (?:greater|larger|higher|later|newer) (?!bound|limit)",
     re.IGNORECASE,
 )
 _SAYS_MOST: Final = re.compile(
     r"at most|or (?:less|earlier|before|older|below|fewer|lower|lighter|shorter|smaller|cooler|slower)"
     r"|not (?:after|above|more)|maximum|upper bound"
-    r"|less than|fewer than|earlier than|older than|lower than|\bbefore\b|until|up to|<=?",
+    r"|less than|fewer than|earlier than|older than|lower than|\bbefore\b|until|up to|<=?"
+    r"|\ba (?:smaller|lower|earlier|older) (?!bound|limit)",
     re.IGNORECASE,
 )
 # Phrases in it which say that the bound belongs to the values.
-_SAYS_EQUAL: Final = re.compile(r"\bat (?:least|most)\b|\bor \w+(?:er|re|ess|ve|ow)\b|inclusive|[<>]=", re.IGNORECASE)
+_SAYS_EQUAL: Final = re.compile(
+    r"\bat (?:least|most)\b|\bor \w+(?:er|re|ess|ve|ow)\b|inclusive|[<>]=|\bequal", re.IGNORECASE
+)
+# Phrases in it which say that the bound does not belong to the values.
+_SAYS_BEYOND: Final = re.compile(
+    r"(?<!not )(?<!no )(?:\b(?:greater|higher|larger|more|less|lower|smaller|fewer) than\b"
+    r"|\ba (?:greater|higher|larger|lower|smaller) (?!bound|limit))",
+    re.IGNORECASE,
+)
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _STEM: Final = re.compile(r"(?:at|on|date|time)$")
 _FREE: Final = frozenset({"", "date", "time", "datetime", "timestamp"})
@@ -480,7 +487,15 @@ class Bound(NamedTuple):
         bound, own = _rank(text), _rank(value)
         if bound is None or own is None or bound[0] != own[0]:
             return False
-        return own[1] < bound[1] - bound[2] if self.is_least else own[1] > bound[1] + bound[2]
+        is_below = own[1] < bound[1] - bound[2] if self.is_least else own[1] > bound[1] + bound[2]
+        return is_below or (self.is_strict and own == bound)
+
+    @property
+    def is_strict(self) -> bool:
+        """Whether the description says that a number is no item's value itself."""
+        says = self.parameter.says
+        is_said = bool(_SAYS_BEYOND.search(says)) and not _SAYS_EQUAL.search(says)
+        return is_said and _kind(self.parameter.schema) == "number"
 
     def includes(self, text: str, value: Any) -> bool:
         """Return whether a value of the member lies on the right side of the parameter's text, or on it if said."""
@@ -507,6 +522,10 @@ def bound_of(parameter: Parameter, members: Mapping[str, Schema]) -> Bound | Non
             # "raised at this time or later" means `raisedAt`.
             dated = [name for name in dated if _STEM.sub("", name) in re.findall(r"[a-z]+", parameter.says.lower())]
         said = {name for text in re.findall(r"`([\w.-]+)`", parameter.says) if (name := plain_name(text)) in members}
+        # "with a greater seq" means the member `seq`.
+        said |= {
+            name for name in re.findall(r"\w+$", parameter.says.rstrip(" .")) if _kind(members.get(name, {})) == kind
+        }
         found = named or (dated if rest in _FREE and kind in _DATES and len(dated) == 1 else [*said] * (len(said) == 1))
         own, is_level = _kind(members[found[0]]) if found else "", words[index].startswith(("min", "max"))
         is_level = is_level and bool(levels and named) and flat(members[named[0]]).get("enum") == levels

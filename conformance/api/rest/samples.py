@@ -42,6 +42,13 @@ FORMATS: Mapping[str, str] = {
 }
 
 
+def entry_of(schema: Schema | None) -> Schema | None:
+    """Return the schema of the entries of a map; None of what has members of its own, or entries of any kind."""
+    given = flat(schema or {})
+    entry = given.get("additionalProperties")
+    return entry if isinstance(entry, dict) and "properties" not in given else None
+
+
 def fits(schema: Schema, value: Any) -> bool:
     """Return whether a schema allows a value; a schema that no validator reads allows all."""
     try:

@@ -10,7 +10,7 @@ from http import HTTPStatus
 from typing import Any, Final, NamedTuple, TypeGuard
 
 from conformance.api.rest.references import refers, singular
-from conformance.api.rest.samples import FORMATS, alike_and_apart, fits, sample
+from conformance.api.rest.samples import FORMATS, alike_and_apart, entry_of, fits, sample
 from conformance.api.rest.values import IDS
 from conformance.documents.json_schema import Schema, is_number, kinds_of
 from conformance.documents.json_text import clip
@@ -319,14 +319,8 @@ def _of_items(
 
 def members_in(schema: Schema, names: Collection[str]) -> dict[str, Any]:
     """Return the schemas of an object's members; of a map, those of the entries with these names."""
-    entry = entry_of(flat(schema))
+    entry = entry_of(schema)
     return flat(schema).get("properties", {}) if entry is None else dict.fromkeys(names, entry)
-
-
-def entry_of(schema: Schema) -> Schema | None:
-    """Return the schema of the entries of a map; None of what has members of its own, or entries of any kind."""
-    entry = schema.get("additionalProperties")
-    return entry if isinstance(entry, dict) and "properties" not in schema else None
 
 
 def as_answered(sent: dict[str, Any], answer: dict[str, Any], before: dict[str, Any], schema: Schema) -> dict[str, Any]:

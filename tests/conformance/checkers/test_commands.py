@@ -28,7 +28,7 @@ _JOB = object_of(
     "id",
     "status",
     id={"type": "string"},
-    status={"type": "string", "enum": ["queued", "running", "paused", "done", "cancelled"]},
+    status={"type": "string", "enum": ["queued", "idle", "running", "paused", "done", "cancelled"]},
     litres={"type": "number"},
     locked={"type": "boolean"},
 )
@@ -51,7 +51,7 @@ _PATHS = {
         }}
         for name, text in (
             ("cancel", "Cancel it"), ("lock", "Lock it"), ("unlock", "Unlock it"), ("fill", "Fill it up"),
-            ("pause", "It pauses when it can"), ("check", "Check it"),
+            ("pause", "It pauses when it can"), ("check", "Check it"), ("start", "Start it"), ("stop", "Stop it"),
         )
     },
 }  # fmt: skip
@@ -94,6 +94,11 @@ def _broken(contract, steps):
         ([_get(), _do("unlock"), _get(4)] * 2, set()),
         ([_get(), _do("lock"), _do("fill"), _get(4)] * 2, set()),  # two at once: neither is judged
         ([_get(), _do("pause"), _get(4)] * 2, set()),
+        ([_get(status="idle"), _do("start", status="idle"), _get(4, status="idle")] * 2, {_STATES}),
+        ([_get(status="idle"), _do("start"), _get(status="done")] * 2, set()),
+        ([_get(), _do("start"), _get(4)] * 2, set()),  # what is queued may wait
+        ([_get(status="running"), _do("stop", status="running"), _get(4, status="running")] * 2, {_STATES}),
+        ([_get(status="running"), _do("stop"), _get(4, status="idle")] * 2, set()),
         ([_get(), _do("fill", litres=9), _get(4)] * 2, {_READ}),
         ([_get(), _do("fill", litres=9), _get(4, litres=9)] * 2, set()),
         ([_get(), _do("fill", litres=9, id="2"), _get(4)] * 2, set()),  # another thing

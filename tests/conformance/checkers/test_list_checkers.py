@@ -1,5 +1,7 @@
 """Lists in every style: parameters that do what they say are never blamed, and those that do not are."""
 
+import json
+
 import pytest
 from small_device import answers, contract_of, described
 from valve_lists import (
@@ -19,9 +21,10 @@ from valve_lists import (
     word,
 )  # fmt: skip
 
-from conformance.api.rest.listing import items_of
+from conformance.api.rest.listing import items_of, page_of
 from conformance.checkers.lists import is_before
 from conformance.checkers.rest import RestCheckers
+from conformance.documents.openapi import operations_of
 from conformance.transport.exchange import Exchange, Request, Response
 
 
@@ -124,6 +127,15 @@ def test_a_list_is_found_in_its_envelope(envelope, tmp_path):
     assert Seen(tmp_path, [whole("limit")], ENVELOPES[envelope]).read(VALVES, limit=1).broken == {LIMIT}
 
 
+def test_things_by_their_identifiers_are_a_list(tmp_path):
+    places = {"type": "object", "additionalProperties": {"type": "object", "properties": {"joints": {}}}}
+    paths = {"/places": {"get": {"responses": {"200": answers(places)}}}}
+    (read,) = operations_of(contract_of(tmp_path, described(paths, "3.1.0")))
+    body = json.dumps({"home": {"joints": [0]}, "park": {"joints": [1]}, "none": 3}).encode()
+    page = page_of(Response(200, (("Content-Type", "application/json"),), body, 1.0), read)
+    assert [(one["id"], one["joints"]) for one in page.items] == [("home", [0]), ("park", [1])]
+
+
 _XML_ITEM = {"type": "object", "xml": {"name": "valve"}, "properties": {"id": MEMBERS["id"], "state": MEMBERS["state"]}}
 _XML_LISTS = {
     "plain": ({"type": "array", "items": _XML_ITEM, "xml": {"name": "valves"}}, "<valves>{}</valves>"),
@@ -201,6 +213,15 @@ _WHEN = {"type": "string", "format": "date-time"}
     ("parameter", "value", "keep", "blamed"),
     [
         (_bound("min_size", "At least this size."), 2, lambda _: True, True),
+        (_bound("since", "Only valves with a greater size."), 2, lambda one: one["size"] >= 2, True),
+        (_bound("since", "Only valves with a greater size."), 2, lambda one: one["size"] > 2, False),
+        (_bound("since", "Not those with a size greater than this."), 2, lambda one: one["size"] <= 2, False),
+        (
+            _bound("min_size", "No size greater than or equal to it is left out."),
+            2,
+            lambda one: one["size"] >= 2,
+            False,
+        ),
         (_bound("sizeMax", "Sizes up to this."), 2, lambda _: True, True),
         (_bound("size[lte]", "Size <= value."), 2, lambda one: one["size"] >= 2, True),
         (_bound("since", "Only those at or after this time.", **_WHEN), _NOON, lambda one: one["opened"], True),
@@ -352,12 +373,32 @@ def test_a_cursor_that_no_page_has_named(says, text, blamed, tmp_path):
         ("The oldest valves first.", "134", True),
         ("As they were opened, oldest first.", "4321", False),
         ("All valves.", "4321", False),
+        ("All valves, ordered by name.", "2134", True),
+        ("All valves, ordered by name.", "1234", False),
+        ("All valves, sorted by `name`.", "4321", False),
+        ("All valves, sorted by state.", "2134", False),
+        ("All valves, ordered by use.", "2134", False),
     ],
 )
 def test_an_order_that_the_description_tells(says, order, blamed, tmp_path):
     seen = Seen(tmp_path, [], says=says).read([VALVES[int(number) - 1] for number in order])
     assert (ORDER in seen.broken) == blamed
     assert all(case.doubt for case in seen.cases if case.requirement == ORDER)
+
+
+@pytest.mark.parametrize(
+    ("says", "asked", "blamed"),
+    [
+        ("Only valves of this zone.", "nor", True),
+        ("Only valves of this zone.", "North", False),
+        ("Only valves of zones that begin with this text.", "nor", False),
+        ("Zone.", "nor", False),
+    ],
+)
+def test_a_filter_that_goes_by_the_whole_value(says, asked, blamed, tmp_path):
+    seen = Seen(tmp_path, [{**word("zone"), "description": says}]).read(VALVES).read(VALVES[:1], zone=asked)
+    assert (FILTER in seen.broken) == blamed
+    assert all(case.doubt for case in seen.cases if not case.holds)
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,8 @@ def _contract(tmp_path_factory):
     paths["/belts/{id}"] = {"parameters": [_ID], "get": {"responses": {"200": answers(_BELT)}}, "put": put}
     begin = {"summary": "Only one belt runs at a time: while one is `running`, 409.", "responses": acted}
     paths["/belts"] = {"post": begin}
+    alone = {**acted, "409": {**REFUSED, "description": "Another belt is running"}}
+    paths["/belts/{id}/launch"] = {"parameters": [_ID], "post": {"responses": alone}}
     paths["/belts/{id}/goods"] = {"parameters": [_ID], "post": put}
     document = described(paths, "3.1.0")
     return contract_of(tmp_path_factory.mktemp("pack"), document)
@@ -95,6 +97,10 @@ _BROKEN = {
     ),
     "resumed from stopped": (_RESUMED * 2, _STATES),
     "two run at once": ([(f"GET {number} 200", "running") for number in (1, 2, 1)], _STATES),
+    "launched beside another": (
+        [("GET 1 200", "running"), ("POST 2/launch 200", "running"), ("GET 1 200", "running")],
+        _STATES,
+    ),
     "a scrapped one that is done": ([("GET . 200", "scrapped"), ("GET . 200", "stopped")], _STATES),
     "sealed twice": ([("POST /seal 200",), ("GET . 200", "stopped"), ("POST /seal 200",)], _STATES),
     "a refused start counts": (_refused("start", 1, 2, 3), _KEEPS),
@@ -118,6 +124,9 @@ _RIGHT = {
         *(("GET . 200", "running", 1), ("GET . 200", "running", 2)), *_refused("start", 2, 3, 4),
     ],
     "a count of all refusals": [*_refused("start", 1, 2, 3)[:-2], *_refused("resume", 3, 4, 5)],
+    "launched when another stops": [
+        ("GET 1 200", "running"), ("POST 2/launch 200", "running"), ("GET 1 200", "stopped"),
+    ],
     "one that runs after another": [("GET 1 200", "running"), ("GET 2 200", "running"), ("GET 1 200", "stopped")],
     "a refusal of which nothing is said": _refused("pause", 1, 2, 3),
     "a refusal that keeps": _refused("start", 1, 2, 3, change=0)[:3],
