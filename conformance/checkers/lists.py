@@ -411,7 +411,7 @@ def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[
     text = listing.operation.text
     said, by = IN_TIME.search(text), _BY.search(text)
     found = said or by
-    member, descending = _timed(listing) if said is not None else "", said is not None and said[1] is not None
+    member, descending = _time_member(listing) if said is not None else "", said is not None and said[1] is not None
     # "Pinned notes first, in both groups the newest first": the newest of all need not come first.
     if said is not None and _GROUPED.search(text[: said.start()].rpartition(".")[2]):
         return
@@ -432,7 +432,7 @@ def _said_order(occasion: Occasion, listing: Listing, page: Page, sent: Mapping[
         yield occasion.case("description/list-order", not wrong, expected, other, cause=cause, doubt=SENTENCE)
 
 
-def _timed(listing: Listing) -> str:
+def _time_member(listing: Listing) -> str:
     """Return the member with the time of an item, or an empty text."""
     dated = [name for name, one in listing.members.items() if flat(one).get("format") == "date-time"]
     made = [name for name in dated if plain_name(name).startswith("created")] or (dated if len(dated) == 1 else [])
