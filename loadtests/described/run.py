@@ -279,10 +279,9 @@ class Described:
         names, weights, changing = tuple(choice.weights), tuple(choice.weights.values()), choice.changing
         if changing or options["operators"]:
             self._stopping = tuple(map(Stopping.of, (*self.devices, *self.others)))
-        robot = choice.robot()
         levels = choice.levels(partial=self.named.wsdl is not None)
         return Target(
-            robot,
+            choice.robot(),
             Selection(
                 names, tuple(each.interface for each in devices), ("wire",), weights if len(set(weights)) > 1 else ()
             ),
@@ -402,6 +401,7 @@ def _other(named: Named, options: Mapping[str, Any], against: str) -> tuple[Devi
 
 
 def _statement(device: Device) -> RobotStatement:
-    """Return a device's statement as the load test reads it."""
-    said = device.statement
-    return RobotStatement(robot=said.robot, endpoints=said.endpoints, load=said.load)
+    """Return a device's statement as the load test reads it; a device without a name has its description's title."""
+    said, info = device.statement, device.api.run.contract.openapi.get("info")
+    title = {"name": str(info.get("title", ""))} if isinstance(info, dict) else {}
+    return RobotStatement(robot=title | said.robot, endpoints=said.endpoints, load=said.load)

@@ -30,8 +30,7 @@ class Notary:
 
         Args:
             path: the file.
-            known: returns the digests and the ledger of the installed suite for the contract of the results, with the
-                fields of `policy.Known`; of a result by another suite or contract, the ledger is not checked.
+            known: returns the installed suite's `policy.Known`; the ledger of another suite or contract is not checked.
 
         Raises:
             KeyUnusableError: the file cannot be read, has a passphrase, or holds no Ed25519 private key.

@@ -4,6 +4,7 @@ The bounds are Nielsen's (Usability Engineering, 1993, section 5.5, after Miller
 immediate, within 1 s the delay is noticed but does not interrupt a train of thought, and beyond that people wait.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -176,9 +177,9 @@ class Verdict:
 
 
 def verdict(result: Mapping[str, Any], series: AllSeries) -> Verdict:
-    """Return the verdict for a page: the headline stored in the result, with the tone and sign that fit."""
-    said = result["headline"]
-    return Verdict(*_tone(result, series), said["words"], said["sentence"])
+    """Return the verdict for a page: the headline stored in the result, whose sentence does not repeat its words."""
+    words, sentence = result["headline"]["words"], result["headline"]["sentence"]
+    return Verdict(*_tone(result, series), words, opened(re.sub(rf"\A{re.escape(words)}[.:] ", "", sentence)))
 
 
 def _tone(result: Mapping[str, Any], series: AllSeries) -> tuple[str, str]:

@@ -145,7 +145,7 @@ def test_https_with_its_own_authority_and_a_login(started, load, certificate, tm
     run = load(str(statement), SHORT, "--operation 'GET /state' --processes 2")
     series = run.series("GET /state", "rest")
     assert (series["count"] > 50, series["errors"]) == (True, 0), run.out + run.err
-    assert run.result["environment"]["robot"]["rest"] == url
+    assert [run.result["environment"]["robot"][key] for key in ("name", "rest")] == ["toy", url]
     assert TOKEN not in run.out + run.err + json.dumps(run.result)
     untrusted = load(f"{url}/openapi.json", SHORT, "--operation 'GET /state'")
     assert (untrusted.code, "certificate" in untrusted.err) == (3, True), untrusted.err

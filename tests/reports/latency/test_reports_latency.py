@@ -89,6 +89,8 @@ def test_markdown_is_short_and_has_the_answer(latency):
     source = latency_markdown(latency)
     assert len(source) < 6000
     assert latency["headline"]["sentence"][:80] in source
+    repeated = {"words": "REST breaks down", "sentence": "REST breaks down. Half take 1 ms."}
+    assert latency_markdown(latency | {"headline": repeated}).count("REST breaks down") == 1
     assert "| delivery | SOAP | wire | 900 |" in source
 
 
