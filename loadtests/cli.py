@@ -17,7 +17,7 @@ import click
 from conformance.commandline.device_options import credential_options, description_options
 from conformance.commandline.endings import as_parent, end_like_ctrl_c, end_with_parent, ending_signals, ignore_signals
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import Group, inert, options_of
+from conformance.commandline.help_pages import Group, inert, options_of, say
 from conformance.commandline.out_folder import FolderError, command_without_folders, hold
 from conformance.commandline.result_command import CommandResult, ResultCommand
 from conformance.contract.toml_file import TomlFileError
@@ -301,9 +301,9 @@ def load(targets: tuple[str, ...], **options: Any) -> CommandResult:
         click.echo(result.file.read_text(encoding="utf-8"), nl=False)
     elif not as_json:
         for line in stops_lines(result.file):
-            click.echo(line)
+            say(line)
         summary.seek(0)
-        click.echo(summary.read(), nl=False)
+        say(summary.read().rstrip("\n"))
     return kept.after(result, tolerance, context.obj)._replace(tell=not as_json)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from conformance.commandline.exit_codes import ExitCode
-from conformance.commandline.help_pages import columns, inert, wrap
+from conformance.commandline.help_pages import columns, inert, say, wrap
 from conformance.contract.classes import QUESTIONS
 from conformance.verdict.baseline import ENTRY
 from conformance.verdict.finding import count_of, few_of
@@ -54,7 +54,7 @@ def print_summary(outcome: Certification) -> None:
         mark, blanks = click.style(_MARKS[value], fg=_COLOURS.get(value)), " " * (13 - len(_MARKS[value]))
         # On a narrow terminal the reason gets lines of its own.
         below = (columns() or _WIDE) < _WIDE and reason
-        told = wrap(inert(reason[:300]), " " * (_NARROW if below else _REASON))
+        told = wrap(" " * (_NARROW if below else _REASON) + inert(reason[:300]))
         click.echo(
             f"  {name + view:<30} {mark}{blanks}{chr(10) if below else ''}{told if below else told.lstrip()}".rstrip()
         )
@@ -74,10 +74,10 @@ def print_summary(outcome: Certification) -> None:
                 _print_line(cause, requirement)
     _print_unjudged(document)
     if "web_server" in document:
-        click.echo(f"\nThe web server\n{wrap(inert(document['web_server']['text']), '  ')}")
+        say(f"\nThe web server\n  {inert(document['web_server']['text'])}")
     if document["causes"]:
         id_ = document["causes"][0]["requirement"]
-        click.echo(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
+        say(f"\nwhy a requirement matters and how to meet it: roaas explain ID, as in roaas explain {id_}")
     _print_counts(document)
 
 
@@ -98,14 +98,12 @@ def _print_counts(document: Mapping[str, Any]) -> None:
     accepted = f", accepted by the baseline until {document['accepted_until']}" if "accepted_until" in document else ""
     if stale := document.get("stale"):
         accepted += f", but the baseline expects {few_of(stale, _SHOWN_BLOCKED)} to fail, so the exit code is 1"
-    click.echo(
+    say(
         f"\n{document['verdict_line']}{accepted}: {told}; "
         f"{count_of(document['requests'], 'request')} in {document['duration_s']:.1f} s, seed {document['seed']}"
     )
     if counts[_UNTESTED] and "api" in document:
-        click.echo(
-            "not tested: this run could not try it, and the report says why; not judged: nothing called shows it"
-        )
+        say("not tested: this run could not try it, and the report says why; not judged: nothing called shows it")
 
 
 def _print_answers(found: Sequence[Mapping[str, str]]) -> None:
@@ -129,17 +127,17 @@ def _print_unjudged(document: Mapping[str, Any]) -> None:
     """Print what the baseline does not accept, and what was not judged because of a suite error or ``--minutes``."""
     for item in document["requirements"]:
         if item["reason"].startswith(ENTRY):
-            click.echo(f"\n{item['id']}: {inert(item['reason'].partition(': ')[0])}.")
+            say(f"\n{item['id']}: {inert(item['reason'].partition(': ')[0])}.")
     for id_ in document.get("stale", ()):
-        click.echo(f"\nThe baseline expects {id_} to fail, and it passes: delete the entry.")
+        say(f"\nThe baseline expects {id_} to fail, and it passes: delete the entry.")
     faults: Sequence[Mapping[str, Any]] = document.get("suite_errors", ())
     if faults:
         count = len({id_ for fault in faults for id_ in fault["requirements"]})
-        click.echo(f"\n{count_of(count, 'requirement')} could not be judged because of an error in the suite:")
+        say(f"\n{count_of(count, 'requirement')} could not be judged because of an error in the suite:")
     for fault in faults:
-        click.echo(f"  {inert(fault['text'])}")
+        say(f"  {inert(fault['text'])}")
     if "left_out" in document:
-        click.echo(f"\nNot everything was tried\n{wrap(inert(document['left_out']['text']), '  ')}")
+        say(f"\nNot everything was tried\n  {inert(document['left_out']['text'])}")
 
 
 def _print_unshown(rows: list[dict[str, Any]]) -> None:
@@ -148,13 +146,13 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
     if not unshown:
         return
     pronoun = "it" if len(unshown) == 1 else "them"
-    click.echo(f"\n{count_of(len(unshown), 'operation')} never answered 2xx, so little of {pronoun} was judged:")
+    say(f"\n{count_of(len(unshown), 'operation')} never answered 2xx, so little of {pronoun} was judged:")
     for row in unshown:
         statuses = (
             ", ".join(f"{count_of(count, 'time')} {code}" for code, count in row["statuses"].items()) or "no response"
         )
         need = f"; needs {row['needs']}" if "needs" in row else ""
-        click.echo(f"  {inert(row['operation'])}: {statuses}{need}")
+        say(f"  {inert(row['operation'])}: {statuses}{need}")
     names = sorted({name for row in unshown for name in row.get("values", ())})
     if names:
         click.echo("  values that the device knows, in a statement, may help:\n    [values]")
@@ -165,9 +163,7 @@ def _print_unshown(rows: list[dict[str, Any]]) -> None:
 def _print_left(lines: Sequence[str]) -> None:
     """Print in which state the device was left."""
     if lines:
-        click.echo("\nLeft behind on the device:")
-    for line in lines:
-        click.echo(f"  {inert(line)}")
+        say("\n  ".join(("\nLeft behind on the device:", *map(inert, lines))))
 
 
 def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
@@ -177,7 +173,7 @@ def _print_line(cause: dict[str, Any], requirement: dict[str, Any]) -> None:
     said = said if len(said) <= _LINE else f"{said[:_LINE]}…"
     others = len(failure.get("operations", ())) - 1
     more = f" … and {count_of(others, 'more operation')}" if others > 0 else ""
-    click.echo(f"{cause['number']}. {_word(requirement, failure)} {requirement['id']}: {inert(said)}{more}")
+    say(f"{cause['number']}. {_word(requirement, failure)} {requirement['id']}: {inert(said)}{more}")
 
 
 def _word(requirement: Mapping[str, Any], failure: Mapping[str, Any]) -> str:
@@ -189,17 +185,17 @@ def _print_cause(cause: dict[str, Any], requirement: dict[str, Any], folder: Pat
     """Print a finding, and the requirements that could not be tested because of it."""
     failure = next(item for item in requirement["failures"] if item["number"] == cause["number"])
     head = f"{_word(requirement, failure)} {requirement['id']} ({requirement['level']}, {requirement['source']})"
-    click.echo(f"\n{cause['number']}. {head}")
+    say(f"\n{cause['number']}. {head}")
     if accepted := requirement.get("expected_failure"):
-        click.echo(wrap(inert(f"accepted by the baseline until {accepted['expires']}: {accepted['reason']}"), "  "))
+        say(f"  accepted by the baseline until {accepted['expires']}: {inert(accepted['reason'])}")
     # The others are in the report and in roaas explain.
-    click.echo(wrap(_SENTENCE.split(requirement["text"], maxsplit=1)[0], "  "))
-    click.echo(wrap(inert(cause["text"]), "  "))
+    click.echo(wrap(f"  {_SENTENCE.split(requirement['text'], maxsplit=1)[0]}"))
+    say(f"  {inert(cause['text'])}")
     if "breaks" in requirement:
-        click.echo(wrap(f"what breaks in practice: {requirement['breaks']}", "  "))
+        say(f"  what breaks in practice: {requirement['breaks']}")
     blocks = cause["blocks"]
     if blocks:
-        click.echo(f"  not tested because of it: {few_of(blocks, _SHOWN_BLOCKED)}")
+        say(f"  not tested because of it: {few_of(blocks, _SHOWN_BLOCKED)}")
     if failure["request"]:
         click.echo(f"  replay: {inert(_command(failure['request']['curl'], cause['number'], folder))}")
 

@@ -1,5 +1,6 @@
 """Help of a command with many options: in groups, rare options only under --help-all, and a first example."""
 
+import os
 import re
 import shutil
 import sys
@@ -7,7 +8,7 @@ import textwrap
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TextIO, TypeVar
 
 import click
 
@@ -111,8 +112,7 @@ def _show_everything(ctx: click.Context, _: click.Parameter, given: bool) -> Non
 
 
 _NARROWEST, _WIDEST = 60, 200
-# Texts that CI systems execute when a job prints them: GitHub's `::` at the start of a line, and `##[` and `##vso[` of
-# Azure, TeamCity and older GitHub anywhere.
+# CI systems execute these in a job's output: GitHub's `::` at a line's start; `##[` and `##vso[` of others anywhere.
 _COMMAND = re.compile(r"^(?=\s*::)|(?<=#)#(?=\w*\[)")
 
 
@@ -126,22 +126,22 @@ def inert(text: str) -> str:
     return _COMMAND.sub(lambda found: f"\\{found[0]}", line)
 
 
-def columns() -> int | None:
-    """Return the terminal's width, 60 to 200 columns; None if stdout is no terminal: then lines are not wrapped."""
-    if not sys.stdout.isatty():
+def columns(stream: TextIO | None = None) -> int | None:
+    """Return the width of a stream (stdout), 60 to 200 columns; None if it is no terminal: then no line is wrapped."""
+    stream = stream or sys.stdout
+    if not stream.isatty():
         return None
-    return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
+    return min(max(shutil.get_terminal_size(os.get_terminal_size(stream.fileno())).columns, _NARROWEST), _WIDEST)
 
 
-def wrap(text: str, indent: str = "") -> str:
-    """Return a text whose lines are as wide as the terminal.
-
-    Args:
-        text: one line of words; what is to be copied as it is must not be given.
-        indent: what each line begins with.
-    """
-    width = columns()
+def wrap(text: str, stream: TextIO | None = None) -> str:
+    """Return a line of words in lines as wide as the terminal, all with its indent; not for what is to be copied."""
+    width, indent = columns(stream), text[: len(text) - len(text.lstrip(" "))]
     if width is None:
-        return f"{indent}{text}"
-    lines = textwrap.wrap(text, width - len(indent), break_long_words=False, break_on_hyphens=False)
-    return "\n".join(f"{indent}{line}" for line in lines)
+        return text
+    return textwrap.fill(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def say(text: str, stream: TextIO | None = None) -> None:
+    """Print lines of words to a stream (stdout)."""
+    click.echo("\n".join(wrap(line, stream) for line in text.split("\n")), file=stream)

@@ -14,6 +14,7 @@ import pytest
 
 from conformance.commandline.endings import Started
 from conformance.commandline.exit_codes import OF_VERDICT, ExitCode
+from conformance.commandline.help_pages import say
 from conformance.commandline.secrecy import SECRETS
 from conformance.contract.classes import Prerequisite
 from conformance.contract.described import MOTION, ROS, SOAP
@@ -103,7 +104,7 @@ def certify(
             if reached:
                 # If the robot was never reached, its findings only hide that.
                 if progress is not None:
-                    progress.writelines(f"{note}\n" for note in filter(None, (*notes, *announced, robot.estimate())))
+                    say("\n".join(filter(None, (*notes, *announced, robot.estimate()))), progress)
                 _run_and_repeat(robot, Progress(robot, progress, bar=bar), remarks, recordings)
             else:
                 run.aborted = "the robot could not be reached: " + "; ".join(

@@ -2,7 +2,6 @@
 
 import math
 import os
-import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from collections.abc import Callable
 import gevent
 
 from conformance.commandline.endings import PARENT_VARIABLE
+from conformance.commandline.help_pages import columns, wrap
 from loadtests.measuring.distributed_executor import Executor
 from loadtests.measuring.errors import GeneratorError
 from loadtests.result.outcome import Carried, Outcome
@@ -105,7 +105,7 @@ class Progress:
         """Write a line."""
         if not self._silent:
             self.end()
-            sys.stderr.write(message + "\n")
+            sys.stderr.write(wrap(message, sys.stderr) + "\n")
             sys.stderr.flush()
 
     def look(self, recorder: Recorder, elapsed_s: float, length_s: float) -> None:
@@ -118,8 +118,7 @@ class Progress:
         self._due = now + (_OFTEN_S if self._renews or not answered else self._every_s)
         self._before = elapsed_s, answered
         if self._renews:
-            width = shutil.get_terminal_size().columns
-            sys.stderr.write(f"\r{line[: width - 1]}\x1b[K")
+            sys.stderr.write(f"\r{line[: (columns(sys.stderr) or 80) - 1]}\x1b[K")
             self._open = True
         else:
             sys.stderr.write(line + "\n")
