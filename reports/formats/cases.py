@@ -152,8 +152,6 @@ def _outcome(requirement: Mapping[str, Any], found: Sequence[Finding]) -> tuple[
     outcome = _OUTCOMES[verdict]
     if outcome in {Outcome.FAILED, Outcome.WARNING}:
         return outcome, headline(found) or requirement["reason"] or requirement["text"]
-    if verdict == "not-claimed":
-        return outcome, "The class is not claimed."
     return outcome, "" if outcome is Outcome.PASSED else reason or _UNEXPLAINED[outcome]
 
 

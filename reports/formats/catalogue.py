@@ -228,10 +228,10 @@ _LATENCY_MESSAGE = 1000
 def junit(result: Mapping[str, Any]) -> str:
     """Return a valid `roaas-result/1` document as JUnit XML text with an XML declaration (UTF-8)."""
     found = cases(result)
-    robot = result["statement"]["robot"].get("name") or result["target"].get("rest") or "robot"
+    names = (result["statement"]["robot"].get("name"), result.get("api", {}).get("title"), result["target"].get("rest"))
     root = etree.Element(
         "testsuites",
-        name=excerpt(f"RoAAS: {robot}", 200),
+        name=excerpt(f"RoAAS: {next(filter(None, names), 'robot')}", 200),
         tests=str(len(found)),
         failures=_count(found, "failure"),
         errors=_count(found, "error"),
@@ -337,7 +337,7 @@ def _test(result: Mapping[str, Any], case: Case) -> dict[str, Any]:
 
 def _environment(result: Mapping[str, Any]) -> dict[str, str]:
     robot = result["statement"]["robot"]
-    named = {"appName": robot.get("name"), "appVersion": robot.get("version")}
+    named = {"appName": robot.get("name") or result.get("api", {}).get("title"), "appVersion": robot.get("version")}
     return {key: excerpt(value, 200) for key, value in named.items() if value}
 
 

@@ -65,26 +65,20 @@ def test_failure_tells_how_to_see_it_again(result):
     assert failure.get("message") == told["message"]
     for wanted in (f"[1] {told['message']}", "Send it again: curl ", "no response", "Not tested because of it: "):
         assert wanted in failure.text
-
-
-def test_what_a_finding_blocks_is_skipped_because_of_it(result):
-    skipped = case(parsed(result), "rest-resources/sensors-unique").find("skipped")
-    assert skipped.get("message").startswith("Not tested, because of finding 1: ")
+    blocked = case(parsed(result), "rest-resources/sensors-unique").find("skipped").get("message")
+    assert blocked.startswith("Not tested, because of finding 1: ")
 
 
 def test_warning_breaks_no_build_and_is_told(result):
     assert "WARNING: Sent the bytes `" in case(parsed(result), "http/malformed-request").findtext("system-out")
 
 
-def test_class_that_failed_without_a_failing_requirement_is_red(result):
-    result["classes"]["rest-delivery"] = "fail"
+def test_class_without_a_failing_requirement_is_red_as_its_verdict_says(result):
+    result["classes"] |= {"rest-delivery": "fail", "strict-input": "inconclusive"}
     result["class_reasons"]["rest-delivery"] = "its prerequisite, the REST endpoint, was not given"
-    assert case(parsed(result), "class rest-delivery").find("failure").get("message").startswith("its prerequisite")
-
-
-def test_inconclusive_class_is_no_green_one(result):
-    result["classes"]["strict-input"] = "inconclusive"
-    assert case(parsed(result), "class strict-input").find("error") is not None
+    root = parsed(result)
+    assert case(root, "class rest-delivery").find("failure").get("message").startswith("its prerequisite")
+    assert case(root, "class strict-input").find("error") is not None
 
 
 def test_nothing_judged_is_an_error(result):
@@ -121,3 +115,11 @@ def test_huge_body_is_cut(result):
     document = junit(result)
     assert len(document) < 60_000
     assert "of 1000000 characters are not shown" in document
+
+
+def test_a_device_without_a_statement_has_its_descriptions_name_and_reasons(described_result):
+    described_result["statement"]["robot"] = {}
+    unseen = next(item for item in described_result["requirements"] if item["verdict"] == "not-claimed")
+    root = parsed(described_result)
+    told = root.get("name"), case(root, unseen["id"]).find("skipped").get("message")
+    assert told == (f"RoAAS: {described_result['api']['title']}", unseen["reason"])
